@@ -30,7 +30,7 @@ import numpy as np  # noqa: E402
 
 from inertial.fits.linear import fit_lot  # noqa: E402
 from pipelines.archive import Archive, Run  # noqa: E402
-from pipelines.jobs.model_change import ModelChange, wanted  # noqa: E402
+from pipelines.jobs.model_change import ModelChange, change_from_options  # noqa: E402
 from pipelines.parallel import map_partitions  # noqa: E402
 from pipelines.rerun.lot_comparison import judged  # noqa: E402
 from pipelines.rerun.partition import Batch, parts, run_again  # noqa: E402
@@ -128,7 +128,7 @@ def measured(units: int, workers: int, folder: Path) -> None:
         str(units // PER_LOT),
     ]
     subprocess.run(generate, check=True, stdout=subprocess.DEVNULL)
-    archive, change = Archive(place), wanted(",".join(EFFECTS))
+    archive, change = Archive(place), change_from_options(",".join(EFFECTS))
     print(f"{units} units in {units // PER_LOT} lots × 72 dwells of the fit, {workers} processes of one thread")
     read, read_cpu = timed("reading and solution", bare, archive, ModelChange(), workers)
     memory, memory_cpu = timed("re-fit and re-grade in memory", judged, archive, change, workers)

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from docs.generated_page import write_or_check
 from stations.devices.adapters import adapters
 from stations.devices.axis import TableAxis
 from stations.devices.equipment import Equipment
@@ -159,13 +160,5 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
-def main() -> int:
-    """Writes the page; with ``--check`` gives 1 where it is not what the profiles say."""
-    if "--check" in sys.argv[1:]:
-        return 0 if PAGE.read_text(encoding="utf-8") == page() else 1
-    PAGE.write_text(page(), encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check(PAGE, page(), "docs.devices_page"))

@@ -21,6 +21,7 @@ from typing import (
 
 from typing_extensions import is_typeddict
 
+from docs.generated_page import write_or_check
 from pipelines.cli import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -134,18 +135,5 @@ def page(text: str) -> str:
     return f"{before}{BEGIN}\n{tables()}\n{END}{rest.split(END)[1]}"
 
 
-def main(arguments: list[str]) -> int:
-    """Write the page, or check it; 1 where it is out of date."""
-    old = PAGE.read_text(encoding="utf-8")
-    new = page(old)
-    if "--check" in arguments:
-        sys.stdout.write(
-            "" if old == new else f"{PAGE.name} is out of date; write it again with 'python -m docs.documents_page'\n"
-        )
-        return int(old != new)
-    PAGE.write_text(new, encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write_or_check(PAGE, page(PAGE.read_text(encoding="utf-8")), "docs.documents_page"))

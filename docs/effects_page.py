@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from docs.generated_page import write_or_check
 from inertial import effects
 from inertial.effects.covariate import Covariate
 from inertial.effects.formula import Formula
@@ -109,19 +110,5 @@ def _formulas() -> str:
     return "\n".join(lines)
 
 
-def main(arguments: list[str]) -> int:
-    """Write the page, or check it; 1 where it is out of date."""
-    text = page()
-    if "--check" in arguments:
-        same = PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text
-        sys.stdout.write(
-            "" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.effects_page'\n"
-        )
-        return 0 if same else 1
-    PAGE.parent.mkdir(parents=True, exist_ok=True)
-    PAGE.write_text(text, encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write_or_check(PAGE, page(), "docs.effects_page"))

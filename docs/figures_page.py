@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+from docs.generated_page import write_or_check
 from pipelines.stages import figures
 
 if TYPE_CHECKING:
@@ -37,18 +38,5 @@ def _row(kind: FigureKind) -> str:
     return f"| `{kind.name}` | {kind.unit} | {meaning} | {kind.missing(EMPTY)} |"
 
 
-def main(arguments: list[str]) -> int:
-    """Write the page, or check it; 1 where it is out of date."""
-    text = page()
-    if "--check" in arguments:
-        same = PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text
-        sys.stdout.write(
-            "" if same else f"{PAGE.name} is out of date; write it again with 'python -m docs.figures_page'\n"
-        )
-        return 0 if same else 1
-    PAGE.write_text(text, encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write_or_check(PAGE, page(), "docs.figures_page"))

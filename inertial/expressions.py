@@ -152,9 +152,9 @@ class Expression:
             close = get_close_matches(name, FUNCTIONS, n=2, cutoff=0.5)
             hint = f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(FUNCTIONS)}"
             self._refuse(f"unknown function '{name}'; {hint}")
-        wanted = FUNCTIONS[name][0]
-        if len(arguments) != wanted:
-            self._refuse(f"{name} has {len(arguments)} arguments, {wanted} needed")
+        needed = FUNCTIONS[name][0]
+        if len(arguments) != needed:
+            self._refuse(f"{name} has {len(arguments)} arguments, {needed} needed")
         for argument in arguments:
             self._check(argument)
 

@@ -183,8 +183,8 @@ class _Work:
         rows, _ = self.rows(theta)
         white, left = self.white(rows), self.white(self.left(theta)[..., None])[..., 0]
         step = np.zeros_like(theta)
-        for unit, (own, wanted) in enumerate(zip(white, left, strict=True)):
-            unscaled = self._solved(own, wanted)
+        for unit, (own, target) in enumerate(zip(white, left, strict=True)):
+            unscaled = self._solved(own, target)
             step[unit][self.free] = -unscaled
         length = np.ones((len(theta), 1, 1))
         for _ in range(_HALVINGS):
@@ -198,7 +198,7 @@ class _Work:
         trial = np.where(kept, theta + length * step, theta)
         return trial, self.cost(trial)
 
-    def _solved(self, rows: Array, wanted: Array) -> Array:
+    def _solved(self, rows: Array, target: Array) -> Array:
         """Least squares of one unit; refused where a direction of the coefficients does not show."""
         size = np.linalg.norm(rows, axis=0)
         unit = rows / np.where(size > 0.0, size, 1.0)
@@ -213,7 +213,7 @@ class _Work:
                 f"fit: {name} of {effect} on axis {'xyz'[axis]} does not show in the norm of gravity over these dwells; leave "
                 f"{effect} out, or measure other orientations and conditions"
             )
-        return np.linalg.lstsq(unit, wanted, rcond=None)[0] / size
+        return np.linalg.lstsq(unit, target, rcond=None)[0] / size
 
     def finished(self, theta: Array) -> NormFit:
         """The fit with covariances, residuals and degrees of freedom."""

@@ -26,8 +26,8 @@ Result = TypeVar("Result")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
-class Spread(Protocol):
-    """A way to spread work over other machines, such as :func:`pipelines.flows.spread.on_dask`."""
+class Distributor(Protocol):
+    """A way to spread work over other machines, such as :func:`pipelines.flows.dask_cluster.on_dask`."""
 
     def __call__(self, function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
         """What the function makes of every partition, in order; ``name`` is that of the work in logs."""
@@ -37,7 +37,7 @@ class Spread(Protocol):
 def map_partitions(
     function: Callable[[Part], Result],
     partitions: Sequence[Part],
-    spread: Spread | None = None,
+    distribute: Distributor | None = None,
     *,
     workers: int = 1,
     name: str = "partitions",
@@ -54,8 +54,8 @@ def map_partitions(
     """
     if not partitions:
         return []
-    if spread is not None:
-        return spread(function, partitions, name)
+    if distribute is not None:
+        return distribute(function, partitions, name)
     if workers <= 1 or len(partitions) == 1:
         return [in_one_thread(function, part) for part in partitions]
     return _in_processes(function, partitions, min(workers, len(partitions)))

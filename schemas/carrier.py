@@ -38,12 +38,12 @@ class Carried(Strict):
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> Carried:
-        for wanted, names in (("rtu", SERIAL), ("tls", SECURE)):
-            given = {} if self.link == wanted else self.model_dump(include=set(names), exclude_defaults=True)
+        for kind, names in (("rtu", SERIAL), ("tls", SECURE)):
+            given = {} if self.link == kind else self.model_dump(include=set(names), exclude_defaults=True)
             stray = [name for name in names if name in given]
             if stray:
                 raise ValueError(
-                    f"{', '.join(stray)}: for link {wanted}, the link is {self.link}; leave it out, or set link"
+                    f"{', '.join(stray)}: for link {kind}, the link is {self.link}; leave it out, or set link"
                 )
         if bool(self.key_file) != bool(self.certificate_file):
             raise ValueError("certificate_file, key_file: one without the other; name both, or none")

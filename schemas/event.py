@@ -36,7 +36,7 @@ class EventLog(Protocol):
         """Write an event durably; an event in the log is not written twice."""
         ...
 
-    def noted(self) -> list[Event]:
+    def recorded(self) -> list[Event]:
         """Every event so far, in order."""
         ...
 
@@ -52,6 +52,6 @@ class MemoryLog:
         if event not in self.events:
             self.events.append(event)
 
-    def noted(self) -> list[Event]:
+    def recorded(self) -> list[Event]:
         """Every event so far."""
         return list(self.events)

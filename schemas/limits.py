@@ -24,8 +24,8 @@ from pydantic import (
 
 from schemas.bounds import Name, Number, Positive
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.recipe import explain, parse_toml
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

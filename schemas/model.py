@@ -9,8 +9,9 @@ from typing import Annotated
 from pydantic import Field, ValidationError, model_validator
 
 from schemas.bounds import Name, Text
-from schemas.recipe import FormulaSpec, explain, parse_toml, read_text
+from schemas.recipe import FormulaSpec
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml, read_text
 
 MOST_VERSIONS = 1_000_000
 

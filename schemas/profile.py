@@ -13,8 +13,8 @@ from pydantic import Field, ValidationError, model_validator
 
 from schemas.bounds import Number
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.recipe import explain, parse_toml
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml
 
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]

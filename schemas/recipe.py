@@ -6,12 +6,10 @@ same thing with every name resolved, and is what stages and stations are given.
 
 from __future__ import annotations
 
-import tomllib
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
-    BaseModel,
     Field,
     FiniteFloat,
     SerializerFunctionWrapHandler,
@@ -38,18 +36,12 @@ from schemas.bounds import (
     Text,
     Wait,
 )
-from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.fault import FaultOrder
-from schemas.foreign import foreign, shown
 from schemas.serials import LONGEST_SERIAL, SERIAL_PATTERN
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pydantic_core import ErrorDetails
 
 SHORTEST_SOAK_S = 900.0  # at least 15 min of soak per temperature: the field's practice for static tests at ±1 °C
 FEWEST_SAMPLES = 100  # per pose
@@ -57,9 +49,6 @@ LEAST_SPAN_G = 1.4  # of the poses on every axis; twelve edges reach 1.41, and a
 
 MOST_PROCEDURES = 50  # in one recipe
 MOST_SAMPLES = 10**9  # of one record, on one axis
-LONGEST_FILE = 4 * 2**20  # bytes of a file that somebody writes by hand
-LONGEST_REASON = 400  # characters of what a check says
-DEEPEST = 16  # tables and lists inside one another; the deepest of our files has five
 
 Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2)]
 Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth lies between 9.76 and 9.84 m/s²
@@ -343,7 +332,7 @@ class Recipe(_Measurement):
         return self
 
     @property
-    def wanted_records(self) -> int:
+    def planned_records(self) -> int:
         """The number of records that capture makes: the poses of every soak, and the static one."""
         soaks = range(len(self.temperatures_C))
         dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)
@@ -361,98 +350,3 @@ def parse_recipe(text: str, source: str) -> RecipeFile:
         return RecipeFile.model_validate(parse_toml(text, source))
     except ValidationError as problem:
         raise explain(problem, source, RecipeFile) from None
-
-
-def read_text(path: Path, what: str, form: str = "TOML") -> str:
-    """The content of a text file, with or without the mark that some editors begin UTF-8 with.
-
-    The message names the file and what it should have been.
-    """
-    try:
-        with path.open("rb") as file:
-            data = file.read(LONGEST_FILE + 1)
-        text = data.decode("utf-8-sig")
-    except (OSError, ValueError) as problem:  # a name with a zero byte is a ValueError, too
-        strerror = problem.strerror if isinstance(problem, OSError) else None
-        reason = strerror or ("not UTF-8 text" if isinstance(problem, UnicodeDecodeError) else str(problem))
-        raise RecipeInvalid(
-            f"{what}: {shown(str(path))} cannot be read ({reason}); give the path of a {what} file in {form}"
-        ) from None
-    if len(data) > LONGEST_FILE:
-        raise RecipeInvalid(
-            f"{what}: {shown(str(path))} has more than {LONGEST_FILE // 2**20} MiB, which no {what} file has; give the path of "
-            f"a {what} file in {form}"
-        )
-    return text
-
-
-def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """The tables of a TOML text, or :class:`RecipeInvalid` with line and column."""
-    with foreign(f"{source}: not valid TOML", "correct the file", RecipeInvalid):
-        content = tomllib.loads(text)
-    if _depth(content) > DEEPEST:
-        raise RecipeInvalid(
-            f"{source}: tables and lists more than {DEEPEST} deep in one another, none needs so many; correct the file"
-        )
-    return content
-
-
-def _depth(content: Any) -> int:
-    """How deep lists and tables lie in one another, found without going down into them one by one."""
-    level, depth = [content], 0
-    while level and depth <= DEEPEST:
-        inner = [v for one in level for v in (one.values() if isinstance(one, dict) else one)]
-        level, depth = [v for v in inner if isinstance(v, dict | list)], depth + 1
-    return depth
-
-
-def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> RecipeInvalid:
-    """The first problem of a file as one message: key, value, what is needed, close matches.
-
-    An unknown key is told first: it is mostly the cause of the missing one.
-    """
-    details = sorted(problem.errors(include_url=False), key=lambda d: d["type"] != "extra_forbidden")
-    first = details[0]
-    key = shown(".".join(str(part) for part in first["loc"] if not _is_branch(part)))
-    if first["type"] == "extra_forbidden":
-        known = _fields_at(model, first["loc"][:-1])
-        wrong = str(first["loc"][-1])
-        message = f"{source}: unknown key '{key}'; {did_you_mean(wrong, known)}"
-        return RecipeInvalid(message, key=key, close=close_matches(wrong, known))
-    return RecipeInvalid(f"{source}: {_sentence(first, key)}", key=key)
-
-
-def _is_branch(part: object) -> bool:
-    """Whether a part of a location is a branch of a union, which the file's author never wrote."""
-    return isinstance(part, str) and (part == "str" or "[" in part)
-
-
-def _sentence(detail: ErrorDetails, key: str) -> str:
-    if detail["type"] == "missing":
-        return f"key '{key}' is missing; add it"
-    reason = shown(detail["msg"].removeprefix("Value error, "), LONGEST_REASON)
-    if not key:
-        return reason
-    if isinstance(detail["input"], dict | list):
-        return f"key '{key}': {reason}"
-    found = detail["input"]
-    text = f"'{shown(found)}'" if isinstance(found, str) else shown(found)
-    return f"key '{key}': found {text}: {reason[:1].lower()}{reason[1:]}"
-
-
-def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
-    """Names of the keys allowed at a location of a model, walking through lists, mappings and optional parts."""
-    for part in location:
-        field = model.model_fields.get(str(part))
-        if field is None:
-            continue
-        inner = _models_in(field.annotation)
-        if inner:
-            model = inner[0]
-    return list(model.model_fields)
-
-
-def _models_in(annotation: object) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [found for inner in getattr(annotation, "__args__", ()) for found in _models_in(inner)]

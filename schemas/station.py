@@ -18,10 +18,10 @@ from schemas.bounds import Celsius, Degrees, Name, NotNegative, Number, Positive
 from schemas.carrier import Carried
 from schemas.errors import WrongUse
 from schemas.fault import FaultOrder
-from schemas.recipe import explain, parse_toml, read_text
 from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml, read_text
 from schemas.uncertainty import TO_SI, Uncertainty
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from pydantic import Field, ValidationError, field_validator
 
 from schemas.bounds import Positive, Text
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.recipe import Strict, explain, parse_toml
+from schemas.recipe import Strict
+from schemas.toml_files import explain, parse_toml
 
 
 class VibrationProfile(Strict):

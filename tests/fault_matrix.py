@@ -102,7 +102,7 @@ def run_case(case: Case) -> CaseResult:
         except StationError as problem:
             message, status = str(problem), problem.exit_status
     planned = len(steps(recipe))
-    spoilt = [event.reason for event in events.noted() if event.kind in {"spoilt", "suspended"}]
+    spoilt = [event.reason for event in events.recorded() if event.kind in {"spoilt", "suspended"}]
     if not sink.records:
         return CaseResult(RUN, message, status, [], 0, planned, spoilt)
     verdicts = validate([sink.records[n][0] for n in sorted(sink.records)], sink.all(1), lot.units)

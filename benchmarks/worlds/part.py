@@ -312,7 +312,7 @@ def separation(diagnosis: Any, truth: str, wrong: str, instead: Any = None) -> f
     problem, rest, noise = diagnosis.problem, diagnosis.base.terms, diagnosis.final.noise
     if instead is not None:
         problem = Problem(lot_of(measured(*instead)))
-        noise = problem.covariance.taken(noise, diagnosis.problem.covariance)
+        noise = problem.covariance.rescaled(noise, diagnosis.problem.covariance)
     base = Model(problem, rest)
     left = []
     for name in (wrong, truth):

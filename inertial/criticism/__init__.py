@@ -1,1 +1,1 @@
-"""Criticism of a model: is it good enough for the noise that is there, where does it fail, which effect is missing."""
+"""Criticism of a model: its adequacy for the noise of the data, the drivers of its residual, missing effects."""

@@ -1,4 +1,4 @@
-"""Is the model good enough for the noise that is there: the largest of many looks, against its own distribution."""
+"""Adequacy of a model for the noise of the data: the largest of many test statistics against its own distribution."""
 
 from collections.abc import Callable, Iterable, Iterator
 
@@ -22,10 +22,10 @@ Array = NDArray[np.float64]
 
 _BATCH = 33
 _NUMBERS = 4_000_000
-"""Random numbers drawn at a time at the most: large lots get fewer draws."""
+"""Largest number of random numbers per batch: large lots get fewer draws."""
 
 _OFF = (-8, -4, 0, 4, 8)
-"""Eighths of a decade about the fitted shares at which the noise of a draw is estimated again."""
+"""Eighths of a decade about the fitted shares within which the noise of a draw is estimated."""
 
 
 def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Generator) -> float:
@@ -56,7 +56,7 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
 
 
 def _against_draws(draws: "_Draws", looks: Callable[[], Iterable[Candidate]], worst: float) -> float:
-    """Logarithm of the share of draws that fail as much somewhere; drawing ends when that is plain."""
+    """Logarithm of the share of draws that fail as much somewhere; drawing ends when the result is clear."""
     blocks, n = draws.model.problem.blocks, draws.model.problem.n
     batch = int(np.clip(_NUMBERS // (blocks * n), 5, _BATCH))
     drawn, beyond = 0, 0
@@ -67,7 +67,7 @@ def _against_draws(draws: "_Draws", looks: Callable[[], Iterable[Candidate]], wo
 
 
 def _own_part(space: Space, candidate: Candidate, place: int, common: float) -> float:
-    """Part of what a look takes off that is left when the noise which all units share is reckoned with."""
+    """Part of the reduction by a test that remains if the noise common to all units is taken into account."""
     if candidate.shared:
         return 1.0 / common
     units = space.targets.shape[0] // 3
@@ -95,10 +95,10 @@ class _Draws:
         self._values = left / np.sqrt(np.mean(left**2))
 
     def worst(self, looks: Iterable[Candidate], count: int) -> Array:
-        """Smallest log p over all looks for each of so many draws."""
+        """Smallest log p over all tests of each draw."""
         covariance = self.model.problem.covariance
         shape = (self.model.problem.blocks, self.model.problem.n, count)
-        # heavy tails: what the model itself leaves, in another order
+        # heavy tails: the residuals of the model in random order
         white = (
             self._values[self.rng.integers(self._values.size, size=shape)]
             if self.heavy
@@ -128,7 +128,7 @@ class _Draws:
 
 
 class _At:
-    """Draws whose shares were found to be the same."""
+    """Draws with equal estimated shares."""
 
     def __init__(self, model: Model, shares: Shares, series: Array) -> None:
         self.space = model.at(Noise(shares, model.noise.scale))
@@ -163,7 +163,7 @@ def _lattice(shares: Shares) -> list[Shares]:
 
 
 def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array, int]]:
-    """For every value of the nonlinear parameters: what the candidate takes off each draw, and its rank."""
+    """For every value of the nonlinear parameters: the reduction of each draw by the candidate, and its rank."""
     white = candidate.whitened(space.covariance, space.noise)
     blocks, n, grid, p = white.shape
     flat = white.reshape(blocks, n, grid * p)

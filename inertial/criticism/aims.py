@@ -1,4 +1,4 @@
-"""What a next measurement is for: to part rivals, or to let effects show that were not seen."""
+"""Aims of a next measurement: to separate rival effects, or to show unseen effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,19 +7,19 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.decisions import TOLD_APART
+from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.heldout import Fitting
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import freedom, price
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.separation import Apart, Rivals, apart, left_of, predictions, separations, widened
+from inertial.criticism.separation import Apart, Rivals, apart, predictions, residual_squares, separations, widened
 from inertial.criticism.turn_on import with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace
 
 Array = NDArray[np.float64]
 
 UNLUCKY = 1.65
-"""Standard deviations of bad luck that the measurement must stand."""
+"""Standard deviations of chance against which the measurement must still separate."""
 
 LEAST_WEIGHT = 0.02
 
@@ -28,7 +28,7 @@ _SHOWN = 36.0
 
 
 class Objective(Protocol):
-    """What measurements are wanted for; ``least`` is the share of all that is wanted that a further course must bring."""
+    """The aim of measurements; ``least`` is the smallest share of the aim that a further sequence must add."""
 
     least: float
 
@@ -39,34 +39,34 @@ class Objective(Protocol):
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """The effects that it is about."""
+        """The effects of the aim."""
         ...
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Share, 0 … 1, of all that is wanted that is there after these steps; ``fine`` for a promise, not for a search."""
+        """Share, 0 … 1, of the aim that is reached after these steps; ``fine`` for a promise, not for a search."""
         ...
 
     def picks(
         self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
     ) -> list[SequenceStep]:
-        """Steps of a grid, each the best beside those before it."""
+        """Steps of a grid, each the best after those before it."""
         ...
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
     ) -> "Promise":
-        """What ``steps`` change, taken after ``already``."""
+        """The gain of ``steps``, measured after ``already``."""
         ...
 
 
 @dataclass(frozen=True)
 class Promise:
-    """What steps are expected to bring.
+    """Expected result of steps.
 
-    before, after : chi-square between the pair, whichever of the two is true; of a coefficient for effects not seen
-    ids : the effects that it is about: the best rival and the nearest that will be told apart from it; effects that will show
+    before, after : chi-square between the pair, the smaller for either being true; of a coefficient for unseen effects
+    ids : the best rival and the nearest that is separated from it; or the effects that become visible
     if_true : chi-square expected between the two, by which of them is true
-    remaining : rivals that are still not told apart from the best
+    remaining : rivals that are not separated from the best
     """
 
     before: float
@@ -77,7 +77,7 @@ class Promise:
 
 
 class RivalDiscrimination:
-    """Rivals parted: of each truth, by how likely it is, every other one must leave enough, and none counts beyond need."""
+    """Separation of rivals: for each truth, by its probability, every other rival must leave enough chi-square."""
 
     least = 0.03
 
@@ -85,7 +85,7 @@ class RivalDiscrimination:
         self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: NDArray[np.bool_] | None = None
     ) -> None:
         self.rivals, self.every = rivals, every or rivals
-        # (r, r): of a pair that no measurement parts nothing is wanted
+        # (r, r): pairs that no measurement separates do not count
         self.never = np.eye(len(scores), dtype=bool) if never is None else never | np.eye(len(scores), dtype=bool)
         self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
         self.needed = _needed(rivals, apart(rivals, fine=False))
@@ -102,15 +102,15 @@ class RivalDiscrimination:
         return self.rivals.terms
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Share of the separations wanted that is there after these steps."""
+        """Share of the required separations that is reached after these steps."""
         gap, needed = self.expected(steps, pace, fine=fine)
-        wanted = self.weight[:, None] * ~self.never
-        return float(np.sum(wanted * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(wanted)), 1e-12))
+        open_pairs = self.weight[:, None] * ~self.never
+        return float(np.sum(open_pairs * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(open_pairs)), 1e-12))
 
     def expected(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = True) -> tuple[Array, Array]:
         """Chi-square (r, r) expected for the truth of a row against that of a column, and how much is needed.
 
-        What was measured already says what it says, whatever could be expected of it; what is new is expected to add its own.
+        For the present measurements the observed chi-square counts; new steps add their expected one.
         """
         rivals = self.every if fine else self.rivals
         if fine not in self._begun:
@@ -123,7 +123,7 @@ class RivalDiscrimination:
     def picks(
         self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
     ) -> list[SequenceStep]:
-        """Steps at which the rivals differ most once those before are fitted."""
+        """Steps at which the rivals differ most after those before are fitted."""
         rivals = self.rivals
         problem = widened(rivals, [*held, *grid], pace)
         truths = predictions(rivals, problem)
@@ -132,7 +132,7 @@ class RivalDiscrimination:
         n = problem.n - len(grid)
         error = _error(problem, rivals)[:, n:, None]
 
-        def told_apart(train: NDArray[np.bool_]) -> Array:
+        def separation(train: NDArray[np.bool_]) -> Array:
             total = np.zeros(len(grid))
             for column, fit in enumerate(fits):
                 left = fit.left(truths, train)[:, n:] / error
@@ -141,30 +141,30 @@ class RivalDiscrimination:
                 total += np.minimum(gained / self.needed[:, column], 1.0) @ self.weight
             return total
 
-        return _greedy(grid, n, count, told_apart)
+        return _greedy(grid, n, count, separation)
 
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
     ) -> Promise:
-        """The best rival and the nearest that will be told apart from it, whichever of the two is true."""
+        """The best rival and the nearest that is separated from it, for either being true."""
         before, _ = self.expected(already, pace)
         after, needed = self.expected([*already, *steps], pace)
         names = self.rivals.ids
         sure = np.minimum(after / needed, (after / needed).T)[0, 1:]
-        parted = [k for k in range(1, len(names)) if sure[k - 1] >= 1.0]
-        other = parted[0] if parted else 1 + int(np.argmax(sure))
+        separable = [k for k in range(1, len(names)) if sure[k - 1] >= 1.0]
+        other = separable[0] if separable else 1 + int(np.argmax(sure))
         both = (names[0], float(after[0, other])), (names[other], float(after[other, 0]))
         return Promise(
             before=float(max(before[0, other], 0.0)),
             after=min(chi for _, chi in both),
             ids=(names[0], names[other]),
             if_true=both,
-            remaining=tuple(names[k] for k in range(1, len(names)) if k not in parted),
+            remaining=tuple(names[k] for k in range(1, len(names)) if k not in separable),
         )
 
 
 class Sighting:
-    """Effects that were not seen made to show: each coefficient, at the effect's typical size, by six standard errors."""
+    """Unseen effects made visible: each coefficient, at the effect's typical size, by six standard errors."""
 
     least = 0.1
 
@@ -173,7 +173,7 @@ class Sighting:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """The effects that were not seen."""
+        """The unseen effects."""
         return self._terms
 
     @property
@@ -182,25 +182,25 @@ class Sighting:
         return self.rivals.lot
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Mean share over the effects of the chi-square wanted."""
+        """Mean share over the effects of the required chi-square."""
         del fine
         return float(np.mean(np.minimum(self.shown(steps, pace) / _SHOWN, 1.0)))
 
     def shown(self, steps: Sequence[SequenceStep], pace: StationPace) -> Array:
-        """Chi-square a coefficient that each effect of typical size would leave, (effects,)."""
+        """Chi-square per coefficient of each effect at its typical size, (effects,)."""
         rivals = self.rivals
         problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
         columns, sizes = _typical(problem, self.terms)
         rest = with_turn_on(problem.lot.state, rivals.rest)
-        noise = problem.covariance.taken(rivals.noise, rivals.covariance)
-        left = left_of(Model(problem, rest), columns, noise)
+        noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
+        left = residual_squares(Model(problem, rest), columns, noise)
         per_column = left * rivals.weight / rivals.variance / problem.blocks
         return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
 
     def picks(
         self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
     ) -> list[SequenceStep]:
-        """Steps at which what the model leaves of the effects is largest."""
+        """Steps at which the effects beyond the model are largest."""
         rivals = self.rivals
         problem = widened(rivals, [*held, *grid], pace)
         columns, _ = _typical(problem, self.terms)
@@ -218,7 +218,7 @@ class Sighting:
     def effect_of_steps(
         self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
     ) -> Promise:
-        """Chi-square a coefficient of the effect that shows least of those that will, before and after; those that will."""
+        """Chi-square per coefficient of the least visible effect, before and after; and the visible effects."""
         before, after = self.shown(already, pace), self.shown([*already, *steps], pace)
         will = after >= max(1.0, 0.5 * min(_SHOWN, float(np.max(after))))
         names = tuple(t.effect.id for t, there in zip(self.terms, will, strict=True) if there)
@@ -228,7 +228,7 @@ class Sighting:
 def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]:
     """Columns of some effects at their typical size, (blocks, n, all), g, and how many each has.
 
-    The size is the geometric mean of what has been seen, at the largest excursion of the column.
+    The size is the geometric mean of the usual range, at the largest excursion of the column.
     """
     found: list[Array] = []
     for term in terms:
@@ -241,7 +241,7 @@ def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]
 
 
 def _greedy(grid: Sequence[SequenceStep], n: int, count: int, score: "Score") -> list[SequenceStep]:
-    """The steps of a grid that score best one after the other; ``n`` dwells before them are there already."""
+    """The steps of a grid that score best one after the other; ``n`` dwells are before them."""
     train = np.arange(n + len(grid)) < n
     chosen: list[SequenceStep] = []
     for _ in range(min(count, len(grid))):
@@ -254,10 +254,10 @@ def _greedy(grid: Sequence[SequenceStep], n: int, count: int, score: "Score") ->
 
 
 class Score(Protocol):
-    """What each step of a grid is worth once some dwells are there."""
+    """The gain of each step of a grid after some dwells."""
 
     def __call__(self, train: NDArray[np.bool_]) -> Array:
-        """One figure a step."""
+        """One value per step."""
         ...
 
 
@@ -266,15 +266,16 @@ def _error(problem: Problem, rivals: Rivals) -> Array:
 
 
 def _needed(rivals: Rivals, found: Apart) -> Array:
-    """Chi-square (r, r) that must lie between a truth (row) and a wrong rival (column) for the class to drop the wrong one.
+    """Chi-square (r, r) between a truth (row) and a wrong rival (column) that removes the wrong one.
 
-    The difference found scatters by twice the root of its own size about it; a simpler rival has its price in its favour.
+    The observed difference
+    scatters by twice its own root; a simpler rival has the lower price.
     """
     counts = [_coefficients(rivals, t) for t in rivals.terms]
     paid = np.array([price(d, k) for d, k in zip(found.whole, counts, strict=True)])
     wrong = np.array([[price(max(d - lost, 0.0), k) for k, lost in zip(counts, row, strict=True)]
                       for d, row in zip(found.whole, found.left, strict=True)])  # fmt: skip
-    least = np.maximum(TOLD_APART + paid[:, None] - wrong, TOLD_APART)
+    least = np.maximum(CLASS_WIDTH + paid[:, None] - wrong, CLASS_WIDTH)
     return (UNLUCKY + np.sqrt(UNLUCKY**2 + least)) ** 2
 
 

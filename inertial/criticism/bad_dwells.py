@@ -1,7 +1,7 @@
-"""Single dwells that are off, by what is left when each is deleted.
+"""Single bad dwells, by the residuals after each is deleted.
 
-With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deleted from its series is off by (Py)_i/P_ii, and (Py)_i²/P_ii over its variance is
-chi-square: no fit is needed to know it. Deleting says which dwell; weights that fall off with the size change all, and name none.
+With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deleted from its series deviates by (Py)_i/P_ii, and (Py)_i²/P_ii over its variance is
+chi-square: no further fit is needed. Deletion identifies the dwell; robust weights would change all dwells and identify none.
 """
 
 from dataclasses import dataclass, replace
@@ -20,18 +20,18 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 8
 _ALIKE = 0.6
-"""Of the largest deviation: dwells that are less far off are looked at again when the noise is known without the largest."""
+"""Of the largest deviation: dwells with smaller deviations are tested again after the noise is estimated without the largest."""
 
 _AT_LEAST = 2
 """Dwells that may be left out of a record, however short it is."""
 
 _LEAST_DOF = 6
-"""Degrees of freedom of a unit below which none of its dwells is told from the others."""
+"""Degrees of freedom of a unit below which none of its dwells can be identified as bad."""
 
 
 @dataclass(frozen=True)
 class BadDwell:
-    """A dwell of one unit: how far it is off its neighbours in time and the model.
+    """A dwell of one unit: its deviation from its neighbours in time and the model.
 
     off : (axes,), g; by_axis : (axes,), the same in standard deviations; tail : whether the noise of the run reaches as far
     """
@@ -57,7 +57,7 @@ def without(lot: Lot, found: list[BadDwell]) -> Lot:
 
 
 def bad_dwells(model: Model) -> list[BadDwell]:
-    """The dwells that do not belong to a model and its noise, the noise estimated again without them."""
+    """The dwells that disagree with a model and its noise; the noise is estimated again without them."""
     if model.problem.lot.radial:
         return [
             BadDwell(one.unit, dwell, np.array([off]), np.array([deviations]))
@@ -107,7 +107,7 @@ class _Deletion:
             roots = self._roots(block)
             self.left[block] = roots.T @ space.residual[block]
             self.size[block] = np.einsum("tn,tn->n", roots, roots)
-        # in units of the white variance of each block: its own variance is found again as dwells go
+        # in units of the white variance of each block: its own variance is estimated again after each deletion
         self.left, self.size = self.left * scaled**2, self.size * scaled**2
         self.squares, self.dof = space.squares.copy(), space.by_block.copy()
         if np.isfinite(space.noise.prior):
@@ -150,7 +150,7 @@ class _Deletion:
         return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n)
 
     def delete(self, unit: int, dwell: int) -> Array:
-        """Take one dwell out; by how much it was off, (axes,), g."""
+        """Take one dwell out; its deviation, (axes,), g."""
         blocks = range(unit * self.axes, (unit + 1) * self.axes)
         off = np.array([self.left[b, dwell] / self.size[b, dwell] for b in blocks])
         for place, b in enumerate(blocks):
@@ -166,7 +166,7 @@ class _Deletion:
         return off
 
     def _held(self, block: int, gone: int, dwell: int) -> Array:
-        """What an earlier deletion took off a column of P."""
+        """The change of a column of P by earlier deletions."""
         roots = self._roots(block)
         scale = self.space.noise.scale[block] ** 2
         first = roots.T @ roots[:, gone] * scale
@@ -174,7 +174,7 @@ class _Deletion:
 
 
 def deletion_residuals(model: Model) -> Array:
-    """How far each dwell is off when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
+    """Deviation of each dwell when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
     space = model.space
     looked = _Deletion(space, 1 if model.problem.lot.radial else 3)
     known = looked.there & (looked.size > 1e-9 * looked.size.max())

@@ -1,7 +1,7 @@
 """Bad dwells where only the norm of gravity is known: one or two at a time, with the noise estimated again without them.
 
-Few dwells and many coefficients: two bad dwells hide each other, and either passes for wander. So pairs are deleted together, and
-every suspicion is judged at the noise that the other dwells show: with P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ the dwells B are off by
+Few dwells and many coefficients: two bad dwells hide each other, and either looks like wander. So pairs are deleted together, and
+every suspicion is judged with the noise of the other dwells: with P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ the dwells B deviate by
 (P_BB)⁻¹(Py)_B, and (Py)_Bᵀ(P_BB)⁻¹(Py)_B over the variance is F with |B| and ν − |B| degrees of freedom.
 """
 
@@ -21,19 +21,19 @@ from inertial.criticism.problem import Lot, Problem
 Array = NDArray[np.float64]
 
 FEWEST_DOF = 8
-"""Degrees of freedom below which no dwell is told from the others."""
+"""Degrees of freedom below which no dwell can be identified as bad."""
 
 MOST = 0.1
-"""Share of a unit's dwells that is taken out at the most, and never fewer than two may be."""
+"""Largest share of a unit's dwells that is left out; two are always allowed."""
 
-_TRIED = 3  # suspicions of each size and look at the noise for which the noise is estimated again
-_LONG = 220  # dwells beyond which pairs are not looked at: they hide each other in short records only
-_HANGING = 1e-6  # of its weight: what a dwell has left after the model where it alone determines a coefficient
+_TRIED = 3  # suspicions of each size and noise for which the noise is estimated again
+_LONG = 220  # largest number of dwells for the test of pairs: they hide each other in short records only
+_HANGING = 1e-6  # of its weight: the part of a dwell beyond the model if it alone determines a coefficient
 
 
 @dataclass(frozen=True)
 class Suspicion:
-    """Dwells of one unit that are off together: by how much, g, in standard deviations, and the charged log probability."""
+    """Bad dwells of one unit: deviation in g and in standard deviations, and the charged log probability."""
 
     unit: int
     dwells: tuple[int, ...]
@@ -43,7 +43,7 @@ class Suspicion:
 
 
 def bad_norms(model: Model) -> list[Suspicion]:
-    """The dwells that do not belong to a model and its noise, the most certain first."""
+    """The dwells that disagree with a model and its noise, the most certain first."""
     found: list[Suspicion] = []
     while True:
         tried = [_judged(model, unit, dwells) for unit, dwells in _suspicions(model)]
@@ -52,7 +52,7 @@ def bad_norms(model: Model) -> list[Suspicion]:
         known = [one for one in known if count + len(one.dwells) <= max(2, int(MOST * model.problem.n))]
         if not known:
             return found
-        # of sets that hold each other the smaller one, unless the larger is by far more likely
+        # of nested sets the smaller one, unless the larger is far more probable
         best = min(known, key=lambda one: one.log_p + 4.0 * len(one.dwells))
         found.append(best)
         model = _without(model, best.unit, best.dwells)
@@ -101,7 +101,7 @@ def _projector(model: Model, noise: Noise, unit: int) -> tuple[Array, Array]:
 
 
 def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]]:
-    """What deleting every single dwell, and every pair, takes off the sum of squares; with their places."""
+    """Reduction of the sum of squares by deleting every single dwell, and every pair; with their places."""
     own = np.diagonal(p)
     sound = np.flatnonzero(own > _HANGING * max(float(own.max()), 1e-300))
     singles = py[sound] ** 2 / own[sound]
@@ -118,11 +118,11 @@ def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]
 
 
 def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | None:
-    """A suspicion at the noise of the other dwells; None where these do not determine the model."""
+    """A suspicion at the noise of the other dwells; None if these do not determine the model."""
     rest = _without(model, unit, dwells)
     if rest.space.dof < FEWEST_DOF - len(dwells) or rest.space.local_rank < model.space.local_rank:
         return None
-    noise = model.problem.covariance.taken(rest.noise, rest.problem.covariance)
+    noise = model.problem.covariance.rescaled(rest.noise, rest.problem.covariance)
     p, py = _projector(model, noise, unit)
     own = p[np.ix_(dwells, dwells)]
     off = np.linalg.solve(own, py[list(dwells)])

@@ -1,16 +1,16 @@
-"""Classes of effects that these data cannot tell apart."""
+"""Classes of effects that the data cannot separate."""
 
 from dataclasses import dataclass
 
 from inertial.criticism import decisions
-from inertial.criticism.decisions import TOLD_APART
+from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.refinement import refine
 from inertial.criticism.search import judge, ranked, scanned, size_of
 
-__all__ = ["TOLD_APART", "EffectClass", "Member", "class_of"]
+__all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 
 
 _MOST = 9
@@ -27,10 +27,10 @@ class Member:
 
 @dataclass(frozen=True)
 class EffectClass:
-    """Effects not told apart, best first, with what the best of them does.
+    """Effects that the data cannot separate, best first, with the result of the best of them.
 
-    log_p : log probability that noise does as much
-    size : RMS of the effect beyond what the rest of the model absorbs, g
+    log_p : log probability of the same reduction by noise
+    size : RMS of the effect beyond the part that the rest of the model absorbs, g
     """
 
     members: tuple[Member, ...]
@@ -44,7 +44,7 @@ class EffectClass:
 
     @property
     def simplest(self) -> Term:
-        """The member to recommend; what handling does comes before physics."""
+        """The member to recommend; handling errors come before effects."""
         return min(self.members, key=lambda m: m.term.effect.simplicity).term
 
     @property
@@ -54,12 +54,12 @@ class EffectClass:
 
     @property
     def of_data(self) -> bool:
-        """Whether what handling does explains the data as well as any effect."""
+        """Whether a handling error explains the data as well as any effect."""
         return len(self.physics) < len(self.members)
 
 
 def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
-    """The class of one term of a model, all others held in it; every serious rival with its own noise."""
+    """The class of one term of a model, with all other terms kept; every serious rival with its own noise."""
     rest = model.without_term(term)
     leave = {t.effect.id for t in rest.terms if not isinstance(t.effect, Handling)}
     looked = scanned(field, rest.at(model.noise), leave)
@@ -69,5 +69,5 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     judged = [judge(field, rest, refine(rest, t, model.noise)) for t in near]
     judged = ranked([judge(field, rest, term), *judged])
     best = judged[0]
-    members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + TOLD_APART)
+    members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + CLASS_WIDTH)
     return EffectClass(members, best.log_p, size_of(rest, best.term))

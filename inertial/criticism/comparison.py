@@ -1,4 +1,4 @@
-"""Coefficients of a model by generalised least squares, and what they leave of the run they came from and of a fresh one."""
+"""Coefficients of a model by generalised least squares, and their residuals on their own run and on a fresh run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 class Estimate:
     """Coefficients of a model's terms in the blocks of a problem, from data whitened for white noise and wander.
 
-    local : (blocks, p), shared : (q,), g per unit of the column; standard errors likewise. Behind the terms' own coefficients
-    stand those of the unknown state before the first dwell; a run of the same plan is taken to start alike.
+    local : (blocks, p), shared : (q,), g per unit of the column; standard errors likewise. The coefficients of the unknown state
+    before the first dwell follow those of the terms; a run of the same plan is assumed to start in the same state.
     """
 
     terms: tuple[Term, ...]
@@ -45,7 +45,7 @@ def estimate(model: Model) -> Estimate:
         target = _free(unit, inverse, y[..., None])[..., 0]
         flat = free.reshape(-1, z.shape[-1])
         shared = np.linalg.lstsq(flat, target.reshape(-1), rcond=1e-9)[0].astype(np.float64)
-        # columns that are nearly one leave diagonals a rounding below zero
+        # nearly collinear columns can give diagonals slightly below zero by rounding
         inverted = np.diag(np.linalg.pinv(flat.T @ flat, rcond=1e-12))
         shared_error = np.sqrt(variance * np.maximum(inverted, 0.0))
         y = y - z @ shared
@@ -57,19 +57,19 @@ def estimate(model: Model) -> Estimate:
 
 
 CONDITION = 1e-8
-"""Directions of the scaled normal matrix below this are the jitter of the angles, not physics: they get no coefficient."""
+"""Directions of the scaled normal matrix below this are scatter of the angles, not effects: they get no coefficient."""
 
 OWN = ("bias", "scale", "misalignment", "turn_on_bias")
-"""Effects that differ from unit to unit by far more than their errors: nothing is learnt from the others."""
+"""Ratio of the scatter between units to the errors above which coefficients are not combined."""
 
 _FEW_UNITS = 4
 
 
 def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: Array, size: Array) -> Array:
-    """Coefficients drawn towards the lot's mean as far as their scatter over the units is less than their errors.
+    """Coefficients shrunk towards the lot's mean, as far as their scatter over the units is smaller than their errors.
 
     Empirical Bayes with the moments of the lot (Efron & Morris, J. Am. Stat. Assoc. 70 (1975) 311): a coefficient that the run
-    determines poorly, and that units of one make share, is predicted better from all of them.
+    determines poorly, and that units of one type have in common, is predicted better from all of them.
     """
     problem = model.problem
     units = problem.lot.state.time.shape[0]
@@ -92,7 +92,7 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
 
 
 def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:
-    """Which local coefficients are drawn together: those of the effects beyond bias, scale and misalignment."""
+    """The local coefficients that are shrunk: those of the effects beyond bias, scale and misalignment."""
     flags: list[bool] = []
     for term in model.terms:
         if not term.shared:
@@ -102,7 +102,7 @@ def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:
 
 
 def _free(unit: Array, inverse: Array, columns: Array) -> Array:
-    """Columns less what the local ones explain."""
+    """Columns without the part that the local ones explain."""
     return columns - unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ columns))
 
 
@@ -124,5 +124,5 @@ def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
 
 
 def rms(values: Array) -> float:
-    """Root mean square of the values that are there."""
+    """Root mean square of the values that are not missing."""
     return float(np.sqrt(np.nanmean(values**2)))

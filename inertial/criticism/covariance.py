@@ -1,11 +1,11 @@
-"""Whitening of a lot's series: white noise, 1/f and random walk, with whiteners shared by blocks that are alike.
+"""Whitening of a lot's series: white noise, 1/f and random walk, with whiteners shared by equal blocks.
 
 A block is the series of one unit and axis. Its covariance is s²·(diag(e²) + F·K_F + W·K_W), where e is the white standard error
 of its dwells and F and W, in units of the lot's white variance, are the same for all blocks. Blocks that have the same dwells at
 the same times and about the same white noise share a whitener; a missing dwell only leaves out its row.
 
-Where only the norm of gravity is known, a block is a unit. What wanders along one axis shows in the norm as far as the force
-points along that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directions u of the force.
+Where only the norm of gravity is known, a block is a unit. Wander along one axis enters the norm in proportion to the force along
+that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directions u of the force.
 """
 
 from collections import OrderedDict
@@ -28,16 +28,16 @@ _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 _times = get_blas_funcs(("trmm",), dtype=np.float64)[0]
 
 _FEW = 16
-"""Columns of a block up to which a triangular product, with the transposing that it needs, is faster than a plain one."""
+"""Columns of a block up to which a triangular product, including its transposition, is faster than a general one."""
 
 _EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
 
 _WHITENERS = 24_000_000
-"""Numbers of whiteners that are kept."""
+"""Largest number of stored whiteners."""
 
 _COLUMNS = 12_000_000
-"""Numbers of whitened columns that are kept between passes; beyond, they are made again."""
+"""Largest number of whitened columns stored between passes; more are computed again."""
 
 
 class Shares(NamedTuple):
@@ -51,8 +51,8 @@ class Shares(NamedTuple):
 class Noise:
     """Noise of a lot.
 
-    scale : (blocks,), s: standard deviations over those that the white errors and the shares make
-    prior : degrees of freedom by which the blocks' variances are drawn together; infinite where one serves all
+    scale : (blocks,), s: ratio of the standard deviations to those of the white errors and shares
+    prior : prior degrees of freedom of the blocks' variances; infinite if all are equal
     """
 
     shares: Shares
@@ -66,7 +66,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class _Kernel:
-    """Dwells that are there, their times and white profile: what blocks of one whitener have in common."""
+    """Valid dwells, their times and white profile, common to the blocks of one whitener."""
 
     time: Array
     there: NDArray[np.bool_]
@@ -82,7 +82,7 @@ class _Kernel:
 
 
 def _applied(lower: Array, series: Array) -> Array:
-    """Series (blocks, m, n) times a lower triangle (n, n), by the half of the products that a triangle needs."""
+    """Series (blocks, m, n) times a lower triangle (n, n), by half of the products, as the matrix is triangular."""
     flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
     return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1).T.reshape(series.shape)
 
@@ -105,7 +105,7 @@ class Covariance:
         known = typical > 0.0
         self.level = np.where(known, typical, np.median(typical[known]) if known.any() else 1.0)
         self.white = float(np.exp(np.mean(np.log(self.level**2))))
-        """White variance that shares are counted in, g²."""
+        """White variance that is the unit of the shares, g²."""
         self.span = max(float(np.ptp(time)), 1.0)
         self._kernels: list[_Kernel] = []
         self._groups = self._grouped(time, error, direction)
@@ -193,7 +193,7 @@ class Covariance:
         for i, wander in zip(index, self._wander or (), strict=True):
             if i is not None:
                 covariance += 10.0 ** (i / SHARE_STEP) * wander[place][np.ix_(there, there)]
-        # of the transpose, which is Fortran's order: nothing is copied
+        # of the transpose, which is in Fortran order: no copy
         upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
         if failed:
             raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
@@ -285,10 +285,10 @@ class Covariance:
         return found
 
     def white_noise(self) -> Noise:
-        """White noise as the errors say."""
+        """White noise as stated by the errors."""
         return Noise(Shares(), np.ones(len(self.level)))
 
-    def taken(self, noise: Noise, other: "Covariance") -> Noise:
+    def rescaled(self, noise: Noise, other: "Covariance") -> Noise:
         """Noise of another covariance, of the same blocks, in the units of this one."""
         factor = other.white / self.white
         shares = Shares(noise.shares.flicker * factor, noise.shares.walk * factor * self.span / other.span)

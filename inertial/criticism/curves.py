@@ -1,4 +1,4 @@
-"""A curve of one driver, the same for every unit and axis but for its size: the signature of physics that no effect describes."""
+"""A curve of one driver with the same shape for every unit and axis: the sign of an effect that the catalogue lacks."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from inertial.criticism.space import Candidate, Space
 
 Array = NDArray[np.float64]
 
-_TURNS = 8  # of sizes and shape, each found for the other
+_TURNS = 8  # alternating estimates of sizes and shape
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class CurveFit:
     """A common curve beside a model.
 
     model : the model with the curve in it
-    rank : coefficients spent, sizes and shape together
+    rank : number of coefficients, of sizes and shape
     cost : penalised deviance, on the scale of the search
     """
 
@@ -30,7 +30,7 @@ class CurveFit:
 
 
 def fit_curve(model: Model, driver: str, candidate: Candidate) -> CurveFit:
-    """The best common curve of a driver beside a model, with the noise estimated anew."""
+    """The best common curve of a driver added to a model, with the noise estimated again."""
     if candidate.shared:
         fitted = model.with_shared_curves(candidate.columns[:, :, 0, :])
         return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
@@ -44,7 +44,7 @@ def fit_curve(model: Model, driver: str, candidate: Candidate) -> CurveFit:
 
 
 def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
-    """Column (blocks, n, 1) of the common curve that takes off most, and the coefficients it spends."""
+    """Column (blocks, n, 1) of the common curve that reduces the residual most, and its number of coefficients."""
     whole = candidate.columns[:, :, 0, :]
     white = space.whiten(whole)
     free = space.project(white)
@@ -66,7 +66,7 @@ def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
 
 
 def _evened(gram: Array, size: Array) -> Array:
-    """Transformation (p, r) to columns of equal size and no correlation over the lot, without what the model absorbs."""
+    """Transformation (p, r) to columns of equal size and no correlation over the lot, without the part that the model absorbs."""
     scale = np.maximum(size, 1e-300)
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     keep = values > 1e-6 * values[-1]

@@ -1,4 +1,4 @@
-"""The diagnosis of a lot: adequacy, where the model fails, classes of missing effects, what is left unexplained."""
+"""The diagnosis of a lot: adequacy, drivers of the residual, classes of missing effects, the unexplained remainder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -38,7 +38,7 @@ from inertial.probability import passes
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A driver that the residuals follow without an effect of the catalogue that would explain it."""
+    """A driver that the residuals follow, without an effect of the catalogue that explains it."""
 
     driver: str
     shape: str
@@ -47,16 +47,16 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What a lot says of a model; errors in g.
+    """The diagnosis of a model by a lot; errors in g.
 
-    problem, base, final : the series without what handling spoilt, the model judged, the model with everything that was found
+    problem, base, final : the series without handling errors, the judged model, the model with all identified effects
     rms : of the residuals of the base model; floor : of the noise of the measurement, white and wander
-    adequate : None where the data cannot tell, for the reason in ``unjudged``
-    without_removed : the verdict on the dwells that were not removed; None where none was, or it cannot be given
-    handled : what handling did; removed : single dwells that were left out, those marked that are tails of the noise
-    carried : dwells that carry the verdict: of its first class, or the largest residuals where nothing is named
+    adequate : None if the data cannot decide, for the reason in ``unjudged``
+    without_removed : the verdict on the dwells that were not removed; None if there are none, or it cannot be given
+    handled : handling errors; removed : single dwells that were left out, those marked that are tails of the noise
+    carried : dwells of largest influence: on the first class, or the largest residuals if there is no class
     unseen_in_part : effects that the plan cannot see at some values of their nonlinear parameters, with these
-    smallest : the size from which each effect would have been named, those first that slow noise hides most
+    smallest : the smallest detected size of each effect, those that slow noise hides most first
     """
 
     problem: Problem
@@ -91,11 +91,11 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     rng : draws the noise that adequacy is measured against
     """
     run, found = examined(lot, effects)
-    return _told(run, found, rng)
+    return _concluded(run, found, rng)
 
 
-def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
-    """The diagnosis of what was searched."""
+def _concluded(run: Run, search_: Search, rng: Generator) -> Diagnosis:
+    """The diagnosis by the result of the search."""
     base, fields, found = search_.base, search_.field, search_.found
     problem = base.problem
     drivers = drivers_of(problem)
@@ -106,9 +106,9 @@ def _told(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     unjudged = not_judged(base, rms)
     passed = passes(np.exp(log_p), ADEQUATE_ABOVE) if rms <= GROSS else False
     if passed is None and not unjudged:
-        unjudged = "the probability of the residuals is no number; add poses in between"
+        unjudged = "the probability of the residuals is undefined; add poses in between"
     if unjudged:
-        # too little to judge the model by is too little to name what it lacks
+        # data that cannot judge the model cannot identify missing effects either
         found = SearchResult(base, (), found.ladder)
     sound = passed is True and not found.added
     final, unexplained = (found.model, None) if sound or unjudged else _beyond(search_.part, base, found, drivers)
@@ -159,21 +159,21 @@ def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carrie
 
 
 def _verdict(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
-    """Whether a model is adequate; None where the data cannot tell."""
+    """Whether a model is adequate; None if the data cannot decide."""
     if named_data:
         return False
     return None if unjudged else sound
 
 
 def _rms(base: Model) -> float:
-    """Residual of the model that is judged, g: by the fit that is made known where poses are unknown."""
+    """Residual of the model that is judged, g: by the published fit if poses are unknown."""
     if base.problem.lot.radial:
         return rms_of(residuals_of(base.problem, estimate(base)))
     return fit_rms(base.problem, base.terms)
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
-    """A class for every effect that was found, the largest first."""
+    """A class for every identified effect, the largest first."""
     held = {t.effect.id for t in base.terms}
     model, found = final, []
     for term in [t for t in final.terms if t.effect.id not in held]:
@@ -181,7 +181,7 @@ def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
         best = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), term)
         if (
             best is not term
-        ):  # a rival that is better beside the others takes the place, so that no other class has it too
+        ):  # a rival that is better beside the others replaces the effect, so that no other class contains it
             others = [t for t in model.terms if t is not term]
             model = Model(base.problem, [*others, best], near=model.noise)
         found.append(group)
@@ -206,12 +206,12 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
 
 
 def _first(group: EffectClass) -> Term:
-    """The best effect of a class, what handling does only where there is none."""
+    """The best effect of a class, a handling error only if there is no effect."""
     return next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), group.members[0].term)
 
 
 def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
-    """A dependence on a recorded column without physics behind it: real, and its cause unknown."""
+    """A significant dependence on a recorded column of unknown cause."""
     for group in classes:
         best = group.simplest
         if isinstance(best.effect, Covariate):
@@ -220,7 +220,7 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
 
 
 def _beyond(part: Part, base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
-    """The effects that stand, and the driver that is left: effects that only imitate a curve of one driver are taken back."""
+    """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
     instead = better_curve(part.base, found.added, part.suspected) if found.added else None
     if instead is not None:
         fit, kept = instead
@@ -238,14 +238,14 @@ def _beyond(part: Part, base: Model, found: SearchResult, drivers: list[Driver])
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
-    """Whether a driver is significant and large, the wander estimated with it inside: slow drivers and wander look alike."""
+    """Whether a driver is significant and large, with the wander estimated beside it: slow drivers and wander look alike."""
     if model.explained(driver.candidate, model.floor()) < decisions.UNEXPLAINED * model.floor():
         return False
     return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
 
 
 def _driver_log_p(model: Model, driver: Driver) -> float:
-    """Logarithm of the probability that noise follows a driver as much, the share of wander estimated with it inside."""
+    """Logarithm of the probability that noise follows a driver as much, with the share of wander estimated beside it."""
     richer = model.with_curves(driver.candidate.columns[:, :, 0, :])
     space = model.at(richer.noise)
     gain = space.gain(driver.candidate)
@@ -253,6 +253,6 @@ def _driver_log_p(model: Model, driver: Driver) -> float:
 
 
 def _worth(model: Model, driver: Driver) -> float:
-    """What a driver takes off, in chi-square, less the price of its coefficients."""
+    """Reduction of chi-square by a driver, less the price of its coefficients."""
     gain = model.space.gain(driver.candidate)
     return float(gain.drop[0]) / model.space.variance - PER_COEFFICIENT * float(gain.rank[0])

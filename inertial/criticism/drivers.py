@@ -1,4 +1,4 @@
-"""Where a model fails: smooth dependence of its residuals on everything that was recorded, physics or not."""
+"""Drivers of the residual: smooth dependence on every recorded quantity."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 _KNOTS = 5
 _TIME_KNOTS = 8
 _CERTAIN = -600.0
-"""Logarithm of a probability below which drivers are told apart by the share they explain."""
+"""Logarithm of a probability below which drivers are ranked by the share that they explain."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Driver:
     """Columns of a smooth dependence on one driver.
 
     name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
-    values : (units, n) of the driver itself, None where it is not one quantity
+    values : (units, n) of the driver itself, None if it is not a single quantity
     """
 
     name: str
@@ -36,7 +36,7 @@ class Driver:
 
 @dataclass(frozen=True)
 class Misfit:
-    """Where the model fails: a driver, the axes it shows on, the share of the excess it explains."""
+    """A driver of the residual, the affected axes, and the share of the excess that it explains."""
 
     driver: str
     axes: tuple[str, ...]
@@ -128,11 +128,11 @@ def _by_axis(problem: Problem, values: Array) -> Candidate:
 
 
 def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float) -> list[Misfit]:
-    """Where the residuals of a space lie, most telling first.
+    """Drivers of the residuals of a space, most significant first.
 
     Parameters
     ----------
-    floor_variance : what the variance would be if nothing were missing, in the space's own unit
+    floor_variance : variance of an adequate model, in the unit of the space
     """
     excess = max(space.rss - space.dof * floor_variance, 1e-12)
     found: list[Misfit] = []
@@ -147,7 +147,7 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
 
 
 def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tuple[str, ...]:
-    """Axes that take more than a tenth of what the driver explains beyond noise."""
+    """Axes with more than a tenth of the part that the driver explains beyond noise."""
     if problem.lot.radial:
         return ("norm",)
     by_axis = by_block.reshape(-1, 3).sum(axis=0) - rank / 3.0 * variance

@@ -1,4 +1,4 @@
-"""What a verdict rests on: degrees of freedom, condition, single dwells, and the smallest effect that would have been seen."""
+"""The basis of a verdict: degrees of freedom, condition, single dwells, and the smallest detected effect."""
 
 from dataclasses import dataclass
 
@@ -14,16 +14,16 @@ from inertial.criticism.space import SEEN
 Array = NDArray[np.float64]
 
 FEWEST_DOF = 15
-"""Degrees of freedom from which on a verdict is given where the noise is known from the residuals alone.
+"""Degrees of freedom needed for a verdict if the noise is known from the residuals only.
 
-Below, a cubic term of 1 mg is missed in half of the runs, and "adequate" would say nothing.
+Below it, a cubic term of 1 mg is missed in half of the runs, and "adequate" has no meaning.
 """
 
 FEW_DOF = 60
-"""Degrees of freedom below which "adequate" states the smallest cubic term that would have been seen."""
+"""Degrees of freedom below which "adequate" is given with the smallest detected cubic term."""
 
 GROSS = 0.02
-"""Residual, g rms, that no noise of a usable sensor makes: the model is wrong however few the dwells are."""
+"""Residual, g rms, above the noise of any usable sensor: the model is wrong even with few dwells."""
 
 SMOOTH = 1e4
 """Variance of a random walk over the record, over the white variance, from which dwells without recorded noise are a movement.
@@ -31,7 +31,7 @@ SMOOTH = 1e4
 A walk of 8 µg/√s over an hour beside 10 µg of white noise has 2300."""
 
 POWER = 0.5
-"""Probability with which the smallest cubic term would have been seen."""
+"""Detection probability of the smallest cubic term."""
 
 _LEVEL = 0.05
 _LARGEST = 1.0  # g/g³
@@ -39,12 +39,12 @@ _LARGEST = 1.0  # g/g³
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a verdict rests on.
+    """The basis of a verdict.
 
     dof : degrees of freedom of the residuals; condition : of the scaled columns of the worst block
     bias_spread : jackknife standard deviation of the bias, worst axis, g; bias_change : its largest change by one dwell, g
-    carrier : unit and dwell of that change; largest : studentised residual of the dwell that is farthest off, and where
-    cubic : smallest cubic coefficient that would have been seen with a probability of one half, g/g³; None where none would
+    carrier : unit and dwell of that change; largest : largest studentised residual of a dwell, and which
+    cubic : smallest cubic coefficient detected with a probability of one half, g/g³; None if there is none
     """
 
     dof: int
@@ -72,16 +72,16 @@ def evidence(model: Model, field: Candidates) -> Evidence:
 
 
 def not_judged(model: Model, rms: float) -> str:
-    """Why a verdict cannot be given; empty where it can."""
+    """The reason why a verdict cannot be given; empty if it can."""
     space = model.space
     if rms > GROSS:
         return ""
     if not np.isfinite(space.rss) or not np.isfinite(rms):
-        return "the residuals are no numbers: the orientations leave the model undetermined; add poses in between"
+        return "the residuals are undefined: the orientations do not determine the model; add poses in between"
     if _is_movement(model):
         return (
-            "what the model leaves goes on smoothly from dwell to dwell, as in samples of a movement, which are no dwells; "
-            "import the samples so that stretches at rest are found, or give each dwell with sd_x, sd_y, sd_z and n"
+            "the residual varies smoothly from dwell to dwell, as in samples of a movement, dwells at rest are needed; "
+            "import the samples to find the stretches at rest, or state sd_x, sd_y, sd_z and n of each dwell"
         )
     if space.dof < FEWEST_DOF:
         count = model.problem.count
@@ -93,7 +93,7 @@ def not_judged(model: Model, rms: float) -> str:
 
 
 def _is_movement(model: Model) -> bool:
-    """Whether dwells without recorded noise go on so smoothly that they are samples of a movement."""
+    """Whether dwells without recorded noise vary so smoothly that they are samples of a movement."""
     lot = model.problem.lot
     return lot.radial and not lot.recorded and model.noise.shares.walk >= SMOOTH
 
@@ -133,9 +133,9 @@ def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int]
 
 
 def _deleted(model: Model, block: int) -> tuple[Array, Array, Array]:
-    """Of one block: the whitener (n, n), how far each dwell is off when it is deleted (n,), g, and that over its error (n,).
+    """Of one block: the whitener (n, n), deviation of each dwell when it is deleted (n,), g, and that over its error (n,).
 
-    With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell is off by (Py)_i/P_ii, with variance 1/P_ii.
+    With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deviates by (Py)_i/P_ii, with variance 1/P_ii.
     """
     space = model.space
     eye = np.eye(space.local.shape[1])[None]
@@ -160,7 +160,7 @@ def _bias_columns(model: Model) -> list[int]:
 
 
 def _largest(model: Model) -> tuple[float, int, int] | None:
-    """The dwell that is farthest off its prediction by all others: externally studentised residual, unit, dwell."""
+    """The dwell that deviates most from its prediction by all others: externally studentised residual, unit, dwell."""
     space, axes = model.space, 1 if model.problem.lot.radial else 3
     blocks = space.local.shape[0]
     each = np.stack([_deleted(model, block)[2] for block in range(blocks)])
@@ -174,7 +174,7 @@ def _largest(model: Model) -> tuple[float, int, int] | None:
 
 
 def _cubic(model: Model, field: Candidates) -> float | None:
-    """Smallest cubic coefficient that would have been seen, g/g³, by the non-central F distribution over all looks."""
+    """Smallest detected cubic coefficient, g/g³, by the non-central F distribution over all tests."""
     if any(t.effect.id == "third_order" for t in model.terms):
         return None
     effect = catalogue.get("third_order")

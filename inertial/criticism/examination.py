@@ -1,4 +1,4 @@
-"""A run under examination: bad dwells and what handling did are taken out of it before any physics is read into it."""
+"""A run under examination: bad dwells and handling errors are removed before effects are judged."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from inertial import effects as catalogue
 from inertial.criticism import decisions
 from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.decisions import RISES, TOLD_APART
+from inertial.criticism.decisions import CLASS_WIDTH, RISES
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
@@ -32,19 +32,19 @@ from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 
 Array = NDArray[np.float64]
 
-_MANY = 32  # units of a lot that is searched whole
-_ENOUGH = 24  # units, spread over the lot, that a larger one is searched in
-_MENDED = 6  # alternatives that are told of one run at the most
-_TURNS = 3  # searches after which single dwells are looked at no more
+_MANY = 32  # largest number of units of a lot that is searched completely
+_ENOUGH = 24  # units, distributed over a larger lot, that are searched
+_MENDED = 6  # largest number of handling errors reported for one run
+_TURNS = 3  # searches after which single dwells are not tested again
 
 
 @dataclass(frozen=True)
 class Named:
     """A class of effects that is missing, with the errors before and after it is added; g.
 
-    heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN where none can
-    units, dwells : that an alternative of scope "data" concerns, none for all units; told : what it did, in words
-    carried : the dwells that carry the verdict
+    heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN if none can
+    units, dwells : that an alternative of scope "data" concerns, none for all units; evidence : its description
+    carried : the dwells of largest influence
     """
 
     effects: EffectClass
@@ -53,21 +53,21 @@ class Named:
     heldout_after: float
     units: tuple[int, ...] = ()
     dwells: tuple[int, ...] = ()
-    told: str = ""
+    evidence: str = ""
     carried: Carried = field(default_factory=Carried)
 
     @property
     def predicts(self) -> bool:
-        """Whether what was not fitted is predicted no worse with it: nothing else is worth to be added to a model.
+        """Whether the prediction of unfitted dwells is no worse with it: only then it is recommended for a model.
 
-        Where dwells left out cannot judge it (NaN), nothing is recommended.
+        If dwells left out cannot judge it (NaN), it is not recommended.
         """
         return bool(self.heldout_after <= (1.0 + RISES) * self.heldout_before)
 
 
 @dataclass
 class Run:
-    """A lot under examination: what was mended so far, and what stays in the model beside the effects that are judged."""
+    """A lot under examination: the corrections so far, and the terms that stay in the model beside the judged effects."""
 
     lot: Lot
     effects: tuple[str, ...]
@@ -77,7 +77,7 @@ class Run:
     _made: tuple[list[object], Model] | None = None
 
     def model(self) -> Model:
-        """The model that is judged, in the lot without its bad dwells; the same object as long as nothing of it changes."""
+        """The model that is judged, in the lot without its bad dwells; the same object while nothing changes."""
         parts: list[object] = [self.lot, *self.removed, *self.beside]
         if self._made is None or list(map(id, self._made[0])) != list(map(id, parts)):
             self._made = parts, self._new_model()
@@ -93,14 +93,14 @@ class Run:
 
 
 def examined(lot: Lot, effects: Sequence[str]) -> "tuple[Run, Search]":
-    """A run without what spoilt it, and the search for effects in it."""
+    """A run without bad dwells and handling errors, and the search for effects in it."""
     run = Run(lot, tuple(effects))
     run.removed = bad_dwells(run.model())
     found = mended(run)
     for _ in range(_TURNS):
         if not run.handled and not found.found.added:
             break
-        # what physics or handling explains is no bad dwell, and beside it others show that its size had covered
+        # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=found.base.problem.slope)
         kept = bad_dwells(Model(whole, found.model.terms, near=found.model.noise))
         if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
@@ -121,12 +121,12 @@ class Search:
 
     @property
     def model(self) -> Model:
-        """With everything that was added."""
+        """The model with all added terms."""
         return self.found.model
 
 
 def mended(run: Run) -> Search:
-    """The search for effects, each alternative that comes first told and taken out of the lot before it begins again."""
+    """The search for effects; a handling error that ranks first is reported and removed before the next search."""
     while True:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), alternatives())
@@ -140,7 +140,7 @@ def mended(run: Run) -> Search:
 
 
 def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None:
-    """Take what handling did out of a run, and note it."""
+    """Remove a handling error from a run, and record it."""
     model = found.model.with_term(term)
     group = class_of(fields, model, term)
     problem = fields.problem
@@ -149,10 +149,10 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
         raise TypeError(term.effect.id)
     size = model.shared_sizes(term)
     units = (int(place["unit"]),) if "unit" in place else ()
-    told, dwells = _happened(fields, found.model, term, alternative, size)
+    evidence, dwells = _happened(fields, found.model, term, alternative, size)
     before, after = left_out(found.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, told, carried_by(found.model, term)))
+    run.handled.append(Named(group, *errors, units, dwells, evidence, carried_by(found.model, term)))
     lot = alternative.settled(run.lot, size, _misfit(found.model, model), **place)
     if lot is None:
         run.beside.append(term)
@@ -161,15 +161,15 @@ def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None
 
 
 def _misfit(model: Model, richer: Model) -> Misfit:
-    """How well a model fits the dwells of some units, at the noise of a richer one."""
+    """Misfit of a model on the dwells of some units, with the noise of a richer model."""
     local = [t for t in model.terms if not t.shared]
 
     def left(lot: Lot, units: tuple[int, ...]) -> float:
-        # dwells that were taken out stay out
+        # dwells that were removed stay removed
         error = model.problem.lot.error[list(units)]
         problem = Problem(replace(lot, error=error))
         blocks = [3 * unit + axis for unit in units for axis in range(3)]
-        noise = problem.covariance.taken(richer.noise.pick(blocks), model.problem.covariance)
+        noise = problem.covariance.rescaled(richer.noise.pick(blocks), model.problem.covariance)
         return Model(problem, local).at(noise).rss
 
     return left
@@ -178,19 +178,19 @@ def _misfit(model: Model, richer: Model) -> Misfit:
 def _happened(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
-    """What an alternative did, in words, and the dwells it concerns: at each place that explains the run as well."""
+    """The description of a handling error, and its dwells: at each place that explains the run equally well."""
     lot, place = fields.problem.lot, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
     best = judge(fields, beside, term).cost
     words: list[str] = []
     dwells = list(alternative.dwells(lot, **place))
     for other in alternative.instead(lot, **place):
         rival = judge(fields, beside, Term(alternative, tuple(other.items())))
-        if rival.cost < best + TOLD_APART:
+        if rival.cost < best + CLASS_WIDTH:
             words.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
             dwells += alternative.dwells(lot, **other)
-    told = alternative.told(lot, size, **place)
-    told += f"; these dwells cannot tell it from {' or '.join(words)}" if words else ""
-    return told, tuple(sorted(dwells))
+    evidence = alternative.describe(lot, size, **place)
+    evidence += f"; these dwells cannot separate it from {' or '.join(words)}" if words else ""
+    return evidence, tuple(sorted(dwells))
 
 
 def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
@@ -203,7 +203,7 @@ def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
 
 @dataclass(frozen=True)
 class Part:
-    """As much of a lot as the search for effects needs: what all units of a large lot share shows in two dozen of them."""
+    """The part of a lot that the search for effects needs: effects common to a large lot are visible in two dozen units."""
 
     field: Candidates
     base: Model
@@ -214,7 +214,7 @@ class Part:
         return suspects(self.field.problem)
 
     def imitates(self, chosen: Sequence[Term]) -> bool:
-        """Whether a curve of one driver does better than the effects chosen: by far, or leaving nothing else to find."""
+        """Whether a curve of one driver is better than the chosen effects: by far, or with no further effect left."""
         instead = better_curve(self.base, chosen, self.suspected)
         if instead is None:
             return False

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class Candidates:
-    """The candidates that a lot's dwells carry the quantities for.
+    """The candidates whose quantities a lot has.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Candidates:
         return next(e for e in (*self.effects, *self.handling) if e.id == name)
 
     def places(self, name: str) -> int:
-        """How many places an alternative is charged with; one for an effect."""
+        """Number of places in the price of an alternative; one for an effect."""
         return len(self.grids[name]) if any(a.id == name for a in self.handling) else 1
 
     def gains(self, space: Space, leave: set[str], *, handling: bool = False) -> dict[str, Gain]:
@@ -75,7 +75,7 @@ class Candidates:
         return Gain.joined([space.gain(piece) for piece in pieces])
 
     def _every_dwell(self, effect: Handling) -> Array:
-        """Columns (blocks, n, p) of an alternative of one dwell, each dwell as if it were the one."""
+        """Columns (blocks, n, p) of an alternative of one dwell, for each dwell in turn."""
         if effect.id not in self._single:
             units, n = self.problem.lot.state.time.shape
             change = effect.every_dwell(self.problem.lot)

@@ -1,4 +1,4 @@
-"""Least squares of a model on some dwells, and what it leaves of all."""
+"""Least squares of a model on some dwells, and its residuals on all."""
 
 from collections.abc import Sequence
 
@@ -31,7 +31,7 @@ class Fitting:
         self._weight = np.where(np.isfinite(problem.error), 1.0 / problem.error, 0.0)
 
     def left(self, series: Array, train: NDArray[np.bool_]) -> Array:
-        """What a fit to the dwells ``train`` (n,) leaves of series (blocks, n, m), on all dwells."""
+        """Residuals of a fit to the dwells ``train`` (n,) on series (blocks, n, m), on all dwells."""
         x, z, weight = self._x, self._z, self._weight * train
         solve = _solver(x, weight)
         if z.shape[-1]:

@@ -1,4 +1,4 @@
-"""Dwells that carry a verdict: by what each of them adds to the deviance, and what is left of it without the most telling."""
+"""Influence of dwells on a verdict: their shares of the deviance, and the verdict without the largest."""
 
 from dataclasses import dataclass
 
@@ -14,12 +14,12 @@ Array = NDArray[np.float64]
 
 _MOST, _MOST_DWELLS = 8, 3
 _CARRY = 0.5
-"""Share of the whole that the dwells named carry at the most; further ones are many small ones."""
+"""Largest total share of the listed dwells; the others are many small ones."""
 
 
 @dataclass(frozen=True)
 class Influence:
-    """A dwell of a unit, and the share of the verdict's deviance that it carries."""
+    """A dwell of a unit, and its share of the verdict's deviance."""
 
     unit: int
     dwell: int
@@ -27,11 +27,11 @@ class Influence:
 
 
 def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
-    """The dwells that carry a verdict, most first.
+    """The dwells of largest influence on a verdict, largest first.
 
     Parameters
     ----------
-    model : beside which the term is judged; term : what was found, None where the model is adequate
+    model : to which the term is added; term : the identified effect, None if the model is adequate
     """
     before = model.space.residual
     carried = before**2
@@ -70,20 +70,20 @@ def _whole_dwells(share: Array) -> tuple[Influence, ...]:
 
 @dataclass(frozen=True)
 class Carried:
-    """Dwells that carry the verdict on a term, and the log probability of the term when they are left out."""
+    """Dwells of largest influence on a term, and the log probability of the term when they are left out."""
 
     dwells: tuple[Influence, ...] = ()
     log_p_without: float | None = None
 
 
 def carried_by(model: Model, term: Term) -> Carried:
-    """The dwells that carry the verdict on a term beside a model, and what it is without them."""
+    """The dwells of largest influence on a term of a model, and the verdict without them."""
     dwells = influence(model, term)
     return Carried(dwells, log_p_without(model, term, dwells) if dwells else None)
 
 
 def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> float:
-    """Log probability of a term when the dwells that carry most of it are left out, at the noise that was found."""
+    """Log probability of a term without the dwells of largest influence, at the estimated noise."""
     lot = model.problem.lot
     error = lot.error.copy()
     for one in dwells:

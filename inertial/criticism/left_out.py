@@ -1,8 +1,8 @@
-"""Error and log density of a model on dwells left out, predicted with the noise that stands between them and the others.
+"""Error and log density of a model on dwells left out, predicted with the noise that correlates them with the others.
 
-With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ of all dwells, those of a fold B are missed by (P_BB)⁻¹(Py)_B, with covariance (P_BB)⁻¹: the
-prediction from all others, wander between them and the errors of the coefficients in it, without a second fit. Ordinary least
-squares on the other dwells is no honest judge under wander: both sides of a fold share it, and everything slow is "confirmed".
+With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ of all dwells, those of a fold B deviate by (P_BB)⁻¹(Py)_B, with covariance (P_BB)⁻¹: the
+prediction from all others, with wander and the errors of the coefficients, without a second fit. Ordinary least squares on the
+other dwells is biased under wander: both sides of a fold share it, and every slow effect is confirmed.
 """
 
 from dataclasses import dataclass
@@ -27,10 +27,10 @@ _POSES = 6
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A model on dwells that were left out, kind of fold by kind.
+    """A model on dwells left out, by kind of fold.
 
     missed : by kind, (blocks, n) g, NaN where a dwell is missing or its fold cannot judge the model
-    density : by kind, log density of what was left out; kinds of which a fold cannot judge the model are not in it
+    density : by kind, log density of what was left out; kinds with a fold that cannot judge the model are omitted
     """
 
     missed: dict[Kind, Array]
@@ -64,7 +64,7 @@ def left_out(model: Model) -> LeftOut:
 
 
 def _without_wander(model: Model) -> LeftOut:
-    """Poses left out by weighted least squares: a record so long that no wander is reckoned with says no more."""
+    """Poses left out by weighted least squares: for records so long that wander is not modelled."""
     problem = model.problem
     fold = _by_pose(problem)
     whole = np.full((problem.blocks, problem.n), np.nan)
@@ -74,7 +74,7 @@ def _without_wander(model: Model) -> LeftOut:
 
 
 class _Parts:
-    """The matrix P of every block, and what columns that all share make of it."""
+    """The matrix P of every block, and its change by columns that all blocks share."""
 
     def __init__(self, model: Model) -> None:
         space = model.space
@@ -99,7 +99,7 @@ class _Parts:
         self.typical = [self._spread(b) for b in range(blocks)]
 
     def predicted(self, out: NDArray[np.bool_]) -> tuple[Array, float] | None:
-        """How far the dwells ``out`` (n,) are missed, (blocks, k), and their log density; None where that cannot be judged."""
+        """Deviations (blocks, k) of the dwells ``out`` (n,) from their prediction, and their log density; None if undefined."""
         missed = np.full((len(self.p), int(out.sum())), np.nan)
         density = 0.0
         inner = self.inner.copy()
@@ -139,7 +139,7 @@ class _Parts:
         return missed, density
 
     def _known(self, block: int, places: NDArray[np.intp], inverse: Array) -> bool:
-        """Whether the other dwells determine the model where these stand: not much worse than wander alone would have it."""
+        """Whether the other dwells determine the model at these dwells: not much worse than with wander alone."""
         expected = np.sqrt(np.mean(np.diagonal(inverse)))
         alone = np.sqrt(np.mean(1.0 / self.precision[block, places]))
         wander = np.sqrt(self.typical[block])
@@ -169,7 +169,7 @@ def _folds(problem: Problem) -> dict[Kind, NDArray[np.intp]]:
 
 
 def _by_pose(problem: Problem) -> NDArray[np.intp]:
-    """Equal poses together; dwells in turn where no pose comes again."""
+    """Equal poses together; dwells in turn if no pose is repeated."""
     force = np.round(problem.lot.state.force[0], 3)
     pose = np.unique(force, axis=0, return_inverse=True)[1].reshape(-1)
     if pose.max() + 1 < 2 * _POSES:

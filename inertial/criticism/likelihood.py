@@ -1,6 +1,6 @@
-"""Likelihood ratio of a term beside a model, with the noise estimated again with the term inside.
+"""Likelihood ratio of a term beside a model, with the noise estimated again with the term included.
 
-Before a term is in the model part of it counts as noise, slow ones as random walk above all. So the covariance of the richer
+Before a term is in the model, part of it counts as noise, above all slow terms as random walk. So the covariance of the richer
 model is its own: D = −2[ℓ(V0; H) − ℓ(V1; H, C)], error contrasts of the model's columns H in both, the coefficients of C at
 their best, V1 the better of the model's and the richer one's noise.
 """
@@ -32,9 +32,9 @@ _QUANTILES = (0.5, 0.75, 0.9)
 class Ratio:
     """A term beside a model.
 
-    deviance : D, what units share of the noise taken out; rank : coefficients that the plan determines
-    price : of them, and of the places looked at; log_p : of the chi-square, one look
-    shared : φ with the term inside, by which the part that is alike in all units was divided; again : the ratio with another φ
+    deviance : D, corrected for the noise that units share; rank : coefficients that the plan determines
+    price : of them, and of the places searched; log_p : of the chi-square, one look
+    shared : φ with the term inside, by which the part common to all units is divided; again : the ratio with another φ
     """
 
     deviance: float
@@ -45,12 +45,12 @@ class Ratio:
     again: Callable[[float], "Ratio"] | None = None
 
     def at(self, shared: float) -> "Ratio":
-        """The same with another φ: rivals are compared at one, as it is found from what each of them leaves, and scatters."""
+        """The same with another φ: rivals are compared at a common φ, because the estimate of each scatters."""
         return self if self.again is None else self.again(shared)
 
     @property
     def score(self) -> float:
-        """What is left of the deviance when everything is paid."""
+        """The deviance less its price."""
         return self.deviance - self.price
 
 
@@ -59,7 +59,7 @@ def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
 
     Parameters
     ----------
-    places : where the term was looked for, for alternatives that have a place and no coefficient of it
+    places : number of places searched, for alternatives with a place
     """
     richer = model.with_term(term)
     noises = [model.noise, richer.noise]
@@ -82,7 +82,7 @@ def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
         found = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, places)
         return replace(found, shared=shared, again=divided)
 
-    # by what the units share with the term inside: an effect that is alike in all of them is no noise
+    # by what the units share with the term inside: an effect common to all units is not noise
     return divided(shared_noise(richer))
 
 
@@ -99,7 +99,7 @@ def _deviance(contrasts: Space, left: Space) -> float:
 
 
 def shared_noise(model: Model) -> float:
-    """φ: variance, over that of independent units, of the mean over the units of what a model leaves; one where they are alone.
+    """φ: variance, over that of independent units, of the mean residual over the units; one for a single unit.
 
     From the median: one wrong pose does not raise it.
     """
@@ -154,7 +154,7 @@ def scatter_of_poses(model: Model) -> float:
 
 
 def along_mean(model: Model, noise: Noise, term: Term) -> float:
-    """Share of what a term takes off that is the same in all units, 0 … 1."""
+    """Share of the reduction by a term that is equal in all units, 0 … 1."""
     lot = model.problem.lot
     units = lot.state.time.shape[0]
     if units < 2 or lot.radial:

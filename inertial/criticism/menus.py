@@ -1,4 +1,4 @@
-"""What a station could do next: sequences of steps, of every kind that parts effects.
+"""Possible next steps of a station: sequences of every kind that separates effects.
 
 Poses in new directions, at the temperatures of the run; waits of different length after a move; approaches from both sides;
 excursions of temperature up and down, soaked or read on the way; the same poses later; the devices switched off and on.
@@ -34,7 +34,7 @@ class Reach:
     """What the station may do.
 
     outer, inner : rad, bounds of the table
-    temperature : °C, bounds for further soaks; None where the temperature stays as it is
+    temperature : °C, bounds for further soaks; None if the temperature is not changed
     settle : s, the usual wait after a move
     power : whether it can switch the devices off and on
     """
@@ -56,7 +56,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class StepSequence:
-    """A sequence of steps that is offered as a whole."""
+    """A sequence of steps that is proposed as a whole."""
 
     kind: Kind
     steps: tuple[SequenceStep, ...]
@@ -67,7 +67,7 @@ class StepSequence:
 
 
 def reach_of(state: State) -> Reach:
-    """What the run itself has shown that the station does: its angles, and its temperatures where they varied."""
+    """The capabilities of the station that the run shows: its angles, and its temperatures if they varied."""
     settle = 2.0 if state.since_move is None else float(np.clip(np.median(state.since_move), 0.0, 60.0))
     if state.temperature is None or float(np.ptp(state.temperature)) < _VARIED_K:
         return Reach(settle=settle)
@@ -77,9 +77,9 @@ def reach_of(state: State) -> Reach:
 
 
 def pose_grid(reach: Reach, temperature: float) -> list[SequenceStep]:
-    """Directions that answer to any curve of the force: a lattice, edges and corners, rings near 0.24, 0.5 and 0.75 g.
+    """Directions that respond to any curve of the force: a lattice, edges and corners, rings near 0.24, 0.5 and 0.75 g.
 
-    A direction of the force can be reached by two attitudes of the table; both are there: errors of the table differ.
+    Two attitudes of the table give one direction of the force; both are included: the errors of the table differ.
     """
     rings = [_ring(axis, level) for axis in range(3) for level in (0.1, 0.24, 0.5, 0.75)]
     named = [poses.plan(name) for name in ("twenty_six", "orthogonal24")]
@@ -103,7 +103,7 @@ def _ring(axis: int, level: float) -> Array:
 
 
 def temperatures(here: float, reach: Reach) -> list[float]:
-    """Temperatures of further soaks: the ends and the middle of what may be reached, but for where the station stands."""
+    """Temperatures of further soaks: the ends and the middle of the range, without the present temperature."""
     if reach.temperature is None:
         return []
     low, high = reach.temperature
@@ -111,7 +111,7 @@ def temperatures(here: float, reach: Reach) -> list[float]:
 
 
 def present(state: State, pace: StationPace) -> float:
-    """Temperature at which the chamber stands, °C."""
+    """Present temperature of the chamber, °C."""
     there = pace.start or standing(state)
     if there is not None:
         return there.temperature
@@ -119,12 +119,12 @@ def present(state: State, pace: StationPace) -> float:
 
 
 def courses(state: State, reach: Reach, best: Sequence[SequenceStep], here: float) -> list[StepSequence]:
-    """Sequences that do not come from picking poses one by one.
+    """Sequences that are not a selection of single poses.
 
     Parameters
     ----------
-    best : poses that part the rivals by their directions; some are used where any pose would do
-    here : °C, where the chamber stands
+    best : poses that separate the rivals by their directions; some are used if any pose is suitable
+    here : °C, present temperature of the chamber
     """
     chosen = _spread(best, reach, here)
     found = [
@@ -163,7 +163,9 @@ def _waits(here: float) -> list[StepSequence]:
         found.append(StepSequence("waits", tuple(short)))
     stay = [0.0, *[0.0] * 7]
     dwell_on = [SequenceStep(o, i, here, w) for pair in pairs for o, i in pair for w in stay]
-    found.append(StepSequence("waits", tuple(dwell_on)))  # dwell after dwell at one pose: all of the settling is seen
+    found.append(
+        StepSequence("waits", tuple(dwell_on))
+    )  # dwell after dwell at one pose: the whole settling is measured
     return found
 
 
@@ -185,7 +187,7 @@ def _approaches(state: State, reach: Reach, here: float, chosen: Sequence[Sequen
 
 
 def _laters(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """The same poses again and again, with the station left alone between."""
+    """The same poses again and again, with waiting time in between."""
     found: list[StepSequence] = []
     for wait, times in ((120.0, 3), (600.0, 1), (600.0, 3), (1800.0, 1), (1800.0, 2)):
         group = [replace(chosen[0], wait=wait), *chosen[1:], chosen[0]]
@@ -206,7 +208,7 @@ def _power_cycles(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
 
 
 def _excursions(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """Soaks away from where the station stands and back, up and down, far and near."""
+    """Soaks away from the present temperature and back, up and down, far and near."""
     if reach.temperature is None:
         return []
     low, high = reach.temperature
@@ -226,7 +228,7 @@ def _excursions(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> li
 
 
 def _between(state: State, reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
-    """Soaks half-way between those of the run, beginning at the nearer end: a bend between two soaks shows only there."""
+    """Soaks half-way between those of the run, from the nearer end: only they show a curvature between two soaks."""
     soaks = np.array(sorted(levels(first_unit(state))))
     apart = np.flatnonzero(np.diff(soaks) > _VARIED_K)
     if reach.temperature is None or apart.size < 1:

@@ -1,4 +1,4 @@
-"""A model under criticism: its columns in a problem, and the noise that its residuals show."""
+"""A model under criticism: its columns in a problem, and the noise of its residuals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from inertial.errors import NotIdentified
 Array = NDArray[np.float64]
 
 _LONG = 400
-"""Dwells above which shares are looked for by half decades: a whitener takes long, and so many dwells are kept at each."""
+"""Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""
 
 _HANGING = 1e-3
-"""Part of a column that the others leave below which one factorisation is not trusted."""
+"""Independent part of a column below which a single factorisation is inaccurate."""
 
 _OWN = 20
-"""Degrees of freedom of a block from which on its own variance tells of the shares; fewer are taken to be alike."""
+"""Degrees of freedom of a block from which on its own variance is used for the shares; blocks with fewer have a common one."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Term:
         return dict(self.values)
 
     def candidate(self, problem: Problem) -> Candidate:
-        """The term's columns in a problem, as something that a model may gain by."""
+        """The term's columns in a problem, as a candidate."""
         return problem.candidate(self.effect, [self.keywords], first=self.first)
 
 
@@ -62,8 +62,8 @@ class Model:
 
     Parameters
     ----------
-    near : noise near which this model's is looked for
-    curves, shared_curves : (blocks, n, d), columns of a driver that is no effect, sized by block or for all blocks
+    near : noise at which the search for this model's noise starts
+    curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, sized by block or for all blocks
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class Model:
         return self.problem.start(term.effect, term.keywords)
 
     def at(self, noise: Noise) -> Space:
-        """What the model leaves, whitened for a noise."""
+        """The residuals of the model, whitened for a noise."""
         return Space(self.problem.covariance, noise, self.problem.y, self.local, self.shared)
 
     @cached_property
@@ -122,13 +122,13 @@ class Model:
         return self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
 
     def noise_at(self, shares: Shares) -> Noise:
-        """The noise at given shares: each block's variance drawn together with the others' as far as they are alike."""
+        """The noise at given shares: each block's variance shrunk towards the others as far as they are similar."""
         space = self._rough(shares)
         squares, prior = variance.moderated(space.squares, space.by_block)
         return Noise(shares, np.sqrt(squares), prior)
 
     def _rough(self, shares: Shares) -> Space:
-        """The space at shares, the blocks weighed as they are known before."""
+        """The space at shares, with the blocks weighted by their known variances."""
         if shares not in self._spaces:
             scale = np.ones(self.problem.blocks) if self._near is None else self._near.scale
             if self._near is None and self.shared.shape[-1]:
@@ -143,7 +143,7 @@ class Model:
         return np.sqrt(variance.moderated(space.squares, space.by_block)[0])
 
     def _restricted(self, shares: Shares) -> float:
-        """−2 log restricted likelihood, each block with a variance of its own where it can carry one."""
+        """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
         quick = self._quick(shares)
         if quick is None:
             space = self._rough(shares)
@@ -165,7 +165,7 @@ class Model:
         return np.concatenate([unit, self.problem.y[..., None]], axis=-1)
 
     def _quick(self, shares: Shares) -> tuple[float, Array] | None:
-        """log|HᵀV⁻¹H|, up to a constant, and sums of squares, by one factorisation; None where columns hang together."""
+        """log|HᵀV⁻¹H|, up to a constant, and sums of squares, by one factorisation; None if columns are collinear."""
         if self.shared.shape[-1]:
             return None
         white = self.problem.covariance.whiten(self._stacked, shares)
@@ -191,12 +191,12 @@ class Model:
 
     @cached_property
     def space(self) -> Space:
-        """What the model leaves, whitened for its own noise."""
+        """The residuals of the model, whitened for its own noise."""
         return self.at(self.noise)
 
     def floor(self) -> float:
         """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
-        # the constant part of the wander goes into the bias of the run and is no error of the dwells against each other
+        # the constant part of the wander is part of the bias of the run, not an error between dwells
         return self._noise_rms(self.problem.covariance.about_mean(self.noise.shares))
 
     def scatter(self) -> float:
@@ -225,7 +225,7 @@ class Model:
         return np.zeros(0)
 
     def explained(self, candidate: Candidate, floor: float) -> float:
-        """RMS, g, of what a candidate explains that the model cannot absorb, less what noise of RMS ``floor`` would."""
+        """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""
         covariance = self.problem.covariance
         gain = self._even.gain(candidate)
         beyond = float(gain.drop[0]) * covariance.white - floor**2 * float(gain.rank[0])
@@ -233,7 +233,7 @@ class Model:
 
     @cached_property
     def _even(self) -> Space:
-        """The space in which all blocks count alike: of the lot's white noise."""
+        """The space in which all blocks have equal weight: of the lot's white noise."""
         covariance = self.problem.covariance
         return self.at(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))
 
@@ -271,7 +271,7 @@ class Model:
 
 
 def refuse_without_freedom(model: Model) -> None:
-    """Refuse to judge a model that has as many coefficients as there are measurements: it fits anything, and tells nothing.
+    """Refuse to judge a model that has as many coefficients as there are measurements: it fits any data.
 
     Raises
     ------
@@ -281,6 +281,7 @@ def refuse_without_freedom(model: Model) -> None:
     if model.at(model.problem.covariance.white_noise()).dof < 1:
         count, series = model.problem.count, model.problem.blocks
         raise NotIdentified(
-            f"model: {count // series} dwells a unit leave nothing to judge the model by, more dwells than its coefficients on "
+            f"model: {count // series} dwells a unit leave no degree of freedom to judge the model, more dwells than its "
+            "coefficients on "
             "an axis are needed; measure more poses or repeats, or judge a smaller model"
         )

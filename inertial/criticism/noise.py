@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LONGEST = 1500
-"""Dwells beyond which the wander is left out: its covariance would not fit. Long runs are averaged before they are judged."""
+"""Largest number of dwells with a model of wander: its covariance must fit into memory. Long runs are averaged before."""
 
 
 def walk_kernel(time: Array) -> Array:

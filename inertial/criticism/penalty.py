@@ -1,4 +1,4 @@
-"""The price of an effect, and the probability that noise alone takes off as much."""
+"""The price of an effect, and the probability of the same reduction by noise."""
 
 import numpy as np
 from scipy import stats
@@ -14,12 +14,12 @@ PER_COLUMN = 6.0
 
 
 def cost_of(rank: int, columns: int, nonlinear: int) -> float:
-    """Price, in chi-square, of an effect beside a model whose size is not known yet."""
+    """Price, in chi-square, of an effect whose size is unknown before the fit."""
     return PER_COEFFICIENT * (rank + nonlinear) + PER_COLUMN * columns
 
 
 def price(deviance: float, coefficients: float) -> float:
-    """What coefficients cost that take off so much, in chi-square: k·(1 + ln(D/k)), and all of it where D is below k.
+    """Price of coefficients by their reduction D, in chi-square: k·(1 + ln(D/k)), and all of it where D is below k.
 
     Coefficients from a normal distribution whose variance is fitted to them: the evidence is the likelihood ratio less this.
     """
@@ -29,7 +29,7 @@ def price(deviance: float, coefficients: float) -> float:
 
 
 def fall(space: Space, gain: Gain) -> np.ndarray:
-    """Deviances (grid,) that a candidate takes off at the noise of a space, the variances found anew."""
+    """Reduction of the deviance (grid,) by a candidate at the noise of a space, with the variances estimated again."""
     prior = space.noise.prior
     if np.isfinite(prior) and gain.by_block.any():
         whole = (space.by_block + prior)[:, None]
@@ -39,7 +39,7 @@ def fall(space: Space, gain: Gain) -> np.ndarray:
 
 
 def log_p_value(space: Space, drop: float, rank: int) -> float:
-    """Natural logarithm of the probability that noise alone takes off so much with so many coefficients."""
+    """Natural logarithm of the probability of such a reduction by noise with this number of coefficients."""
     after = space.dof - rank
     if rank == 0 or after <= 0:
         return 0.0
@@ -59,7 +59,7 @@ def cost_of_model(model: Model) -> float:
 
 
 def freedom(term: Term) -> int:
-    """Number of nonlinear parameters that were found from the data: one, or three where the axes have their own."""
+    """Number of nonlinear parameters estimated from the data: one, or three if each axis has its own."""
     if isinstance(term.effect, Handling) or not term.effect.nonlinear:
         return 0
     return sum(len(v) if isinstance(v, tuple) else 1 for v in term.keywords.values())

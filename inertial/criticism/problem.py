@@ -20,13 +20,13 @@ SHARED = ("station", "data")
 """Scopes of effects whose coefficients all blocks share."""
 
 _PIECE = 4_000_000
-"""Numbers of columns worked on at a time."""
+"""Number of columns processed at a time."""
 
 _WIDEST = 3
-"""Columns an axis that an effect usually has at the most."""
+"""Usual largest number of columns of an effect per axis."""
 
 _CACHE = 15_000_000
-"""Numbers of columns kept between passes; beyond, they are made again: memory stays bounded for large lots."""
+"""Number of columns stored between passes; more are computed again, to limit the memory for large lots."""
 
 
 Values = Mapping[str, float | tuple[float, ...]]
@@ -43,7 +43,7 @@ class Problem:
 
     Parameters
     ----------
-    slope : (units, n, 3), g/K, by which the outputs follow temperature as far as that is known: what a wrong thermometer acts by
+    slope : (units, n, 3), g/K, known response of the outputs to temperature: the factor of an error of the thermometer
     """
 
     def __init__(self, lot: Lot, *, slope: Array | None = None) -> None:
@@ -69,7 +69,7 @@ class Problem:
         return Covariance(time, self.error, self._direction if self.lot.radial else None)
 
     def _series(self) -> Array:
-        """Measurements (blocks, n), g: outputs, or what the norm of the corrected output exceeds 1 g by."""
+        """Measurements (blocks, n), g: outputs, or the norm of the corrected output less 1 g."""
         if self.lot.radial:
             return np.einsum("unj,unj->un", self._direction, self.lot.output) - 1.0
         return np.swapaxes(self.lot.output, -1, -2).reshape(self.blocks, self.n)
@@ -119,7 +119,8 @@ class Problem:
             columns = self._by_axis([effect.start_columns(state, axis, **on_axis(values, axis)) for axis in range(3)])
         else:
             columns = self.seen(effect.start_change(self.lot.state, **on_axis(values, 0)))
-        # a state taken up before the second dwell leaves a column of one dwell only: it is kept, the dwell tells nothing then
+        # a state that decays before the second dwell leaves a column of one dwell only: it is kept, and this dwell has no
+        # information
         return columns
 
     def _by_axis(self, axes: list[Array]) -> Array:
@@ -132,7 +133,7 @@ class Problem:
         return np.stack(axes, axis=1).reshape(self.blocks, self.n, -1)
 
     def seen(self, change: Array) -> Array:
-        """Changes of force (units or 1, n, 3, q) seen through every unit's response, by block."""
+        """Changes of force (units or 1, n, 3, q) as measured with every unit's response, by block."""
         state = self.lot.state
         seen = np.einsum(
             "uij,unjq->uinq", self.lot.response, np.broadcast_to(change, (*state.force.shape, change.shape[-1]))
@@ -158,7 +159,7 @@ class Problem:
     def pieces(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
     ) -> Iterator[Candidate]:
-        """The candidate of an effect in pieces of its grid, so small that large lots are worked on in bounded memory."""
+        """The candidate of an effect in pieces of its grid, small enough to limit the memory for large lots."""
         if isinstance(effect, Handling):
             yield from self._places(effect, grid)
             return

@@ -1,7 +1,7 @@
-"""What a wrong effect leaves of a true one when its nonlinear parameters are fitted again: the least over all their values.
+"""The residual of a true effect under a wrong one whose nonlinear parameters are fitted again: the minimum over their values.
 
-Every value of the grid is tried, and values near the best, for each truth by itself; each sensor axis may have its own where
-that takes off as much as the search asks of it (:data:`inertial.criticism.decisions.AXES_DIFFER`).
+Every value of the grid is tried, and values near the best, for each truth by itself; each sensor axis may have its own if that
+brings the reduction that the search requires (:data:`inertial.criticism.decisions.AXES_DIFFER`).
 """
 
 from collections.abc import Sequence
@@ -23,20 +23,20 @@ from inertial.effects.base import Nonlinear
 Array = NDArray[np.float64]
 
 _JITTER = 1e-8
-"""Part of a column, squared, below which a direction is rounding, as in the fits."""
+"""Part of a column, squared, below which a direction is rounding error, as in the fits."""
 
 _ROUNDS = 3
 _AXES = 3
 
 
 class Profile:
-    """Truths that a model does not have, and how much of them a wrong effect beside it cannot take up.
+    """Truths that a model does not have, and the part of them that a wrong effect cannot explain.
 
     Parameters
     ----------
     rest : the model without the rivals
-    targets : (blocks, n, r), what each truth adds to the series, g
-    noise : that everything is whitened for
+    targets : (blocks, n, r), contribution of each truth to the series, g
+    noise : of the whitening
     by_axis : least reduction, in whitened squares, for which each axis has its own values; infinite for never
     """
 
@@ -50,19 +50,19 @@ class Profile:
 
     @cached_property
     def whole(self) -> Array:
-        """Whitened sum of squares (r,) that the model without any rival leaves of each truth."""
+        """Whitened sum of squares (r,) of each truth after the model without any rival."""
         flat = self.targets.reshape(-1, self.targets.shape[-1])
         return _after(self.shared.reshape(flat.shape[0], -1), flat)
 
     def left(self, wrong: Term, *, fine: bool) -> Array:
-        """Whitened sum of squares (r,) that the model with a wrong effect leaves of each truth.
+        """Whitened sum of squares (r,) of each truth after the model with a wrong effect.
 
         Parameters
         ----------
         fine : whether values between those of the grid are tried, too
         """
         if isinstance(wrong.effect, Handling):
-            raise TypeError(f"{wrong.effect.id}: what handling did has no parameters to fit again")
+            raise TypeError(f"{wrong.effect.id}: a handling error has no parameters to fit again")
         state = self.problem.lot.state
         grid: list[Values] = [dict(v) for v in grid_of(wrong.effect, state)]
         parameters = [p for p in wrong.effect.parameters(state) if not p.choices]
@@ -108,7 +108,7 @@ class Profile:
         return best, least
 
     def _over(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
-        """What is left (g, r) at each set of values, and by sensor axis (3, g, r) where blocks have their own coefficients."""
+        """Remaining sums of squares (g, r) at each set of values; by sensor axis (3, g, r) if blocks have own coefficients."""
         columns = np.stack([self._columns(wrong, values) for values in grid], axis=2)
         white = Candidate(columns, wrong.shared).whitened(self.problem.covariance, self.noise)
         blocks, n, g, p = white.shape

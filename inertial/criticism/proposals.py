@@ -1,4 +1,4 @@
-"""The next measurement: the steps that part rivals that fit alike, or show what was not seen, per minute of station time."""
+"""The next measurement: steps that separate rivals of equal fit, or show unseen effects, by gain per minute of station time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,7 +27,7 @@ _SIZES = (3, 6, 12)
 _REPEATS = (1, 2, 4)
 _ROUNDS, _TRIED = 4, 4
 _ALL = 0.999
-"""Share of all that is wanted that counts as all of it."""
+"""Share of the aim that counts as complete."""
 
 _KEPT = 0.5
 """Share of what an offer promises on the grid that must be there with every rival fitted."""
@@ -39,12 +39,12 @@ Minutes = Callable[[Sequence[SequenceStep]], float]
 class Proposal:
     """Steps to measure next.
 
-    ids : the effects that it is about; pair : the two rivals that it parts most; empty where it shows what was not seen
+    ids : the effects of the aim; pair : the two rivals that it separates most; empty for unseen effects
     minutes : of station time
-    before, after : chi-square between the two rivals so far, and expected with the steps whichever of them is true; of a
-        coefficient of typical size for effects that were not seen
-    if_true : the same by which of the two is true; remaining : rivals that are still not told apart from the best
-    settled : share of all that is wanted that will be there afterwards, 0 … 1
+    before, after : chi-square between the two rivals so far, and expected with the steps, the smaller for either being true; of a
+    coefficient of typical size for unseen effects
+    if_true : expected with the steps, by true rival; remaining : rivals that are not separated from the best
+    settled : share of the aim that is reached afterwards, 0 … 1
     """
 
     kinds: tuple[Kind, ...]
@@ -61,7 +61,7 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What a proposal may use: the station's reach and pace, its time for steps, and the minutes that may be spent."""
+    """Limits of a proposal: the station's reach and pace, its time for steps, and the minutes that may be spent."""
 
     reach: Reach | None = None
     pace: StationPace = field(default_factory=StationPace)
@@ -79,7 +79,7 @@ class Circumstances:
 
 
 def rivals_in(model: Model, group: EffectClass, most: int = FEW) -> Rivals | None:
-    """The members of a class as rivals; None for a class of one, and where no angles say how to go on."""
+    """The members of a class as rivals; None for a class of one, and without known angles."""
     if len(group.members) < 2 or not _goes_on(model):
         return None
     others = [t for t in model.terms if t.effect.id not in group.ids]
@@ -89,11 +89,11 @@ def rivals_in(model: Model, group: EffectClass, most: int = FEW) -> Rivals | Non
 def proposal(
     model: Model, group: EffectClass, around: Circumstances | None = None, already: Sequence[SequenceStep] = ()
 ) -> Proposal | None:
-    """The steps that best part the members of a class; None where nothing the station does parts two of them for sure.
+    """The steps that best separate the members of a class; None if no steps of the station are certain to separate two of them.
 
     Parameters
     ----------
-    already : steps that are to be measured anyway, for another class; the proposal comes after them
+    already : steps already planned for another class; the proposal follows them
     """
     rivals, every = rivals_in(model, group), rivals_in(model, group, MANY)
     if rivals is None or every is None:
@@ -104,12 +104,12 @@ def proposal(
         return None
     scores = np.array([m.score for m in group.members[:_MEMBERS]])
     found = ProposalSearch(RivalDiscrimination(rivals, scores, every, never), around, already).best()
-    # a measurement that may well tell nothing apart is not worth its station time
+    # a measurement that may separate nothing is not worth its station time
     return None if found is None or len(found.remaining) == len(rivals.terms) - 1 else replace(found, ids=rivals.ids)
 
 
 def twins(model: Model, group: EffectClass, around: Circumstances | None = None) -> tuple[str, ...]:
-    """The best member of a class and those that no measurement of the station parts from it; empty where there is none."""
+    """The best member of a class and those that no measurement of the station separates from it; empty if there are none."""
     rivals = rivals_in(model, group)
     around = around or Circumstances()
     return () if rivals is None else twins_of(rivals, never_apart(rivals, around.reach, around.pace))
@@ -118,9 +118,10 @@ def twins(model: Model, group: EffectClass, around: Circumstances | None = None)
 def sighting(
     model: Model, unseen: Sequence[str], around: Circumstances | None = None, already: Sequence[SequenceStep] = ()
 ) -> Proposal | None:
-    """The steps that best show effects that the plan could not see; None where none matters, or the station can show none.
+    """The steps that best show unseen effects; None if none matters, or the station can show none.
 
-    An effect matters that has been seen to be larger than the noise that is there.
+    An effect matters if its usual
+    size exceeds the noise.
     """
     if not _goes_on(model):
         return None
@@ -138,13 +139,13 @@ def sighting(
 
 
 def _goes_on(model: Model) -> bool:
-    """Whether there are angles to go on from."""
+    """Whether the angles of the table are known."""
     state = model.problem.lot.state
     return state.outer is not None and state.inner is not None and not model.problem.lot.radial
 
 
 def _term(model: Model, name: str) -> Term | None:
-    """An effect at the middle of its grid; None where the dwells lack what it needs."""
+    """An effect at the middle of its grid; None if the dwells lack a quantity."""
     effect, state = catalogue.get(name), model.problem.lot.state
     try:
         grid = grid_of(effect, state)
@@ -155,13 +156,13 @@ def _term(model: Model, name: str) -> Term | None:
 
 
 def _drivers(state: State, term: Term) -> frozenset[str]:
-    """What an effect answers to; nothing for what handling does."""
+    """The drivers of an effect; none for a handling error."""
     return frozenset() if isinstance(term.effect, Handling) else frozenset(drivers_of(state, term.effect))
 
 
 @dataclass(frozen=True)
 class _Offer:
-    """A course with what is there after it, the station time until then, and what it brings per minute."""
+    """A sequence with the share of the aim after it, the station time until then, and its gain per minute."""
 
     course: StepSequence
     worth: float
@@ -170,22 +171,23 @@ class _Offer:
 
 
 class ProposalSearch:
-    """The choice of courses for one aim."""
+    """The choice of sequences for one aim."""
 
     def __init__(self, aim: Objective, around: Circumstances, already: Sequence[SequenceStep]) -> None:
         self.aim, self.around, self.already = aim, around, tuple(already)
         self.state = aim.lot.state
         self.reach = around.reach or reach_of(self.state)
         self.pace = around.pace
-        # dwells on the way shake everything that follows temperature: only for what answers to its rate
+        # dwells during a ramp disturb every effect of temperature: only for effects that respond to its rate
         answers = [_drivers(self.state, t) for t in aim.terms]
         self.rated = any("rate" in found for found in answers)
         self.timed = any("since_power" in found for found in answers)
 
     def best(self) -> Proposal | None:
-        """Courses one after the other, each the best beside those before it, until all is there or nothing more helps.
+        """Sequences in order, each the best after those before it, until the aim is reached or nothing more helps.
 
-        One course that brings all of it by itself takes their place where they take more time, or do not get there.
+        A single
+        sequence that reaches the aim replaces them if they take more time, or do not reach it.
         """
         chosen: list[StepSequence] = []
         now = self.aim.worth(self.already, self.pace)
@@ -211,7 +213,7 @@ class ProposalSearch:
             promised = self._promised([whole.course])
             if promised >= min(now, _ALL):
                 chosen, now = [whole.course], promised
-        return self._told(chosen, now) if chosen else None
+        return self._proposal(chosen, now) if chosen else None
 
     def _kept(
         self, chosen: Sequence[StepSequence], offers: Sequence[_Offer], now: float
@@ -234,14 +236,14 @@ class ProposalSearch:
         return best if best is not None and best[1] - now >= min(self.aim.least, 0.5 * (1.0 - now)) else None
 
     def _promised(self, chosen: Sequence[StepSequence]) -> float:
-        """What is there after courses, with every rival fitted as it will be."""
+        """Share of the aim after sequences, with every rival fitted as in the diagnosis."""
         return self.aim.worth([*self.already, *(s for c in chosen for s in c.steps)], self.pace, fine=True)
 
     def _minutes(self, chosen: Sequence[StepSequence]) -> float:
         return self.around.cost(self.aim, [*self.already, *(s for c in chosen for s in c.steps)])
 
     def _weighed(self, chosen: Sequence[StepSequence], now: float) -> list["_Offer"]:
-        """Courses that help beside those chosen, and that the budget allows."""
+        """Sequences that help after the chosen ones, within the budget."""
         held = [*self.already, *(s for c in chosen for s in c.steps)]
         spent = self.around.cost(self.aim, held)
         found: list[_Offer] = []
@@ -251,12 +253,12 @@ class ProposalSearch:
                 continue
             worth = self.aim.worth([*held, *course.steps], self.pace)
             if worth - now >= min(self.aim.least, 0.5 * (1.0 - now)):
-                rate = (worth - now) / (minutes - spent + 1.0)  # a minute goes by for the follow-up itself
+                rate = (worth - now) / (minutes - spent + 1.0)  # a minute for the start of the follow-up
                 found.append(_Offer(course, worth, minutes, rate))
         return found
 
     def _offers(self, held: Sequence[SequenceStep]) -> list[StepSequence]:
-        """Every course that is worth a look."""
+        """All candidate sequences."""
         here = held[-1].temperature if held else present(self.state, self.pace)
         picks = self._picked(held, here)
         offers = [StepSequence("poses", tuple(picks[:size])).times(r) for size in _SIZES for r in _REPEATS]
@@ -268,11 +270,11 @@ class ProposalSearch:
         return [c for c in offers if c.steps]
 
     def _picked(self, held: Sequence[SequenceStep], temperature: float) -> list[SequenceStep]:
-        """The best poses at a temperature; none where the table or the chamber may not go there."""
+        """The best poses at a temperature; none if the table or the chamber must not go there."""
         grid = pose_grid(self.reach, temperature)
         return self.aim.picks(held, grid, self.pace, _PICKS) if grid else []
 
-    def _told(self, chosen: Sequence[StepSequence], worth: float) -> Proposal:
+    def _proposal(self, chosen: Sequence[StepSequence], worth: float) -> Proposal:
         steps = [s for c in chosen for s in c.steps]
         promise = self.aim.effect_of_steps(self.already, steps, self.pace)
         whole, free = [*self.already, *steps], self.already

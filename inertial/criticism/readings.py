@@ -1,4 +1,4 @@
-"""The dwells of a lot as they were read, before any physics: what data faults are looked for in."""
+"""The measured dwells of a lot, the input of the search for data faults."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665  # m/s² in one g
-_TURNED = 0.05  # singular value, per root of a dwell, below which poses do not tell a response from a bias
+_TURNED = 0.05  # singular value, per root of a dwell, below which poses do not separate response and bias
 _ROUNDS = 12  # of reweighting
 _TUKEY = 4.685
 """Widths of the biweight: 95 % efficiency under normal noise (Holland & Welsch, Commun. Stat. A6 (1977) 813)."""
@@ -20,12 +20,12 @@ class Readings:
     """Readings of a lot, dwells in the order of their numbers; NaN where a unit lacks a dwell.
 
     force : (units, n, 3), g, commanded
-    output, spread : (units, n, 3), output unit; mean and standard deviation of a sample; spread None where not recorded
-    count : (units, n), samples averaged; duration : (units, n), s; each None where not recorded
+    output, spread : (units, n, 3), output unit; mean and standard deviation of a sample; spread None if not recorded
+    count : (units, n), samples averaged; duration : (units, n), s; each None if not recorded
     time : (units, n), s
-    temperature, chamber, vibration : (units, n), °C, °C, g; None where not recorded
-    unit_name : the output's unit where it is stated ("g", "V", "LSB")
-    history_end : s, last instant of the temperature's history, where there is one
+    temperature, chamber, vibration : (units, n), °C, °C, g; None if not recorded
+    unit_name : the output's unit if stated ("g", "V", "LSB")
+    history_end : s, last time of the temperature history, if there is one
     """
 
     force: Array
@@ -48,7 +48,7 @@ class Readings:
 
     @cached_property
     def turned(self) -> bool:
-        """Whether the poses turn enough to tell a response from a bias; else faults of response cannot be looked for."""
+        """Whether the poses separate response and bias; else faults of response cannot be detected."""
         x = np.concatenate([np.ones((*self.force.shape[1:2], 1)), self.force[0]], axis=-1)
         return bool(np.linalg.svd(x, compute_uv=False)[-1] > _TURNED * np.sqrt(len(x)))
 
@@ -56,7 +56,7 @@ class Readings:
     def fits(self) -> Array:
         """Robust bias and response of every unit, (units, 3, 4): columns 1, fx, fy, fz; output unit.
 
-        Where the poses do not turn, the response is the nominal one of the output's unit.
+        If the poses do not turn, the response is the nominal one of the output's unit.
         """
         if not self.turned:
             return np.stack([self._nominal(f, o) for f, o in zip(self.force, self.output, strict=True)])
@@ -86,7 +86,7 @@ class Readings:
 def robust_fit(force: Array, output: Array) -> Array:
     """Bias and response (3, 4) that the majority of dwells agrees on: least squares reweighted by Tukey's biweight.
 
-    Dwells are weighed by the norm of their residual over the three axes, so that a wrong pose loses all of them together.
+    Dwells are weighed by the norm of their residual over the three axes, so that a wrong pose loses all three together.
     """
     there = np.isfinite(output).all(axis=-1)
     x = np.concatenate([np.ones((int(there.sum()), 1)), force[there]], axis=-1)
@@ -99,7 +99,7 @@ def robust_fit(force: Array, output: Array) -> Array:
         middle = float(np.median(size))
         if middle <= 0.0:
             break
-        # absolute values first: they move off outliers that the biweight would still balance between
+        # absolute values first: they reject outliers between which the biweight could remain
         weight = (
             np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else _biweight(size / (_TUKEY * 1.5 * middle))
         )
@@ -131,14 +131,14 @@ class Split:
 
 
 _LEAST = 6  # dwells on either side of a split: a response and a bias need four
-_BETTER = 0.05  # share of the squares that two fits may leave of what one leaves
+_BETTER = 0.05  # largest ratio of the squares of two fits to those of one
 
 
 def find_split(force: Array, output: Array) -> Split | None:
-    """The place where two calibrations explain a run far better than one; None where one does.
+    """The place at which two calibrations explain a run far better than one; None if one is enough.
 
-    Two plain fits must leave less than a twentieth of the squares that one leaves, and differ by more than a hundredth of
-    the scale: nothing physical changes a sensor so.
+    Two fits must leave less than a twentieth of the squares of one, and differ by more than a hundredth of
+    the scale: no physical effect changes a sensor so.
     """
     there = np.flatnonzero(np.isfinite(output).all(axis=-1))
     if there.size < 2 * _LEAST + 1:

@@ -1,4 +1,4 @@
-"""Nonlinear parameters of a term moved from the grid to where the measurements fit best."""
+"""Nonlinear parameters of a term moved from the grid to the best fit."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term:
     """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
 
-    One value serves all units and axes, unless one per axis takes off far more than noise could.
+    One value serves all units and axes, unless one per axis reduces the residual far more than noise can.
     """
     space = model.at(noise)
     if isinstance(term.effect, Handling):
@@ -60,7 +60,7 @@ def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear
 
 
 def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
-    """The same for every axis by itself, where the axes differ by more than noise."""
+    """The same for every axis by itself, if the axes differ by more than noise."""
     common = float(space.gain(term.candidate(problem)).drop[0])
     best: list[float] = []
     total = 0.0
@@ -115,7 +115,7 @@ def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ..
 
 
 def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
-    """Terms of a given model, nonlinear parameters found one after the other beside the rest."""
+    """Terms of a given model, nonlinear parameters estimated one after the other."""
     terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
     for place, effect in enumerate(effects):
         grid = grid_of(effect, problem.lot.state)

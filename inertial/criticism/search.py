@@ -1,4 +1,4 @@
-"""The search for missing effects: forward with the noise estimated anew, and back again over what was chosen."""
+"""The search for missing effects: forward with the noise estimated again, then backward over the chosen effects."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,19 +19,19 @@ from inertial.criticism.space import Gain, Space
 
 Array = NDArray[np.float64]
 
-_FINALISTS = 5  # of each look at the noise, for which the noise is estimated anew
-_AGAIN = 3  # the same where an effect is examined again
-_MOST = 6  # effects that one search may add
-_AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading one
+_FINALISTS = 5  # finalists at each noise, for which the noise is estimated again
+_AGAIN = 3  # the same for the second examination of an effect
+_MOST = 6  # largest number of effects of one search
+_AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading column
 _REFINED, _SAME = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A candidate on its best values, judged beside a model.
+    """A candidate at its best values, judged in addition to a model.
 
-    drop : deviance that it takes off; cost : what is left to pay, the less the better
-    ratio : the likelihood ratio behind them; None where there is none
+    drop : reduction of the deviance; cost : penalised deviance, the smaller the better
+    ratio : the likelihood ratio behind them; None if there is none
     """
 
     term: Term
@@ -48,9 +48,9 @@ class Rival:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Outcome of the search: the model with what was added, and the rivals of the first step, best first.
+    """Outcome of the search: the model with the added effects, and the rivals of the first step, best first.
 
-    handling : the alternative that ended the search, as it was the best of its step; ``model`` is what it was found beside
+    handling : the alternative that ended the search, because it was the best of its step; ``model`` is the model before it
     """
 
     model: Model
@@ -62,12 +62,12 @@ class SearchResult:
 def search(
     field: Candidates, base: Model, stop: Callable[[Sequence[Term]], bool], start: Sequence[Term] = ()
 ) -> SearchResult:
-    """The effects that the measurements call for beyond a base model, or the alternative that must be mended first.
+    """The effects that the measurements require beyond a base model, or the handling error that must be corrected first.
 
     Parameters
     ----------
-    stop : asked before a third and every further effect: whether those chosen only imitate something else
-    start : effects that a part of the lot called for already
+    stop : called before the third and every further effect: whether the chosen ones only imitate another cause
+    start : effects that a part of the lot required already
     """
     chosen: list[Term] = list(start)
     model, ladder = Model(field.problem, [*base.terms, *chosen], near=base.noise) if chosen else base, ()
@@ -85,12 +85,12 @@ def search(
         if len(chosen) > 1:
             model, chosen = _reexamine(field, base, model, chosen)
     if len(chosen) > len(start):
-        model, chosen = _taken_apart(field, base, model, chosen)
+        model, chosen = _replaced_by_two(field, base, model, chosen)
     return SearchResult(model, tuple(chosen), ladder)
 
 
 def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
-    """The lower-order effect that a rival is built on, where it is missing and called for by itself; else the rival."""
+    """The lower-order effect that a rival is built on, if it is missing and significant by itself; else the rival."""
     held = {t.effect.id for t in model.terms}
     for effect in field.effects:
         if effect.id in rival.term.effect.after and effect.id not in held:
@@ -101,12 +101,12 @@ def _parent_first(field: Candidates, model: Model, rival: Rival) -> Rival:
 
 
 def anything(field: Candidates, model: Model) -> bool:
-    """Whether any effect is still called for beyond a model."""
+    """Whether a model requires a further effect."""
     return any(convincing(field, model, r) for r in contest(field, model, finalists=_AGAIN))
 
 
 def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
-    """Whether a rival is significant over all looks, pays for itself, and is large enough to matter."""
+    """Whether a rival is significant over all tests, exceeds its price, and is large enough to matter."""
     if rival.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
         return False
     if -rival.cost < np.log(max(field.problem.count, 1)):
@@ -115,12 +115,12 @@ def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
 
 
 def size_of(model: Model, term: Term) -> float:
-    """RMS, g, over all dwells of what a term explains that the model cannot absorb, less what noise would."""
+    """RMS, g, over all dwells of the part of a term that the model cannot absorb, less that of noise."""
     return model.explained(term.candidate(model.problem), model.with_term(term).scatter())
 
 
 def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
-    """Whether handling explains no more than what effects leave over whose shape is not known exactly.
+    """Whether a handling error explains no more than the remainder of effects of inexact shape.
 
     Effects without a nonlinear parameter or a memory have the shape that their equation gives, and leave nothing over.
     """
@@ -132,7 +132,7 @@ def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
 
 
 def size_where_it_acts(model: Model, term: Term) -> float:
-    """The same over the dwells that the term changes: what happened to one dwell of one unit is not thinned out by the others."""
+    """The same over the dwells that the term changes: an error of one dwell is not diluted by the others."""
     size = size_of(model, term)
     if not isinstance(term.effect, Handling):
         return size
@@ -142,7 +142,7 @@ def size_where_it_acts(model: Model, term: Term) -> float:
 
 
 def contest(field: Candidates, model: Model, barred: str = "", finalists: int = _FINALISTS) -> list[Rival]:
-    """Rivals, best first: those that look best at the model's noise or at less wander, each with its own noise then."""
+    """Rivals, best first: those that are best at the model's noise or with less wander, each then with its own noise."""
     leave = {*(t.effect.id for t in model.terms if not isinstance(t.effect, Handling)), barred}
     chosen: dict[str, Term] = {}
     noise = model.noise
@@ -155,7 +155,7 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
 
 
 def scanned(field: Candidates, space: Space, leave: set[str]) -> list[tuple[Term, float]]:
-    """Candidates at their best grid value with their scores at one noise, best first; those that cannot pay left out."""
+    """Candidates at their best grid value with their scores at one noise, best first; without those below their price."""
     tried: dict[str, tuple[float, Term]] = {}
     whole, first = field.gains(space, leave, handling=True), field.primary_gains(space, leave)
     for primary, gains in ((False, whole), (True, first)):
@@ -171,7 +171,7 @@ def scanned(field: Candidates, space: Space, leave: set[str]) -> list[tuple[Term
 
 
 def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[float, int]:
-    """Best score of a candidate at a noise, and its place on the grid; nothing where noise alone would do as much."""
+    """Best score of a candidate at a noise, and its place on the grid; nothing if noise alone explains it."""
     falls = fall(space, gain)
     place = int(np.argmax(falls))
     if not gain.rank[place]:
@@ -184,7 +184,7 @@ def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[fl
 
 
 def _exact(field: Candidates, model: Model, term: Term) -> Rival:
-    """A finalist with its nonlinear parameters refined, and the noise estimated with it inside."""
+    """A finalist with refined nonlinear parameters, and the noise estimated with it in the model."""
     for _ in range(_REFINED if term.effect.nonlinear else 1):
         before = term
         term = refine(model, term, model.with_term(term).noise)
@@ -194,13 +194,13 @@ def _exact(field: Candidates, model: Model, term: Term) -> Rival:
 
 
 def _moved(before: Term, after: Term) -> bool:
-    """Whether a nonlinear parameter went anywhere: then part of the effect had counted as noise, and the noise is another now."""
+    """Whether a nonlinear parameter moved: then part of the effect had counted as noise, and the noise changes."""
     old, new = (np.ravel(np.array([np.mean(v) for v in t.keywords.values()])) for t in (before, after))
     return bool(np.any(np.abs(new - old) > _SAME * np.abs(old) + 1e-12))
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
-    """A term beside a model, with the noise estimated with it inside; no gain where an alternative cannot have its size."""
+    """A term added to a model, with the noise estimated again; no gain if a handling error cannot have its size."""
     if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
         return Rival(term, 0.0, 0, 0.0, 0.0)
     places = field.places(term.effect.id)
@@ -228,8 +228,8 @@ def _rival(term: Term, ratio: Ratio) -> Rival:
 def ranked(rivals: Sequence[Rival]) -> list[Rival]:
     """Rivals, best first, at the φ of the one that is best at its own.
 
-    Two effects that are one function in the poses of a plan leave the same, and the medians behind φ differ by a few per cent of
-    their whole deviance: each at its own, one of the two would stand alone in its class.
+    Two effects that are identical in the poses of a plan have equal residuals, but their φ, from medians, differ by a few per
+    cent of the deviance: each at its own φ, one of the two would be alone in its class.
     """
     own = sorted(rivals, key=lambda r: r.cost)
     if not own or own[0].ratio is None:
@@ -239,7 +239,7 @@ def ranked(rivals: Sequence[Rival]) -> list[Rival]:
 
 
 def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
-    """Each chosen effect again beside the others: kept, swapped for a better one, or dropped."""
+    """Each chosen effect again beside the others: kept, replaced by a better one, or removed."""
     for term in tuple(chosen):
         if len(chosen) < 2:
             break
@@ -256,8 +256,8 @@ def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term])
     return model, chosen
 
 
-def _taken_apart(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
-    """Each effect of several columns once more against two simpler ones that together do what it does."""
+def _replaced_by_two(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
+    """Each effect of several columns compared with two simpler ones that together are equivalent."""
     for term in tuple(chosen):
         columns = term.candidate(field.problem).columns.shape[-1]
         if columns < 2 or term.shared:

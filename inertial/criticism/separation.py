@@ -1,7 +1,7 @@
-"""How far measurements part rivals: the chi-square that the wrong one must leave, before and after steps not measured yet.
+"""Separation of rivals by measurements: the chi-square that the wrong one leaves, before and after planned steps.
 
-Every rival is taken as the truth once, with its fitted coefficients and nonlinear parameters; every other one, with the rest
-of the model, is fitted to what it predicts. What is left, whitened for white noise and wander, is the noncentrality of the
+Every rival is assumed as the truth once, with its fitted coefficients and nonlinear parameters; every other one, with the rest
+of the model, is fitted to what it predicts. The residual, whitened for white noise and wander, is the noncentrality of the
 test between the two (Atkinson & Fedorov, Biometrika 62 (1975) 57: T-optimal designs maximise the smallest of these).
 """
 
@@ -26,19 +26,19 @@ from inertial.planning.sequences import SequenceStep, StationPace, extended
 Array = NDArray[np.float64]
 
 FEW, MANY = 3, 16
-"""Units that stand for the lot, where all go through the same steps: while steps are looked for, and for what is promised."""
+"""Units that stand for the lot, as all have the same steps: during the search, and for the expected result."""
 
 
 @dataclass(frozen=True)
 class Rivals:
-    """Effects that measurements do not tell apart, as they were fitted.
+    """Effects that measurements do not separate, with their fits.
 
     lot : a few units of it; weight : units of the whole lot over these
     rest : the terms of the model beside the rivals
     predicted : per rival, its coefficients (blocks, p) or (p,) for a station's effect
-    noise : of the few units; variance : what units share of it makes it larger
-    covariance : that the noise's shares are counted in
-    observed : (r, r), chi-square by which what was measured so far speaks for the rival of a row against that of a column
+    noise : of the few units; variance : enlarged by noise that units share
+    covariance : the unit of the noise's shares
+    observed : (r, r), chi-square of the present measurements in favour of the rival of a row over that of a column
     """
 
     lot: Lot
@@ -62,7 +62,7 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most:
 
     Parameters
     ----------
-    model : with everything that was found, for the noise
+    model : with all identified effects, for the noise
     terms : the rivals
     others : the terms of the model beside them
     most : units that stand for the lot
@@ -102,7 +102,7 @@ def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
 
 @dataclass(frozen=True)
 class Apart:
-    """How far rivals lie apart.
+    """The separation of rivals.
 
     left : (r, r), chi-square over the whole lot that the rival of a column leaves of what the rival of a row predicts
     whole : (r,), the same that the model without any of them leaves
@@ -119,8 +119,8 @@ def separations(
 
     Parameters
     ----------
-    steps : taken after what was measured; none for what the measurements so far part
-    fine : whether the wrong rival's nonlinear parameters are fitted, or only the best of their grid is taken
+    steps : after the present measurements; none for the separation by the present measurements
+    fine : whether the wrong rival's nonlinear parameters are fitted, or only the best of their grid is used
     """
     return apart(rivals, steps, pace, fine=fine).left
 
@@ -128,9 +128,9 @@ def separations(
 def apart(
     rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
 ) -> Apart:
-    """How far rivals lie apart with steps taken after what was measured; parameters as :func:`separations`."""
+    """The separation of rivals with steps after the present measurements; parameters as :func:`separations`."""
     problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
-    noise = problem.covariance.taken(rivals.noise, rivals.covariance)
+    noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
     rest = Model(problem, with_turn_on(problem.lot.state, rivals.rest))
     to_lot = rivals.weight / rivals.variance
     profile = Profile(rest, predictions(rivals, problem), noise, AXES_DIFFER / to_lot)
@@ -140,12 +140,12 @@ def apart(
 
 
 def smallest(left: Array) -> Array:
-    """Of each pair the smaller of its two directions, (r, r) symmetric: whichever of the two is true."""
+    """The smaller of the two directions of each pair, (r, r) symmetric: for either being true."""
     return np.minimum(left, left.T)
 
 
-def left_of(model: Model, targets: Array, noise: Noise) -> Array:
-    """Whitened sums of squares (r,) that a model leaves of some series (blocks, n, r)."""
+def residual_squares(model: Model, targets: Array, noise: Noise) -> Array:
+    """Whitened sums of squares (r,) of the residuals of a model on some series (blocks, n, r)."""
     space: Space = model.at(noise)
     free = space.project(space.whiten(targets))
     blocks, n, count = free.shape
@@ -159,7 +159,7 @@ def left_of(model: Model, targets: Array, noise: Noise) -> Array:
 
 
 def predictions(rivals: Rivals, problem: Problem) -> Array:
-    """What each rival adds to the series of a problem of the same units, (blocks, n, r), g."""
+    """Contribution of each rival to the series of a problem of the same units, (blocks, n, r), g."""
     found: list[Array] = []
     for term, coefficients in zip(rivals.terms, rivals.predicted, strict=True):
         columns = problem.columns(term.effect, term.keywords)[..., : term.first]
@@ -169,7 +169,7 @@ def predictions(rivals: Rivals, problem: Problem) -> Array:
 
 
 def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | None) -> Problem:
-    """The problem with steps taken after its dwells; readings there are of no account."""
+    """The problem with steps taken after its dwells; their readings are not used."""
     lot = rivals.lot
     units = lot.state.time.shape[0]
     state = extended(lot.state, steps, pace, response=lot.response)

@@ -1,7 +1,7 @@
-"""Noise that all units of a lot share: where the table stands is off by the same for every unit, dwell by dwell.
+"""Noise that all units of a lot share: an error of the table's angles is common to every unit, dwell by dwell.
 
-Blocks are whitened one by one, as if units were independent. What they share does not average out over the units: a
-difference of chi-square between two effects that are alike in all units scatters by more than its own root, and is worth less.
+Blocks are whitened one by one, as if units were independent. Common noise does not average out over the units: a difference of
+chi-square between two effects that are equal in all units scatters by more than its own root, and counts less.
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ Array = NDArray[np.float64]
 
 
 def shared_factor(model: Model, term: Term) -> float:
-    """Factor, 1 at least, by which noise that units share widens the scatter of what tells a term of a model from its rivals.
+    """Factor, 1 at least, by which common noise widens the scatter of the separation of a term from its rivals.
 
-    One for an effect whose size differs in sign from unit to unit, as much as the number of units for one that is alike in all.
+    One for an effect with different signs from unit to unit, up to the number of units for one that is equal in all.
 
     Parameters
     ----------
-    model : with the term in it; what it leaves is the noise
+    model : with the term in it; its residual is the noise
     """
     problem = model.problem
     units = problem.lot.state.time.shape[0]
@@ -33,7 +33,7 @@ def shared_factor(model: Model, term: Term) -> float:
 
 
 def _together(model: Model, units: int) -> float:
-    """Correlation of what a model leaves between units, on the same axis; zero where chance would do as much."""
+    """Correlation of the residuals between units, on the same axis; zero if within chance."""
     problem = model.problem
     left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
     found = _pairwise(left.reshape(units, -1))
@@ -42,7 +42,7 @@ def _together(model: Model, units: int) -> float:
 
 
 def _alike(model: Model, term: Term, units: int) -> float:
-    """How far a term adds the same to every unit, 0 … 1."""
+    """Part of a term that is equal in every unit, 0 … 1."""
     found = estimate(model)
     at = 0
     for other in (t for t in model.terms if not t.shared):

@@ -1,4 +1,4 @@
-"""The shares of 1/f and of random walk, looked for on a lattice by restricted likelihood."""
+"""The shares of 1/f and of random walk, searched on a lattice by restricted likelihood."""
 
 from collections.abc import Callable
 
@@ -13,15 +13,15 @@ _STRIDES = (4, 2, 1)
 """Half decades, quarters, eighths."""
 
 _LEAST = 1e-3
-"""Deviance that a step must bring."""
+"""Smallest reduction of the deviance by a step."""
 
 
 def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None, *, finest: int = 1) -> Shares:
-    """The shares at which a deviance is least, walked to from a start.
+    """The shares of the smallest deviance, by descent from a start.
 
     Parameters
     ----------
-    near : where to begin; 1/f of three times the white variance where None
+    near : start; 1/f of three times the white variance if None
     finest : smallest stride, in eighths of a decade
     """
     known: dict[Place, float] = {}
@@ -63,7 +63,7 @@ def _inside(k: int) -> int:
 
 
 def _around(place: Place, stride: int) -> list[Place]:
-    """Neighbours: each share up or down, one for the other; at the first stride also none, or there at last."""
+    """Neighbours: each share up or down, one for the other; at the first stride also none, or appearing."""
     first, second = place
     near: list[Place] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
     if first is not None and second is not None:
@@ -77,7 +77,7 @@ def _around(place: Place, stride: int) -> list[Place]:
         ]
     if stride == _STRIDES[0]:
         near += [(first, None), (None, second)]
-        # a share that is not there yet only shows where it is as large as the other
+        # a new share is visible only if it is as large as the other
         if second is None:
             near += [
                 (first, LEAST_SHARE + 8),

@@ -1,4 +1,4 @@
-"""How a unit's output follows temperature by its fitted model: what an error of the thermometer does."""
+"""Response of a unit's output to temperature by its fitted model: the effect of an error of the thermometer."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ _STEP = 0.5  # K
 
 
 def slope_of(model: Model) -> Array | None:
-    """∂E/∂T of every unit at every dwell, (units, n, 3), g/K; None where no temperature is read or the model has none in it."""
+    """∂E/∂T of every unit at every dwell, (units, n, 3), g/K; None if no temperature is recorded or the model has none."""
     lot = model.problem.lot
     state = lot.state
     if state.temperature is None or lot.radial:

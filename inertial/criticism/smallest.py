@@ -1,7 +1,7 @@
-"""The smallest size of each effect that a measurement would have named, beside its own noise and without the slow part of it.
+"""The smallest size of each effect that a measurement detects, with its own noise and without the slow part of it.
 
-The slow part, 1/f and random walk, is found from the same dwells: what it takes up, an effect of the same shape could be. So a
-model that is adequate beside such noise is adequate for what is larger than these sizes, and no more.
+The slow part, 1/f and random walk, is estimated from the same dwells and can contain an effect of the same shape. So a model that
+is adequate with such noise is adequate only for effects larger than these sizes.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Smallest:
-    """The size of an effect, g rms over the dwells, that would be named; without slow noise likewise."""
+    """The size of an effect, g rms over the dwells, that is detected; the same without slow noise."""
 
     effect: str
     size: float
@@ -30,9 +30,9 @@ class Smallest:
 
 
 def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
-    """The smallest sizes of the effects that the plan sees, those first that slow noise hides most.
+    """The smallest detected sizes of the visible effects, those that slow noise hides most first.
 
-    Of an effect with nonlinear parameters the median over the values at which the plan sees it.
+    Of an effect with nonlinear parameters the median over the values at which it is visible.
     """
     noise = model.noise
     spaces = model.at(noise), model.at(Noise(Shares(), noise.scale, noise.prior))
@@ -48,12 +48,12 @@ def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
 
 
 def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: str, least: float) -> Array:
-    """RMS, g, of the effect's clearest column that would be named in the mean, (2, grid): in each space; infinite where unseen.
+    """RMS, g, of the effect's most visible column that is detected in the mean, (2, grid), in each space; else infinite.
 
     Parameters
     ----------
     spaces : with the noise that was found, and with its white part alone
-    least : RMS, g, of what the model cannot absorb of an effect below which it is not named however clear it is
+    least : RMS, g, of the part of an effect beyond the model below which it is never reported
     """
     problem, effect = model.problem, field.of(name)
     there = problem.covariance.there[:, :, None, None]
@@ -73,7 +73,7 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: s
             seen, whole = np.einsum("bngp,bngp->gp", left, left), np.einsum("bngp,bngp->gp", white, white)
             visible = seen > SEEN**2 * whole
             share = np.where(visible, seen / np.where(visible, whole, 1.0), 0.0)
-            with np.errstate(over="ignore"):  # a column that shows next to nothing would need any size
+            with np.errstate(over="ignore"):  # an almost invisible column would need an arbitrary size
                 factor = np.sqrt(needed / np.where(visible, seen, 1.0))
             visible &= np.isfinite(factor)
             each.append(np.where(visible, raw * np.where(visible, factor, 0.0), np.inf))
@@ -83,7 +83,7 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: s
 
 
 def _needed(coefficients: float, looks: int, count: int) -> float:
-    """Noncentrality from which an effect of so many coefficients is named in the mean: it pays, and chance does not do it."""
+    """Noncentrality from which an effect with this number of coefficients is detected in the mean."""
     deviance = max(float(stats.chi2.isf(NAMED_BELOW / max(looks, 1), coefficients)), coefficients)
     while deviance - price(deviance, coefficients) < np.log(max(count, 2)):
         deviance *= 1.02

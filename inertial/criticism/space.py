@@ -1,6 +1,6 @@
-"""What a model leaves of the measurements, and how much a further effect would take: projections in the whitened space.
+"""Residuals of a model and their reduction by a further effect: projections in the whitened space.
 
-Blocks are the series that have coefficients of their own: one per unit and axis. Columns shared by all blocks (the station's
+Blocks are the series with their own coefficients: one per unit and axis. Columns shared by all blocks (the station's
 effects) are targets beside the measurements, so that adding a block's own column only updates a small Gram matrix.
 """
 
@@ -16,7 +16,7 @@ from inertial.criticism.covariance import Covariance, Noise
 Array = NDArray[np.float64]
 
 SEEN = 0.01
-"""Share of a column, after the base model, below which the plan cannot see it (noise of the drivers makes as much)."""
+"""Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Candidate:
 
     columns : (blocks, n, grid, p), g per unit of the coefficient
     shared : whether all blocks share the p coefficients
-    blocks : the blocks that the columns are of, all where None; the columns of the others are zero. Only where shared
-    key : under which whitened columns are kept; not kept where None
+    blocks : the blocks that the columns are of, all if None; the columns of the others are zero. Only where shared
+    key : under which whitened columns are stored; not stored if None
     """
 
     columns: Array
@@ -48,7 +48,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Gain:
-    """What a candidate takes off the sum of squares, per value of its nonlinear parameters.
+    """Reduction of the sum of squares by a candidate, per value of its nonlinear parameters.
 
     drop : (grid,), reduction of the whitened sum of squares
     rank : (grid,), number of coefficients that the plan determines
@@ -61,7 +61,7 @@ class Gain:
 
     @staticmethod
     def joined(parts: Sequence["Gain"]) -> "Gain":
-        """The gain over a grid that was worked on in parts."""
+        """The gain over a grid that was processed in parts."""
         if len(parts) == 1:
             return parts[0]
         return Gain(
@@ -72,7 +72,7 @@ class Gain:
 
 
 class Space:
-    """The measurements after a model, whitened for its noise: of variance one where the model is right.
+    """The measurements after a model, whitened for its noise: of variance one if the model is correct.
 
     Parameters
     ----------
@@ -112,12 +112,12 @@ class Space:
 
     @cached_property
     def squares(self) -> Array:
-        """Sums of squares of each block over its white variance, (blocks,): the scale is not taken out."""
+        """Sums of squares of each block over its white variance, (blocks,): the scale is not removed."""
         return np.einsum("bn,bn->b", self.residual, self.residual) * self.noise.scale**2
 
     @cached_property
     def variance(self) -> float:
-        """Mean square of what is left: one where the noise is this model's own."""
+        """Mean square of the residuals: one if the noise is that of this model."""
         return self.rss / max(self.dof, 1)
 
     @cached_property
@@ -146,12 +146,12 @@ class Space:
         return float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(safe)))
 
     def project(self, columns: Array, blocks: NDArray[np.intp] | None = None) -> Array:
-        """Whitened columns (blocks, n, m) less what the local columns explain."""
+        """Whitened columns (blocks, n, m) without the part that the local columns explain."""
         q = self.q if blocks is None else self.q[blocks]
         return columns - q @ (np.swapaxes(q, -1, -2) @ columns)
 
     def gain(self, candidate: Candidate) -> Gain:
-        """What a candidate explains of what is left."""
+        """Gain of a candidate on the residuals."""
         white = candidate.whitened(self.covariance, self.noise)
         blocks, n, grid, p = white.shape
         flat = white.reshape(blocks, n, grid * p)
@@ -167,7 +167,7 @@ class Space:
         return self._gain_local(left)
 
     def gain_of_dwells(self, columns: Array, places: NDArray[np.intp]) -> Gain:
-        """What columns explain that are of one dwell each, for every dwell by itself; all blocks share their coefficients.
+        """Gain of columns of one dwell each, for every dwell separately; all blocks share their coefficients.
 
         With P as in :mod:`inertial.criticism.left_out` a column t at dwell k has the product t²·P_kk with itself and t·(Py)_k
         with the measurements: no column is whitened.
@@ -181,7 +181,7 @@ class Space:
         size = np.zeros((n, p))
         for members, whitener in self.covariance.whiteners(self.noise.shares):
             scale = (self.covariance.level * self.noise.scale)[members, None]
-            # rows of Pᵀ from the left: what the local columns explain is taken off
+            # rows of Pᵀ from the left: the part that the local columns explain is subtracted
             back = np.swapaxes(self.targets[members], -1, -2) @ whitener
             along = np.swapaxes(self.q[members], -1, -2) @ whitener
             whole = np.sum(whitener**2, axis=0) / scale**2
@@ -249,7 +249,7 @@ def _orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
     size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
     q = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
     keep = np.ones((1, 1), dtype=bool)
-    for tolerance in (1e-9, 0.5):  # the second turn removes what rounding left of the first
+    for tolerance in (1e-9, 0.5):  # the second turn removes rounding errors of the first
         values, vectors = np.linalg.eigh(np.swapaxes(q, -1, -2) @ q)
         keep = values > tolerance
         scale = np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)

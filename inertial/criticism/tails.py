@@ -1,4 +1,4 @@
-"""Tails of the noise: how far a dwell may be off where large values are common.
+"""Tails of the noise: limit for bad dwells if large deviations are frequent.
 
 The noise of a dwell is taken to be normal plus t of three degrees of freedom with an unknown share of the variance: few noises
 have heavier tails. The share has a distribution given the dwells that were kept, by the likelihood of their deletion residuals
@@ -60,7 +60,7 @@ def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
 
 
 def heavy(values: Array) -> bool:
-    """Whether values (m,) have more large ones among them than a normal distribution."""
+    """Whether values (m,) have heavier tails than a normal distribution."""
     return values.size >= _TELLS and float(stats.kurtosistest(values, alternative="greater").pvalue) < HEAVY
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis allows for where the devices were switched off and on: their bias need not come back to where it was."""
+"""Allowance for a power cycle of the devices: their bias need not return to its value."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -12,7 +12,7 @@ from inertial.state import State
 
 
 class TurnOnBias(SensorEffect):
-    """Bias that differs from one power-on to the next: nothing that is looked for, but nothing may be read into it."""
+    """Bias that differs from one power-on to the next: not an effect to search for, but one to allow for."""
 
     id: ClassVar[str] = "turn_on_bias"
     symbol: ClassVar[str] = "kP"

@@ -1,4 +1,4 @@
-"""Effects that no measurement of a station parts: one does all that the other does, under every step it can take."""
+"""Effects that no measurement of a station separates: one is equivalent to the other under every possible step."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from inertial.planning.sequences import SequenceStep, StationPace
 from inertial.state import State
 
 NOTHING = 1e-6
-"""Part of a truth, in chi-square, that a wrong effect may leave under every step and is still no other: rounding."""
+"""Part of a truth, in chi-square, that an equivalent effect may leave under every step: rounding."""
 
 _EVERY, _FURTHER = 4, 12
 
@@ -29,7 +29,7 @@ def everything(state: State, reach: Reach, pace: StationPace) -> list[SequenceSt
 
 
 def never_apart(rivals: Rivals, reach: Reach | None, pace: StationPace) -> np.ndarray:
-    """Whether (r, r) the rival of a column takes up all that the rival of a row predicts, under every step of the station."""
+    """Whether (r, r) the rival of a column explains the prediction of the rival of a row, under every step of the station."""
     state = rivals.lot.state
     steps = everything(state, reach or reach_of(state), pace)
     if not steps:
@@ -41,6 +41,6 @@ def never_apart(rivals: Rivals, reach: Reach | None, pace: StationPace) -> np.nd
 
 
 def twins_of(rivals: Rivals, never: np.ndarray) -> tuple[str, ...]:
-    """The best rival and those that no measurement parts from it; empty where there is none."""
+    """The best rival and those that no measurement separates from it; empty if there are none."""
     alike = [name for name, same in zip(rivals.ids, never[0], strict=True) if same]
     return (rivals.ids[0], *alike) if alike else ()

@@ -1,4 +1,4 @@
-"""Physics that is in no catalogue: one curve of one driver that does better than the effects that would have to imitate it."""
+"""Effects outside the catalogue: one curve of one driver that is better than the effects that imitate it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,18 +23,18 @@ _KNOTS = 9  # of a smooth curve over a driver
 _TIME_KNOTS = 12  # the same over time
 _HARMONICS = 5  # of a table angle
 _CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
-_LEVELS = 14  # groups of values from which on a driver counts as continuous
-_VISITS = 1.5  # how often each level is met at least, in the mean
+_LEVELS = 14  # number of groups of values from which on a driver is continuous
+_VISITS = 1.5  # smallest mean number of visits to each level
 _CENTRES = np.linspace(0.0, 1.0, 21)  # of bumps and hinges, over the driver's range
 _WIDTHS = (0.02, 0.05, 0.1)  # of bumps, of that range
-_SHARPEST = 3  # suspects that are tried with bumps and hinges
+_SHARPEST = 3  # suspects that are tested with bumps and hinges
 
 
 @dataclass(frozen=True)
 class Suspect:
     """A driver, and columns flexible enough for any smooth dependence on it.
 
-    values : (blocks, n), the driver itself, 0 … 1 over the run; None where there is no one quantity
+    values : (blocks, n), the driver itself, 0 … 1 over the run; None if it is not a single quantity
     """
 
     driver: str
@@ -51,7 +51,7 @@ def suspects(problem: Problem) -> list[Suspect]:
             knots = _TIME_KNOTS if is_clock(name) else _KNOTS
             each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
             found.append(Suspect(name, _alike(problem, curve(values, knots)), each))
-            # levels in time, one for each soak, would follow any memory of temperature: a dependence on time is smooth
+            # levels in time, one for each soak, could follow any memory of temperature: a dependence on time is smooth
             steps = None if is_clock(name) else _levels(values)
             if steps is not None:
                 found.append(Suspect(name, _alike(problem, steps)))
@@ -64,7 +64,7 @@ def suspects(problem: Problem) -> list[Suspect]:
 
 
 def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) -> tuple[CurveFit, list[Term]] | None:
-    """The curve that explains a lot better than the effects chosen, with those it leaves standing; None if none does."""
+    """The curve that explains a lot better than the chosen effects, with the effects that remain; None if there is none."""
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
     whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.noise))
     bare = cost_of_model(base)
@@ -90,7 +90,7 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
 
 
 def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects whose own curves, block by block, take off most; the rest cannot win."""
+    """The suspects whose own curves, block by block, reduce the residual most; the others cannot be best."""
     space = base.space
     worth = [float(np.max(space.gain(s.candidate).drop)) for s in field]
     order = np.argsort(worth)[::-1]
@@ -100,7 +100,7 @@ def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
 def _with_others(
     base: Model, chosen: Sequence[Term], field: Sequence[Suspect], best: CurveFit, worth: float
 ) -> tuple[CurveFit, list[Term]]:
-    """The best curve again beside effects that it does not replace: no functions of its own driver, and worth the room."""
+    """The best curve with the effects that it does not replace: no functions of its own driver, and above their price."""
     suspect = [s for s in field if s.driver == best.driver]
     kept: list[Term] = []
     for term in chosen:
@@ -145,7 +145,7 @@ def _sharp(model: Model, suspect: Suspect) -> CurveFit | None:
 
 
 def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
-    """Column of a bump whose place and width are found between those of the grid."""
+    """Column of a bump whose place and width are refined between those of the grid."""
     space = model.space
     column = np.zeros(0)
     for reach in (0.5, 0.2):
@@ -166,12 +166,12 @@ def _unit_range(values: Array) -> Array:
 
 
 def _alike_to(values: Array, other: Array | None) -> bool:
-    """Whether one quantity is as good as another: the chamber's temperature is the sensor's once it has soaked."""
+    """Whether two quantities are equivalent: after a soak the chamber's temperature is the sensor's."""
     return other is not None and float(np.corrcoef(values.ravel(), other.ravel())[0, 1]) > 0.98
 
 
 def _levels(values: Array) -> Array | None:
-    """A step between neighbouring groups of values where they come in a few groups (soaks), (units, n, d); else None."""
+    """A step between neighbouring groups of values if they form a few groups (soaks), (units, n, d); else None."""
     order = np.sort(values, axis=None)
     gaps = np.diff(order)
     edges = order[:-1][gaps > 0.03 * np.ptp(order)] + 0.5 * gaps[gaps > 0.03 * np.ptp(order)]
@@ -180,7 +180,7 @@ def _levels(values: Array) -> Array | None:
     level = np.searchsorted(edges, values[0])
     visits = 1 + int(np.count_nonzero(np.diff(level)))
     if visits < _VISITS * (edges.size + 1):
-        return None  # levels that are met once each are as many free offsets: they would follow any memory
+        return None  # levels visited once each are free offsets: they could follow any memory
     return np.stack([(values > e).astype(float) for e in edges], axis=-1)
 
 

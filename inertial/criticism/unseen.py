@@ -1,4 +1,4 @@
-"""Effects that a plan could not have seen, at all or at some values of their nonlinear parameters."""
+"""Effects that a plan cannot show, at all or at some values of their nonlinear parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -27,10 +27,10 @@ _TO_SD = 1.4826
 
 
 def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[tuple[str, ...], InPart]:
-    """Effects that the plan could not have seen, and those that it could not have seen at some values, with these.
+    """Effects that the plan cannot show, and those that it cannot show at some values, with these.
 
-    Not seen is an effect whose columns the plan leaves empty, makes equal to columns of the model, or whose quantities were not
-    recorded.
+    An effect is not visible if its columns are zero under the plan or equal to columns of the model, or if its quantities were
+    not recorded.
     """
     gains = field.gains(base.at(base.problem.covariance.white_noise()), {t.effect.id for t in base.terms})
     blind = [name for name, gain in gains.items() if not gain.rank.any()]
@@ -48,9 +48,9 @@ def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> t
 def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str, list[bool]]:
     """Whether each effect with a memory is visible, by its place on the grid of its parameter.
 
-    Beside a memory stands its unknown state before the first dwell: a play that is narrower than the steps of soaks that only
-    climb is that state and a bias, and nothing else. One unit is enough, as the plan is the same for all. The scatter of the
-    thermometer is taken out before for a play: a narrow one would follow it from reading to reading, and no device does.
+    A memory has an unknown state before the first dwell: with rising soaks, a play narrower than their steps is equivalent to
+    this state and a bias. One unit is enough, as the plan is the same for all. For a play the scatter of the thermometer is
+    removed first: a narrow play would follow it from reading to reading.
     """
     if base.problem.lot.radial:
         return {}
@@ -102,7 +102,7 @@ def without_scatter(state: State) -> State:
 
 
 def _shown(model: Model, noise: Noise, effect: AnyEffect, place: dict[str, float]) -> bool:
-    """Whether the first column of an effect shows beside the model and the state that it may have had before."""
+    """Whether the first column of an effect is visible beside the model and the possible initial state."""
     problem = model.problem
     term = Term(effect, tuple(place.items()), 1)
     beside = model.with_curves(problem.start(effect, place))

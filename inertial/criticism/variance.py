@@ -1,6 +1,6 @@
-"""Variances of units and axes, drawn together as far as they are alike.
+"""Variances of units and axes, shrunk towards each other as far as they are similar.
 
-Each block's variance comes from a scaled inverse chi-square distribution whose degrees of freedom and centre are found from
+Each block's variance comes from a scaled inverse chi-square distribution whose degrees of freedom and centre are estimated from
 the lot (Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3): equal units share one variance, a noisy unit keeps its own.
 """
 
@@ -16,12 +16,12 @@ _TURNS = 60
 
 
 def deviance(squares: Array, dof: Array) -> float:
-    """−2 log likelihood of blocks' sums of squares, at the prior that suits them best."""
+    """−2 log likelihood of blocks' sums of squares, at the best prior."""
     return min(_at(squares, dof, prior)[0] for prior in (*PRIOR_DOF, np.inf))
 
 
 def moderated(squares: Array, dof: Array) -> tuple[Array, float]:
-    """Variances (blocks,), and the prior degrees of freedom; one variance for all where that is not clearly worse.
+    """Variances (blocks,), and the prior degrees of freedom; one variance for all if that is not clearly worse.
 
     Parameters
     ----------

@@ -281,11 +281,11 @@ def _scaled(rows: Array) -> tuple[Array, Array]:
     return unit, size
 
 
-def _solve(rows: Array, wanted: Array) -> Array:
+def _solve(rows: Array, target: Array) -> Array:
     unit, size = _scaled(rows)
     gram = np.swapaxes(unit, -1, -2) @ unit
     return np.asarray(
-        np.linalg.solve(gram, np.einsum("unp,un->up", unit, wanted)[..., None])[..., 0] / size, dtype=np.float64
+        np.linalg.solve(gram, np.einsum("unp,un->up", unit, target)[..., None])[..., 0] / size, dtype=np.float64
     )
 
 

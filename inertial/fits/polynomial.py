@@ -59,7 +59,7 @@ def fit_axis_polynomial(
     degree : of the polynomial
     reference_temperature : T0, °C
     """
-    raw, wanted = np.asarray(output, dtype=np.float64), np.asarray(force, dtype=np.float64)
+    raw, target = np.asarray(output, dtype=np.float64), np.asarray(force, dtype=np.float64)
     origin = reference_temperature if temperature is not None else None
     columns = _columns(raw, temperature, degree, origin)
     count, unknowns = columns.shape[-2:]
@@ -72,7 +72,7 @@ def fit_axis_polynomial(
     if not np.all(np.linalg.eigvalsh(gram)[..., 0] >= _SINGULAR):
         msg = f"polynomial: the poses do not determine degree {degree} on every axis; add levels of specific force"
         raise NotIdentified(msg)
-    z = np.swapaxes(np.broadcast_to(wanted, raw.shape), -1, -2)
+    z = np.swapaxes(np.broadcast_to(target, raw.shape), -1, -2)
     theta = np.linalg.solve(gram, np.einsum("...np,...n->...p", unit, z)[..., None])[..., 0] / size
     residual = z - np.einsum("...np,...p->...n", columns, theta)
     variance = np.sum(residual**2, axis=-1) / (count - unknowns)

@@ -146,7 +146,7 @@ def fit_lot_with_wander(
     inside = np.einsum("...np,...p->...n", columns.local, theta) + columns.shared[..., : columns.station] @ station
     wide = np.sqrt(solved.variance * stretch)[..., None] * level
     known = _known(series, shares, solved)
-    left = _Left(columns.local, shared, solved, covariance, there)
+    left = _ResidualCovariance(columns.local, shared, solved, covariance, there)
     found = replace(
         plain,
         coefficients=theta,
@@ -246,7 +246,7 @@ def _covariance(shared: Array, solved: Solved) -> Array:
 
 
 @dataclass(frozen=True)
-class _Left:
+class _ResidualCovariance:
     """What a fit leaves, over the variance of the white part: with y = Hθ + v and θ̂ = θ + G·v the residual is v − H·G·v.
 
     h : (..., 3, n, p); s : (..., 3, n, q), of parameters that all share, which add their errors to predictions

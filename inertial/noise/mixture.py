@@ -120,11 +120,11 @@ class MixtureFit:
         expected = self.model @ strengths
         expected = np.where(expected > 0.0, expected, np.exp(self.target))
         rows = self.whiten @ (self.model / expected[:, None])
-        wanted = self.whiten @ (self.target - np.log(expected) + 1.0)
-        wanted = wanted - rows[:, ~free] @ strengths[~free]
+        right_side = self.whiten @ (self.target - np.log(expected) + 1.0)
+        right_side = right_side - rows[:, ~free] @ strengths[~free]
         size = np.linalg.norm(rows[:, free], axis=0)
         trial = strengths.copy()
-        trial[free] = nnls(rows[:, free] / size, wanted)[0] / size
+        trial[free] = nnls(rows[:, free] / size, right_side)[0] / size
         return trial
 
 

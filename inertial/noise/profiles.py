@@ -28,7 +28,7 @@ _STEP = 0.7  # of the natural logarithm, on the way to a lower end
 _ROUGH = 0.02  # the same where each look takes the covariance anew
 
 
-class Found(NamedTuple):
+class TermFit(NamedTuple):
     """Strengths of one curve, NaN where not identified; ends of the intervals; the mixture that runs through the points."""
 
     value: Array
@@ -39,7 +39,7 @@ class Found(NamedTuple):
     dof: float
 
 
-def found(variance: Array, moments: Sums, threshold: float) -> Found:
+def fit_terms(variance: Array, moments: Sums, threshold: float) -> TermFit:
     """Terms of one curve (t,), each identified only if its interval, with all other terms free, does not reach zero.
 
     Parameters
@@ -72,7 +72,7 @@ def found(variance: Array, moments: Sums, threshold: float) -> Found:
     value = np.where(kept, reduced, np.nan)
     low = np.fmin(low, np.where(kept, reduced, 0.0))
     dof = float(variance.size - int(kept.sum()))
-    return Found(value, low, np.fmax(high, np.nan_to_num(value)), curve.strengths, cost, dof)
+    return TermFit(value, low, np.fmax(high, np.nan_to_num(value)), curve.strengths, cost, dof)
 
 
 def _walk_limit(variance: Array, moments: Sums, fitted: Array) -> float:

@@ -140,7 +140,7 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
         raise ValueError(msg)
     moments = sums(curve.n, tuple(curve.m.tolist()))
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
-    rows = [profiles.found(variance, moments, float(chi2.ppf(confidence, 1))) for variance in variances]
+    rows = [profiles.fit_terms(variance, moments, float(chi2.ppf(confidence, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
     scale = np.sqrt(_per_sample(curve.rate_hz))
 

@@ -33,7 +33,7 @@ class Events:
         content = {**event.document(), "when": datetime.now(UTC).isoformat(timespec="milliseconds")}
         files.publish(self.path / f"{number:05d}.json", files.json_bytes(content))
 
-    def noted(self) -> list[Event]:
+    def recorded(self) -> list[Event]:
         """Every event so far."""
         return [_event(content) for content in self.documents()]
 
@@ -47,7 +47,7 @@ class Events:
 
         rows = [
             {"time_s": e.time_s, "kind": e.kind, "record": e.record, "reason": e.reason, "action": e.action}
-            for e in self.noted()
+            for e in self.recorded()
         ]
         columns = {"time_s": float, "kind": "str", "record": "int64", "reason": "str", "action": "str"}
         return pd.DataFrame(rows, columns=list(columns)).astype(columns)
@@ -58,7 +58,7 @@ class Events:
 
         rows = [
             {"time_s": e.time_s, "record": e.record, **{name: e.figures[name] for name in SOAK_FIGURES}}
-            for e in self.noted()
+            for e in self.recorded()
             if e.kind == "soak" and e.figures
         ]
         columns = {"time_s": float, "record": "int64", **dict.fromkeys(SOAK_FIGURES, float)}

@@ -66,7 +66,7 @@ def unframed(place: Place) -> tuple[bytes, str]:
     return (data if state == SOUND else b""), state
 
 
-def tell_edited(place: Place) -> None:
+def warn_of_edits(place: Place) -> None:
     """Warn that a cache was edited and is made again."""
     LOGGER.warning(
         "archive: %s was edited since it was made from the archive's files; it is not used and is made again, see 'tumbleline "

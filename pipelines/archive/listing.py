@@ -98,9 +98,9 @@ FINISHED = 1  # stamp of a finished run in an object store, whose folders have n
 def infos_of(root: Place, runs: Sequence[Run]) -> list[RunInfo]:
     """The lines of runs: from the list where it is up to date, else from their folders."""
     place = root / "index" / "list.json"
-    known, state = noted_lines(place)
+    known, state = stored_lines(place)
     if state == derived.EDITED:
-        derived.tell_edited(place)
+        derived.warn_of_edits(place)
     stored, lines, new = dict[str, Any](), list[RunInfo](), 0
     for run in runs:
         before, stamp = known.get(run.id), stamp_of(run)
@@ -130,7 +130,7 @@ def stamp_of(run: Run) -> int | None:
         return None
 
 
-def noted_lines(place: Place) -> tuple[dict[str, Any], str]:
+def stored_lines(place: Place) -> tuple[dict[str, Any], str]:
     """Stamp and line of every run in the list, and the state of its seal; no lines where the seal is not sound."""
     if not place.is_file():
         return {}, derived.SOUND

@@ -185,6 +185,6 @@ class Records:
 
     @staticmethod
     def _encoded(name: str, frame: pd.DataFrame) -> bytes:
-        from schemas import tables  # slow to import, and only writers of tables need it
+        from schemas import table_check, tables  # slow to import, and only writers of tables need it
 
-        return parquet.table_bytes(name, tables.check(name, frame), tables.VERSION)
+        return parquet.table_bytes(name, table_check.check(name, frame), tables.VERSION)

@@ -73,11 +73,11 @@ class Run:
         ----------
         about : the stage's inputs, parameters and code, as they went into the key.
         """
-        from schemas import tables  # slow to import, and only writers of tables need it
+        from schemas import table_check, tables  # slow to import, and only writers of tables need it
 
         by, follows = provenance(), self._manifests(about.get("inputs", {}))
         for name, frame in outputs.items():
-            checked = tables.check(name, frame, where=f"{stage} → {name}")
+            checked = table_check.check(name, frame, where=f"{stage} → {name}")
             data = self._put_table(name, columns_of(name, checked, tables.VERSION))
             content = {
                 "stage": stage,

@@ -11,6 +11,7 @@ from pipelines.audit.calibrations import Calibrations, captures_of, later, load,
 from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.drifts import KindDrift, UnitDrift, kind_drifts, unit_drifts
 from pipelines.audit.due import Due, due, last_measured
+from pipelines.audit.exchanged_serials import Stranger, strangers
 from pipelines.audit.gauge_mounts import Study, studies
 from pipelines.audit.index import up_to_date
 from pipelines.audit.population import (
@@ -25,14 +26,13 @@ from pipelines.audit.population import (
     yields,
 )
 from pipelines.audit.stations_over_time import Chart, StationSeries, charts, slot_series, station_series
-from pipelines.audit.swaps import Stranger, strangers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.archive import Archive
     from pipelines.audit.rules import Rules
-    from pipelines.parallel import Spread
+    from pipelines.parallel import Distributor
 
     Flags = NDArray[np.bool_]
 
@@ -90,7 +90,9 @@ class Audit:
     studies: tuple[Study, ...]
 
 
-def audit(archive: Archive, rules: Rules, scope: Scope, *, spread: Spread | None = None, workers: int = 1) -> Audit:
+def audit(
+    archive: Archive, rules: Rules, scope: Scope, *, distribute: Distributor | None = None, workers: int = 1
+) -> Audit:
     """Audit the units, stations and population of an archive up to a day.
 
     Histories are analysed completely; ``since`` selects the changes, signals and figures that are reported.
@@ -99,7 +101,7 @@ def audit(archive: Archive, rules: Rules, scope: Scope, *, spread: Spread | None
     ----------
     spread, workers : where runs are read, see :func:`pipelines.parallel.map_partitions`
     """
-    index = up_to_date(archive, spread, workers)
+    index = up_to_date(archive, distribute, workers)
     runs = runs_of(index, scope.until)
     calibrations = load(index, runs)
     foreign = tuple(strangers(calibrations, rules))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from inertial.population.agreement import e_n
 from inertial.population.drift import (
     DeviceDrift,
     LatestState,
@@ -20,6 +19,7 @@ from inertial.population.drift import (
     prudent,
     standing,
 )
+from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, last_of_each, pairs_of, spans_of
 from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
 
 if TYPE_CHECKING:
@@ -34,24 +34,10 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     Index = NDArray[np.int64]
 
-YEAR_D = 365.25
 MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)
 FEWEST_PAIRS = 8
-PAIRS_A_DOF = 6.0
-"""Pairs for each degree of freedom of the mounting's variance: three variances are estimated from the same pairs. By
-simulation of units without drift, 20 units of three calibrations whose stated uncertainty is a fifth of their scatter: |E_n|
-> 1 in 4.4 % (8.3 % with a coverage factor of 2)."""
 AHEAD = np.arange(0.0, 10.0 + 1e-9, 1.0 / 24.0)  # years, in steps of half a month
-
-
-@dataclass(frozen=True)
-class Pairs:
-    """Neighbouring calibrations of the same unit: rows of the later and of the earlier one, and the years between."""
-
-    later: Index
-    earlier: Index
-    years: Array
 
 
 @dataclass(frozen=True)
@@ -107,26 +93,18 @@ class UnitDrift:
     calibrations: int
 
 
-def pairs_of(calibrations: Calibrations, good: Flags) -> Pairs:
-    """Every good calibration with the previous good one of the same unit."""
-    rows = np.flatnonzero(good)
-    same = calibrations.histories[rows[1:]] == calibrations.histories[rows[:-1]]
-    later, earlier = rows[1:][same], rows[:-1][same]
-    return Pairs(later, earlier, (calibrations.day[later] - calibrations.day[earlier]) / YEAR_D)
-
-
 def kind_drifts(calibrations: Calibrations, good: Flags, rules: Rules, since: float) -> list[KindDrift]:
     """Drift of every parameter of every kind, from all pairs; the shares are of the pairs that end in the period."""
     pairs, out = pairs_of(calibrations, good), list[KindDrift]()
-    spans = _spans(calibrations, pairs)
+    spans = spans_of(calibrations, pairs)
     for device in np.unique(calibrations.device.astype(str)):
         of_kind = calibrations.device[pairs.later] == device
         if of_kind.sum() < FEWEST_PAIRS:
             continue
         own: list[KindDrift] = []
         for name in OWN:
-            change, known = _changes(calibrations, pairs, name)
-            longer, longer_known = _changes(calibrations, spans, name)
+            change, known = changes_of(calibrations, pairs, name)
+            longer, longer_known = changes_of(calibrations, spans, name)
             kept = of_kind & np.isfinite(change + known)
             whole = (calibrations.device[spans.later] == device) & np.isfinite(longer + longer_known)
             if kept.sum() < FEWEST_PAIRS:
@@ -176,8 +154,8 @@ def _kind_drift(
 ) -> KindDrift:
     tolerance = rules.tolerance_of(device, FAMILY_OF[name])
     kind, ahead = kinds
-    change, _ = _changes(calibrations, pairs, name)
-    numbers, moved = _e_n(calibrations, pairs, name, kind)[recent], np.abs(change[recent])
+    change, _ = changes_of(calibrations, pairs, name)
+    numbers, moved = e_n_of(calibrations, pairs, name, kind)[recent], np.abs(change[recent])
     numbers, moved = numbers[np.isfinite(numbers)], moved[np.isfinite(moved)]
     return KindDrift(
         device=device,
@@ -206,7 +184,7 @@ def unit_drifts(
     limits : of the product, by device and family, in the parameter's unit
     """
     pairs = pairs_of(calibrations, good)
-    last = _last_of_each(calibrations.histories[pairs.later])
+    last = last_of_each(calibrations.histories[pairs.later])
     final = Pairs(pairs.later[last], pairs.earlier[last], pairs.years[last])
     out: dict[str, list[UnitDrift]] = {}
     for device in dict.fromkeys(drift_of_kind.device for drift_of_kind in kinds):
@@ -273,8 +251,8 @@ def _course(
 
 def _unit_drifts(calibrations: Calibrations, rows: Pairs, course: _Course, until: Array) -> list[UnitDrift]:
     drift_of_kind, now, times, beyond = course.drift_of_kind, course.now, course.times, course.beyond
-    change, _ = _changes(calibrations, rows, drift_of_kind.parameter)
-    numbers = _e_n(calibrations, rows, drift_of_kind.parameter, drift_of_kind.kind)
+    change, _ = changes_of(calibrations, rows, drift_of_kind.parameter)
+    numbers = e_n_of(calibrations, rows, drift_of_kind.parameter, drift_of_kind.kind)
     return [
         UnitDrift(
             unit=str(calibrations.unit[row]),
@@ -308,39 +286,6 @@ def _leaving(mean: Array, deviation: Array, bound: float, day: Array) -> tuple[A
         return never, never, never
     expected, soonest, latest = leaves(mean, deviation, bound, AHEAD)
     return day + YEAR_D * expected, day + YEAR_D * soonest, day + YEAR_D * latest
-
-
-def _changes(calibrations: Calibrations, pairs: Pairs, name: str) -> tuple[Array, Array]:
-    """Change of a parameter over every pair, and the sum of both variances."""
-    value, error = calibrations.column(name), calibrations.error(name)
-    return value[pairs.later] - value[pairs.earlier], error[pairs.later] ** 2 + error[pairs.earlier] ** 2
-
-
-def _e_n(calibrations: Calibrations, pairs: Pairs, name: str, kind: DeviceDrift) -> Array:
-    """E_n of every pair; the mounting's variance is part of both uncertainties and is known only from the pairs of the kind."""
-    value = calibrations.column(name)
-    error = np.hypot(calibrations.error(name), kind.mount_sd)
-    total = error[pairs.later] ** 2 + error[pairs.earlier] ** 2
-    share = np.maximum(2.0 * kind.mount_sd**2 / total, 1e-6)
-    dof = max(kind.pairs / PAIRS_A_DOF, 1.0) / share**2  # Welch and Satterthwaite (JCGM 100, G.4.1)
-    return e_n(value[pairs.later], value[pairs.earlier], error[pairs.later], error[pairs.earlier], dof)
-
-
-def _spans(calibrations: Calibrations, pairs: Pairs) -> Pairs:
-    """The last calibration of every unit with its first, where others lie between: long times separate slope from random walk."""
-    unit = calibrations.histories[pairs.later]
-    last = _last_of_each(unit)
-    first = np.concatenate([[0], last[:-1] + 1]) if last.size else last
-    longer = last > first
-    later, earlier = pairs.later[last[longer]], pairs.earlier[first[longer]]
-    return Pairs(later, earlier, (calibrations.day[later] - calibrations.day[earlier]) / YEAR_D)
-
-
-def _last_of_each(numbers: Index) -> Index:
-    """Places where a run of equal numbers ends."""
-    if not numbers.size:
-        return np.zeros(0, dtype=np.int64)
-    return np.flatnonzero(np.concatenate([numbers[1:] != numbers[:-1], [True]]))
 
 
 def _padded(calibrations: Calibrations, good: Flags, rows: Pairs, name: str) -> tuple[Array, Array, Array]:

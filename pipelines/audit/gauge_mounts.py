@@ -39,19 +39,19 @@ class Study:
     of_tolerance: float
 
 
-def studies(all_: Calibrations, good: Flags, rules: Rules) -> list[Study]:
+def studies(calibrations: Calibrations, good: Flags, rules: Rules) -> list[Study]:
     """Every gauge study of every parameter; the units are the parts, the stations the appraisers."""
     out: list[Study] = []
-    for group in _groups(all_, good, rules.gauge_days):
-        chosen = _crossed(all_, group)
+    for group in _groups(calibrations, good, rules.gauge_days):
+        chosen = _crossed(calibrations, group)
         if chosen is None:
             continue
         stations, rows = chosen
-        device = str(all_.device[rows[0, 0, 0]])
-        days = all_.day[rows]
-        runs = tuple(sorted({str(run) for run in all_.run[rows].ravel()}))
+        device = str(calibrations.device[rows[0, 0, 0]])
+        days = calibrations.day[rows]
+        runs = tuple(sorted({str(run) for run in calibrations.run[rows].ravel()}))
         for name in OWN:
-            values = all_.column(name)[rows]
+            values = calibrations.column(name)[rows]
             if np.isfinite(values).all():
                 components = gauge_study(values)
                 share = 100.0 * SIX_SIGMA * components.gauge / (2.0 * rules.tolerance_of(device, FAMILY_OF[name]))
@@ -59,35 +59,35 @@ def studies(all_: Calibrations, good: Flags, rules: Rules) -> list[Study]:
     return out
 
 
-def _groups(all_: Calibrations, good: Flags, within_days: float) -> list[dict[str, Index]]:
+def _groups(calibrations: Calibrations, good: Flags, within_days: float) -> list[dict[str, Index]]:
     """Sets of runs on exactly the same units within some days; by run, the rows of its units in order of serial."""
     rows = np.flatnonzero(good)
-    order = rows[np.lexsort((all_.unit[rows].astype(str), all_.run[rows].astype(str)))]
-    runs = all_.run[order].astype(str)
+    order = rows[np.lexsort((calibrations.unit[rows].astype(str), calibrations.run[rows].astype(str)))]
+    runs = calibrations.run[order].astype(str)
     starts = np.flatnonzero(np.concatenate([[True], runs[1:] != runs[:-1]])) if order.size else np.zeros(0, dtype=int)
     by_units: dict[tuple[str, ...], list[Index]] = {}
     for own in np.split(order, starts[1:]) if order.size else []:
         if own.size >= FEWEST_PARTS:
-            by_units.setdefault(tuple(all_.unit[own]), []).append(own)
+            by_units.setdefault(tuple(calibrations.unit[own]), []).append(own)
     out: list[dict[str, Index]] = []
     for members in by_units.values():
-        members.sort(key=lambda own: (float(all_.day[own[0]]), str(all_.run[own[0]])))
+        members.sort(key=lambda own: (float(calibrations.day[own[0]]), str(calibrations.run[own[0]])))
         part: list[Index] = []
         for own in [*members, None]:
-            if part and (own is None or all_.day[own[0]] - all_.day[part[0][0]] > within_days):
+            if part and (own is None or calibrations.day[own[0]] - calibrations.day[part[0][0]] > within_days):
                 if len(part) > 1:
-                    out.append({str(all_.run[one[0]]): one for one in part})
+                    out.append({str(calibrations.run[one[0]]): one for one in part})
                 part = []
             if own is not None:
                 part.append(own)
     return out
 
 
-def _crossed(all_: Calibrations, group: dict[str, Index]) -> tuple[tuple[str, ...], Index] | None:
+def _crossed(calibrations: Calibrations, group: dict[str, Index]) -> tuple[tuple[str, ...], Index] | None:
     """Stations, and rows (parts, stations, mounts) of a study with equal numbers of mounts; None without repeats."""
     by_station: dict[str, list[Index]] = {}
     for rows in group.values():
-        by_station.setdefault(str(all_.station[rows[0]]), []).append(rows)
+        by_station.setdefault(str(calibrations.station[rows[0]]), []).append(rows)
     repeated = {station: runs for station, runs in sorted(by_station.items()) if len(runs) > 1}
     if not repeated:
         return None

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive
     from pipelines.archive.store import Place
-    from pipelines.parallel import Spread
+    from pipelines.parallel import Distributor
 
 FOLDER = "index"
 RUNS_PER_PART = 500
@@ -117,7 +117,7 @@ class AuditIndex:
         return [str(part / f"{name}.parquet") for part in self.parts]
 
 
-def up_to_date(archive: Archive, spread: Spread | None = None, workers: int = 1) -> AuditIndex:
+def up_to_date(archive: Archive, distribute: Distributor | None = None, workers: int = 1) -> AuditIndex:
     """The index of an archive with the present state of every run.
 
     Where the archive cannot be written the index is made in a temporary folder.
@@ -131,16 +131,16 @@ def up_to_date(archive: Archive, spread: Spread | None = None, workers: int = 1)
         return AuditIndex((), 0, 0)
     try:
         with alone(place, wait=True):
-            found = _refreshed(archive, place, spread, workers)
+            found = _refreshed(archive, place, distribute, workers)
             return replace(found, holder=_Reading(place)) if isinstance(place, Path) else found
     except ArchiveUnusable:
         if isinstance(archive.root, Path) and os.access(archive.root, os.W_OK):
             raise
         holder = _Fleeting()
-        return replace(_refreshed(archive, holder.path, spread, workers), holder=holder)
+        return replace(_refreshed(archive, holder.path, distribute, workers), holder=holder)
 
 
-def _refreshed(archive: Archive, place: Place, spread: Spread | None, workers: int) -> AuditIndex:
+def _refreshed(archive: Archive, place: Place, distribute: Distributor | None, workers: int) -> AuditIndex:
     stamps, version = stamps_of(archive.root), version_of_rows()
     parts = _believed(part_folders(place), version)
     _remove(place, [part for part, runs in parts.items() if not runs])  # a new part may have its name
@@ -155,7 +155,9 @@ def _refreshed(archive: Archive, place: Place, spread: Spread | None, workers: i
     root = address_of(archive.root)
     own = "" if place == archive.root / FOLDER else str(place)
     portions = [Portion(root, own, tuple((r, stamps[r]) for r in chunk), version) for chunk in chunks]
-    new = [place / name for name in map_partitions(make_part, portions, spread, workers=workers, name="audit index")]
+    new = [
+        place / name for name in map_partitions(make_part, portions, distribute, workers=workers, name="audit index")
+    ]
     _remove(place, set(parts) - set(good) - set(new))
     return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
 
@@ -196,7 +198,7 @@ def _believed(folders: Sequence[Place], version: str) -> dict[Place, dict[str, s
         states = dict(zip(folders, pool.map(standing_of, folders), strict=True))
     for part, state in states.items():
         if state == derived.EDITED:
-            derived.tell_edited(part)
+            derived.warn_of_edits(part)
     return {part: runs_of(part, version) if state == derived.SOUND else {} for part, state in states.items()}
 
 

@@ -11,7 +11,7 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from pipelines.audit.drifts import YEAR_D
+from pipelines.audit.pairs import YEAR_D
 from pipelines.audit.parameters import unit_text
 from pipelines.report.plots import STYLE, WIDTH_IN, svg
 from schemas.counts import number_of

@@ -109,10 +109,10 @@ def figures_of(index: AuditIndex, calibrations: Calibrations, chosen: Flags) -> 
     units, unit = np.unique(calibrations.unit.astype(str), return_inverse=True)
     own = run.astype(np.int64) * max(units.size, 1) + unit
     order = np.argsort(own)
-    wanted_run, wanted_unit = (_numbers_in(frame[n], known) for n, known in (("run", runs), ("unit", units)))
-    key = wanted_run * max(units.size, 1) + wanted_unit
+    run_index, unit_index = (_numbers_in(frame[n], known) for n, known in (("run", runs), ("unit", units)))
+    key = run_index * max(units.size, 1) + unit_index
     place = np.minimum(np.searchsorted(own[order], key), max(own.size - 1, 0))
-    found = (wanted_run >= 0) & (wanted_unit >= 0)
+    found = (run_index >= 0) & (unit_index >= 0)
     if own.size:
         found &= own[order][place] == key
         row = order[place]

@@ -11,7 +11,8 @@ from pydantic import Field, FiniteFloat, ValidationError, field_validator, model
 
 from pipelines.audit.parameters import FAMILIES
 from schemas.errors import did_you_mean
-from schemas.recipe import Strict, explain, parse_toml, read_text
+from schemas.recipe import Strict
+from schemas.toml_files import explain, parse_toml, read_text
 
 if TYPE_CHECKING:
     from pathlib import Path

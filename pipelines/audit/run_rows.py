@@ -117,12 +117,12 @@ def _tables(files: RunFiles) -> dict[str, pa.Table]:
 
 
 def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:
-    data, wanted = content[f"{name}.parquet"], READ[name]
+    data, schema = content[f"{name}.parquet"], READ[name]
     if f"{name}.json" not in content:
         raise ValueError(f"{name}.parquet has no manifest")
     if hashlib.sha256(data).hexdigest() != json.loads(content[f"{name}.json"])["sha256"]:
         raise ValueError(f"{name}.parquet has changed since it was written")
-    texts = [field.name for field in wanted if field.type == _FEW]
+    texts = [field.name for field in schema if field.type == _FEW]
     file = pq.ParquetFile(pa.BufferReader(data), read_dictionary=texts, pre_buffer=False)
     marks = file.schema_arrow.metadata or {}
     mark = marks.get(TABLE_MARK, b"").decode(errors="replace")
@@ -130,10 +130,10 @@ def _table(name: str, content: Mapping[str, bytes]) -> pa.Table:
         raise ValueError(f"{name}.parquet has '{mark or 'a foreign table'}'")
     version = int(marks.get(SCHEMA_MARK, b"1"))
     if version == VERSION:
-        table = file.read(columns=wanted.names, use_threads=False)  # threads cost more than so few rows
+        table = file.read(columns=schema.names, use_threads=False)  # threads cost more than so few rows
     else:
         table = pa.Table.from_pandas(upgraded(name, file.read().to_pandas(), version, f"{name}.parquet"))
-    return _in_schema(table, wanted)
+    return _in_schema(table, schema)
 
 
 def _in_schema(table: pa.Table, expected: pa.Schema) -> pa.Table:

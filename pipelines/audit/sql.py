@@ -49,7 +49,9 @@ class Answer:
     rows: list[tuple[Any, ...]]
 
 
-def ask(archive: Archive, sql: str, *, workers: int = 1, compact: bool = True) -> Answer:
+def ask(
+    archive: Archive, sql: str, *, workers: int = 1, compact: bool = True, index: AuditIndex | None = None
+) -> Answer:
     """The answer to an SQL query.
 
     Views: those of the index (``runs``, ``units``, ``parameters``, ``station``, ``coefficients``, ``figures``), every other
@@ -59,11 +61,13 @@ def ask(archive: Archive, sql: str, *, workers: int = 1, compact: bool = True) -
     Parameters
     ----------
     compact : whether ``coefficients``, ``figures`` … are read from the index; else from the files of the runs
+    index : one that the caller holds; None: the index is brought up to date first
     """
     statement = one_reading_statement(sql)
     views = {word.lower() for word in WORD.findall(sql)} & set(VIEWS)
     with duckdb.connect(":memory:", config=SHUT_IN) as connection:
-        index = up_to_date(archive, workers=workers) if views & SCHEMAS.keys() else None
+        if index is None and views & SCHEMAS.keys():
+            index = up_to_date(archive, workers=workers)
         for name in sorted(views):
             connection.register(name, _views(archive, index, compact=compact)[name]())
         connection.execute("SET enable_progress_bar = false; SET lock_configuration = true")

@@ -90,7 +90,7 @@ def _grid(residuals: Mapping[str, NDArray[Any]]) -> tuple[Array, State] | None:
     return by_unit.mean(axis=0), State(force=force, time=time, temperature=temperature if known else None)
 
 
-class _Seen(NamedTuple):
+class _PlanProjection(NamedTuple):
     """The columns of the units' model by axis, and for each effect its projected columns with their inverse."""
 
     bases: list[Array]
@@ -98,10 +98,10 @@ class _Seen(NamedTuple):
     spare: int
 
 
-_seen: dict[tuple[object, ...], _Seen] = {}
+_projections: dict[tuple[object, ...], _PlanProjection] = {}
 
 
-def _what_is_seen(exact: State, model: Sequence[str]) -> _Seen:
+def _plan_projection(exact: State, model: Sequence[str]) -> _PlanProjection:
     """The projected columns of a plan; computed once for all runs of a recipe whose temperatures agree within a kelvin.
 
     It is computed from the rounded state, so that the values of a run do not depend on earlier runs.
@@ -109,7 +109,7 @@ def _what_is_seen(exact: State, model: Sequence[str]) -> _Seen:
     state = _rounded(exact)
     parts = (state.force, state.temperature, state.outer, state.inner)
     key = (tuple(model), *(b"" if part is None else np.asarray(part).tobytes() for part in parts))
-    if key not in _seen:
+    if key not in _projections:
         bases = _bases(state, model)
         found: list[tuple[StationEffect, Array, Array]] = []
         for effect in followed():
@@ -117,8 +117,8 @@ def _what_is_seen(exact: State, model: Sequence[str]) -> _Seen:
             if columns is not None and not any(_alike(columns, other) for _, other, _ in found):
                 inverse = np.asarray(np.linalg.inv(columns.T @ columns), dtype=np.float64)
                 found.append((effect, columns, inverse))
-        _seen[key] = _Seen(bases, found, 3 * state.time.size - sum(base.shape[1] for base in bases))
-    return _seen[key]
+        _projections[key] = _PlanProjection(bases, found, 3 * state.time.size - sum(base.shape[1] for base in bases))
+    return _projections[key]
 
 
 def _rounded(state: State) -> State:
@@ -129,7 +129,7 @@ def _rounded(state: State) -> State:
 
 
 def _fitted(mean: Array, state: State, model: Sequence[str]) -> list[StationValue]:
-    seen = _what_is_seen(state, model)
+    seen = _plan_projection(state, model)
     target = np.concatenate([_without(mean[:, axis], seen.bases[axis]) for axis in range(3)])
     out: list[StationValue] = []
     for effect, columns, inverse in seen.effects:

@@ -86,7 +86,7 @@ class CaptureRun:
     def run(self, plan: list[Step]) -> None:
         """Measures every step that is not stored; an error of the station is journalled and leaves it in its safe state."""
         acquisition, done = self.acquisition, self.acquisition.sink.finished()
-        acquisition.plausibility.refuse_contradicted(self.supervisor.events.noted())
+        acquisition.plausibility.refuse_contradicted(self.supervisor.events.recorded())
         acquisition.power.require_on()
         acquisition.identify()
         try:

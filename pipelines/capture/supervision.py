@@ -61,7 +61,7 @@ class Supervisor:
     def past(self) -> list[Event]:
         """Events up to the present time: a simulated run that was killed resumes at an earlier time than its last events."""
         now = self.station.clock.now()
-        return [event for event in self.events.noted() if event.time_s <= now]
+        return [event for event in self.events.recorded() if event.time_s <= now]
 
     def check_before(self, slots: Sequence[int]) -> None:
         """Suspends a record before it starts, where a condition holds."""

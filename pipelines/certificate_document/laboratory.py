@@ -10,8 +10,8 @@ from pydantic import Field, ValidationError, model_validator
 
 from schemas.bounds import Text
 from schemas.errors import WrongUse
-from schemas.recipe import explain, parse_toml, read_text
 from schemas.strict import Strict
+from schemas.toml_files import explain, parse_toml, read_text
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive.store import Place
 
-NOTED = "index/ledger"
+INDEX_FOLDER = "index/ledger"
 VERSION = b"tumbleline.ledger 1"
 DIGITS = "0123456789abcdef"
 FEWEST_NEW = 8  # reading fewer files again is faster than writing the index
@@ -36,7 +36,7 @@ AT_ONCE = 64  # files for one task of a thread
 NAMES = tuple(field.name for field in fields(LedgerEntry))
 
 
-class Noted(NamedTuple):
+class IndexedEvent(NamedTuple):
     """An event, with size and time of its file."""
 
     stamp: str
@@ -68,15 +68,15 @@ def histories_of(root: Place) -> Histories:
 
 def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
     """Events by the places of their files, or the fault of a file; new events are added to the index."""
-    place = root / NOTED / f"{digit}.noted"
-    before, state = noted_events(place)
+    place = root / INDEX_FOLDER / f"{digit}.noted"
+    before, state = indexed_events(place)
     if state == derived.EDITED:
-        derived.tell_edited(place)
+        derived.warn_of_edits(place)
     known = {name: one for name, one in before.items() if stamps.get(name) == one.stamp}
     missing = [name for name in stamps if name not in known]
     read = all_read(root / FOLDER, missing)
     found.read += len(read)
-    new = {name: Noted(stamps[name], event) for name, event in read.items() if isinstance(event, LedgerEntry)}
+    new = {name: IndexedEvent(stamps[name], event) for name, event in read.items() if isinstance(event, LedgerEntry)}
     if len(new) + len(before) - len(known) >= FEWEST_NEW or state == derived.EDITED:
         with suppress(ArchiveUnusable):  # a reader without write permission does without the index
             files.publish(place, derived.framed(_encoded(known | new)))
@@ -136,7 +136,7 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
         return f"cannot be read ({first_line(problem)}); restore it from a copy"
 
 
-def noted_events(place: Place) -> tuple[dict[str, Noted], str]:
+def indexed_events(place: Place) -> tuple[dict[str, IndexedEvent], str]:
     """The index by the place of the event's file, and the state of its seal; empty where the seal is not sound."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -159,7 +159,7 @@ def noted_events(place: Place) -> tuple[dict[str, Noted], str]:
         columns[name] = [known[text] for text in columns[name]]
     events = (LedgerEntry(*row) for row in zip(*(columns[name] for name in NAMES), strict=True))
     rows = zip(columns["place"], columns["stamp"], events, strict=True)
-    return {name: Noted(stamp, event) for name, stamp, event in rows}, state
+    return {name: IndexedEvent(stamp, event) for name, stamp, event in rows}, state
 
 
 def _tuples(value: Any) -> Any:
@@ -167,7 +167,7 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(one) for one in value) if isinstance(value, list) else value
 
 
-def _encoded(known: Mapping[str, Noted]) -> bytes:
+def _encoded(known: Mapping[str, IndexedEvent]) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 

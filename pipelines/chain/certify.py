@@ -247,7 +247,7 @@ def refuse_unstated(run: Run) -> None:
         )
     missing = {name: rules for name, rules in terms.stated.not_stated.items() if name in NEVER_LEFT_OUT}
     if missing:
-        listed = ", ".join(f"{name} (rules {rules})" for name, rules in missing.items())
+        listed = ", ".join(f"{name} (dominates {rules})" for name, rules in missing.items())
         raise WrongUse(f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] and measure again")
     if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
         raise WrongUse(

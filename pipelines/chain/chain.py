@@ -67,8 +67,8 @@ def _summaries(job: Job, run: Run) -> pd.DataFrame:
     if found is None:
         readings = run.table("readings")
         tumbled = set(readings.loc[readings["kind"] != PROCEDURE, "record"])
-        wanted = None if len(tumbled) == readings["record"].nunique() else tumbled
-        found = summarised(records.samples(wanted), readings, job.recipe.zero_output)
+        selection = None if len(tumbled) == readings["record"].nunique() else tumbled
+        found = summarised(records.samples(selection), readings, job.recipe.zero_output)
         _looked_at.clear()
         _looked_at[key] = found
     return found

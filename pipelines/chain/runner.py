@@ -56,8 +56,8 @@ def from_station(job: Job, records: Records, progress: Progress) -> None:
 
 def captured_tables(records: Records) -> dict[str, pd.DataFrame]:
     """What a run keeps of its capture besides the samples: readings, temperatures against time, soaks, what happened."""
-    told = {"events": records.events.table(), "soaks": records.events.soaks()}
-    return {**told, **{name: records.gathered(name) for name in ("readings", "history")}}
+    tables = {"events": records.events.table(), "soaks": records.events.soaks()}
+    return {**tables, **{name: records.gathered(name) for name in ("readings", "history")}}
 
 
 class Runner:

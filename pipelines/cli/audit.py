@@ -1,4 +1,4 @@
-"""``tumbleline audit``: what drifts, what is due, which station moved, how the population stands."""
+"""``tumbleline audit``: drift, calibrations due, changes of stations, and the population."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def command(
         typer.Option("--since", metavar="DATE", help="Changes, signals and figures from this day on; all by default."),
     ] = "",
     until: Annotated[
-        str, typer.Option("--until", metavar="DATE", help="As it was known at the end of this day; today by default.")
+        str,
+        typer.Option("--until", metavar="DATE", help="State of the archive at the end of this day; today by default."),
     ] = "",
     device: Annotated[str, typer.Option("--device", metavar="KIND", help="Only units of this kind.")] = "",
     station: Annotated[str, typer.Option("--station", metavar="NAME", help="Only what this station measured.")] = "",
@@ -53,32 +54,32 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Audit the archive: re-calibrations due, drift, stations, check standards, population; leaves 1 where there is a finding."""
+    """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
     from pipelines.archive import Archive
     from pipelines.audit.audit import audit
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings
     from pipelines.audit.period import scope_of
     from pipelines.audit.rules import load_rules
-    from pipelines.flows.spread import on_dask
+    from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import processors
 
     store, scope = Archive(archive), scope_of(since, until, device, station)
     count = workers or processors()
-    found = audit(store, load_rules(rules), scope, spread=on_dask(dask, count), workers=count)
+    found = audit(store, load_rules(rules), scope, distribute=on_dask(dask, count), workers=count)
     _refuse_nothing(found, str(store.root))
-    told = findings(found)
+    audit_findings = findings(found)
     if page is not None:
-        _write_page(page, found, told, str(store.root))
+        _write_page(page, found, audit_findings, str(store.root))
     if as_json:
-        print_json(document(found, told, str(store.root)))
+        print_json(document(found, audit_findings, str(store.root)))
     else:
-        _show(found, told, page)
-    raise typer.Exit(PART_FAILED if told else DONE)
+        _show(found, audit_findings, page)
+    raise typer.Exit(PART_FAILED if audit_findings else DONE)
 
 
 def _refuse_nothing(found: Audit, root: str) -> None:
-    """Refuse an audit of nothing: a name that is not there, or an archive without calibrations before the day."""
+    """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
 
     from schemas.errors import did_you_mean
@@ -96,14 +97,14 @@ def _refuse_nothing(found: Audit, root: str) -> None:
         )
 
 
-def _write_page(page: Path, found: Audit, told: list[AuditFinding], root: str) -> None:
+def _write_page(page: Path, found: Audit, audit_findings: list[AuditFinding], root: str) -> None:
     from pipelines.archive.files import ELSEWHERE, publish
     from pipelines.audit.page import render
 
-    publish(page, render(found, told, root).encode(), "audit", ELSEWHERE)
+    publish(page, render(found, audit_findings, root).encode(), "audit", ELSEWHERE)
 
 
-def _show(found: Audit, told: list[AuditFinding], page: Path | None) -> None:
+def _show(found: Audit, audit_findings: list[AuditFinding], page: Path | None) -> None:
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
@@ -119,13 +120,13 @@ def _show(found: Audit, told: list[AuditFinding], page: Path | None) -> None:
     _show_yield(found)
     out.print(_certificates(found), markup=False, soft_wrap=True)
     for who, words in WHO.items():
-        own = [finding for finding in told if finding.who == who]
+        own = [finding for finding in audit_findings if finding.who == who]
         if own:
             out.print(f"\n{words}", style="bold", soft_wrap=True)
         for kind in dict.fromkeys(finding.kind for finding in own):
             _show_kind([finding for finding in own if finding.kind == kind])
-    if not told:
-        out.print("nothing needs doing")
+    if not audit_findings:
+        out.print("no action is needed")
     if page is not None:
         error_console().print(f"page    {page}", markup=False, soft_wrap=True)
 
@@ -134,20 +135,20 @@ _BEGINNING = -700000.0  # days before any calibration
 
 
 def _certificates(found: Audit) -> str:
-    """What the ledger has, in one line."""
+    """The state of the ledger in one line."""
     if not len(found.certificates):
         return "ledger  nothing is certified: units are due an interval after their last pass"
-    return (
-        f"ledger  {len(found.certificates)} certificates; {int(found.due.valid.sum())} of {found.due.row.size} units have one "
-        f"that holds on {found.certificates.day}"
+    valid = (
+        f"{int(found.due.valid.sum())} of {found.due.row.size} units have one that is valid on {found.certificates.day}"
     )
+    return f"ledger  {len(found.certificates)} certificates; {valid}"
 
 
 def _show_kind(own: list[AuditFinding]) -> None:
     for finding in own[:SHOWN]:
         console().print(f"  · {finding.message}", markup=False, soft_wrap=True)
     if len(own) > SHOWN:
-        console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page tell all", style="dim")
+        console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page list all", style="dim")
 
 
 def _show_yield(found: Audit) -> None:

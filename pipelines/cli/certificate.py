@@ -27,7 +27,9 @@ def command(
     ],
     laboratory: Annotated[
         Path,
-        typer.Option("--laboratory", metavar="FILE.toml", help="Laboratory, customer, signatory and item; your file."),
+        typer.Option(
+            "--laboratory", metavar="FILE.toml", help="TOML file with laboratory, customer, signatory and item."
+        ),
     ] = Path("laboratory.toml"),
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the files; the current one.")

@@ -94,7 +94,7 @@ def command(
 
 def _print_run(run: Run) -> None:
     """Print on standard error which run will be certified."""
-    from pipelines.certificates.handed_out import library_remarks
+    from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.certificates.measured import measured_on
 
     units = [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])]
@@ -121,7 +121,14 @@ def _document(run: str, done: Certified) -> dict[str, Any]:
 def _print(run: str, done: Certified) -> None:
     there = {event.certificate for event in done.there}
     lines = [
-        [e.certificate, e.grade, e.start, e.until, "was there" if e.certificate in there else e.action, _ended(e.ends)]
+        [
+            e.certificate,
+            e.grade,
+            e.start,
+            e.until,
+            "already certified" if e.certificate in there else e.action,
+            _ended(e.ends),
+        ]
         for e in sorted(done.events, key=lambda event: event.serial)
     ]
     if lines:

@@ -76,7 +76,7 @@ def compared(
     fresh_history: pd.DataFrame | None,
     before: list[str] | None = None,
 ) -> dict[str, Any]:
-    """The comparison, on one thread: the matrices are small. What was added to ``before`` is judged where it is given."""
+    """The comparison, on one thread: the matrices are small. With ``before``, the effects that it lacks are judged."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("fitting"):

@@ -1,4 +1,4 @@
-"""``tumbleline demo``: an effect is hidden in the simulated station; find it, add it, watch the error fall, see what it was."""
+"""``tumbleline demo``: an effect is hidden in the simulated station; find it, add it, compare the errors, and reveal it."""
 
 from __future__ import annotations
 
@@ -83,10 +83,10 @@ def _bar() -> Generator[Progress]:
     with Bars(console=error_console(), transient=True) as bars:
         bar = bars.add_task("measuring the lot twice", total=None)
 
-        def told(done: int, total: int, note: str) -> None:
+        def show(done: int, total: int, note: str) -> None:
             bars.update(bar, completed=done, total=total, description=f"measuring  {note}")
 
-        yield told
+        yield show
 
 
 def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
@@ -96,7 +96,7 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
         return
     out = console()
     out.print(
-        f"Measured twice; something is hidden in it. In {folder}: {', '.join(f'{n}.parquet' for n in names)}.",
+        f"The lot was measured twice, with one hidden effect. Files in {folder}: {', '.join(f'{n}.parquet' for n in names)}.",
         soft_wrap=True,
     )
     out.print("Begin with", soft_wrap=True)
@@ -104,7 +104,7 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
 
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
-    """A command to type, on the files of the game."""
+    """A command to type, on the files of the demonstration."""
     chosen = f"--effects {','.join(model)}" if model else f"--model {folder / 'model.toml'}"
     fresh = f" --fresh {folder / 'fresh.parquet'} --fresh-history {folder / 'fresh-history.parquet'}"
     start = f"tumbleline {name} {folder / 'dwells.parquet'} {chosen} --history {folder / 'history.parquet'}"
@@ -119,15 +119,15 @@ class _Game:
         self.model = list(hidden.model)
 
     def play(self) -> dict[str, Any]:
-        """The game from beginning to end; what came of it."""
+        """Play all steps of the demonstration; return the result."""
         self._say(
             f"Four units were measured on the simulated station, {self.lot.dwells['dwell'].nunique()} dwells each, and then once "
-            "more. The station or the devices have an effect that the model does not know."
+            "more. The station or the devices have an effect that the model does not contain."
         )
         before = self._compare("1. How good is the model?", first=True)
         diagnosis = self._diagnose()
         added = self._extend(diagnosis["recommended"])
-        after = self._compare("4. And with it?", first=False) if added else before
+        after = self._compare("4. How good is the extended model?", first=False) if added else before
         found = {name for group in diagnosis["classes"] for name in group["effects"]}
         several = [group["effects"] for group in diagnosis["classes"] if len(group["effects"]) > 1]
         document = {
@@ -163,7 +163,7 @@ class _Game:
 
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")
-        document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, wanted=True)
+        document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, with_report=True)
         document["history"] = str(self.folder / "history.parquet")
         write_report(self.folder / "report.html", report)
         if not self.quiet:
@@ -182,7 +182,7 @@ class _Game:
         return chosen
 
     def _asked_for(self, recommended: list[str]) -> list[str]:
-        """The effects the player wants to add: those recommended, or others."""
+        """The effects to add: those recommended, or others."""
         from pipelines.jobs.model_files import refuse_unknown_effects
 
         if not self.asks:
@@ -221,7 +221,7 @@ class _Game:
         out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.", markup=False, soft_wrap=True)
 
     def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
-        """The truth is in a class with others: what was added is one of them, and what would tell them apart."""
+        """The result if the hidden effect is in a class with others, and the measurement that separates them."""
         from pipelines.cli.measurements_text import measurements_table
 
         out, hidden = console(), self.hidden.effect
@@ -229,26 +229,28 @@ class _Game:
         added = [name for name in document["added"] if name in group]
         others = ", ".join(name for name in group if name not in added)
         what = (
-            f"what was added, {' and '.join(added)}, is one of a class" if added else "nothing of its class was added"
+            f"the added effect,  {' and '.join(added)}, is one of a class"
+            if added
+            else "nothing of its class was added"
         )
-        text = f"The diagnosis named {named}. Found in a class, not told apart: {what}; these data fit as well with {others}."
+        text = f"The diagnosis named {named}. Found in a class, not separated: {what}; these data fit equally well with {others}."
         out.print(text, style="bold yellow", markup=False, soft_wrap=True)
         rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]
         if not rows:
             out.print(
-                "No measurement that the station is known to take tells them apart for sure.",
+                "No measurement that the station can take is certain to separate them.",
                 markup=False,
                 soft_wrap=True,
             )
         elif "minutes" in rows[0]:
-            out.print("The measurement that tells them apart:", markup=False, soft_wrap=True)
+            out.print("The measurement that separates them:", markup=False, soft_wrap=True)
             measurements_table(rows, out)
         else:
             out.print(rows[0]["why"], markup=False, soft_wrap=True)
 
     def _step(self, title: str, line: str) -> None:
         if self.asks:
-            typer.prompt("\nEnter goes on", default="", show_default=False, prompt_suffix=" ")
+            typer.prompt("\nPress Enter to continue", default="", show_default=False, prompt_suffix=" ")
         if not self.quiet:
             console().print(f"\n{title}", style="bold cyan")
             if line:

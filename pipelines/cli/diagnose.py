@@ -54,7 +54,7 @@ def command(
     ] = None,
     following: Annotated[
         Path | None,
-        typer.Option("--next", metavar="FILE.toml", help="Write a recipe: the measured one and the proposed steps."),
+        typer.Option("--next", metavar="FILE.toml", help="Write a recipe: the measured one with the proposed steps."),
     ] = None,
     recipe: Annotated[
         str,
@@ -66,7 +66,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Say whether a model is good enough, where it fails, and which physical effect is missing.
+    """Judge whether a model is adequate, where it fails, and which physical effect is missing.
 
     Exit status 0: the model is adequate. 1: it is not, it cannot be judged, or every unit has a data fault. 2: the input cannot
     be used.
@@ -88,7 +88,9 @@ def command(
     table, temperatures = dwells_and_history(dwells, history, archive)
     table, left_out = without_dwells(table, leave_out)
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
-    document, report_text = diagnosed(table, temperatures, judged, dwells, wanted=report is not None, left_out=left_out)
+    document, report_text = diagnosed(
+        table, temperatures, judged, dwells, with_report=report is not None, left_out=left_out
+    )
     document["history"] = beside or None
     if report is not None:
         write_report(report, report_text)
@@ -109,18 +111,18 @@ def diagnosed(
     judged: list[str] | None,
     source: str,
     *,
-    wanted: bool,
+    with_report: bool,
     coefficients: list[dict[str, Any]] | None = None,
     left_out: Sequence[str] = (),
 ) -> tuple[dict[str, Any], str]:
-    """The document of a diagnosis, and its report where one is wanted, with a fit's coefficients where they are given."""
+    """The document of a diagnosis, and its report on request, with the coefficients of a fit if they are given."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("looking for missing effects"):
         from pipelines.diagnosis.examination import examination  # loads scipy.stats: after the first line
 
         made = examination(table, history, judged, left_out)
-    if not wanted:
+    if not with_report:
         return made.document, ""
     with error_console().status("drawing the report"):
         from pipelines.report.diagnosis import render_diagnosis
@@ -129,7 +131,7 @@ def diagnosed(
 
 
 def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
-    """The recipe that dwells were measured with: the one named, else the one of the run.
+    """The recipe that dwells were measured with: the one given, else the one of the run.
 
     Raises
     ------
@@ -153,7 +155,7 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
 
 
 def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, source: str) -> None:
-    """Write the proposed measurement as a recipe, and say where; nothing is written where no steps are proposed.
+    """Write the proposed measurement as a recipe and print its path; without proposed steps nothing is written.
 
     Parameters
     ----------
@@ -178,7 +180,7 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
 
 
 def write_report(path: Path, text: str) -> None:
-    """Write a report so that it is there whole or not at all, and say where."""
+    """Write a report, complete or not at all, and print its path."""
     from pipelines.archive import files
 
     files.publish(path, text.encode(), "report", files.ELSEWHERE)

@@ -1,4 +1,4 @@
-"""A diagnosis for people: the verdict in a sentence, then faults, places, classes, the next command, and what was not seen."""
+"""A diagnosis for people: the verdict in a sentence, then data faults, drivers, classes, the next command, hidden effects."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 
 BAD_DWELL = "bad_dwell"
 HIDDEN, SHOWN = 3.0, 4
-"""Factor by which slow noise must raise the smallest size that is named for an effect to be listed, and how many are."""
+"""Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
+listed."""
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
-"""Of a verdict; None: it cannot be given."""
+"""Style of a verdict; None: it cannot be judged."""
 
 SMALL = 1.1
-"""Errors below so many times the floor look like noise to whoever compares the two numbers."""
+"""An error below this multiple of the noise floor can be mistaken for noise, although it is significant."""
 
 
 def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None, next_command: bool = True) -> None:
@@ -46,7 +47,7 @@ def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None
 
 
 def print_findings(document: dict[str, Any]) -> None:
-    """Print data faults, the places where the model fails, and the classes of what is missing."""
+    """Print data faults, the drivers that the residual follows, and the classes of missing effects."""
     _faults(document["blocked_by"])
     _where(document["where"])
     _classes(document)
@@ -56,7 +57,7 @@ def print_findings(document: dict[str, Any]) -> None:
 
 
 def _dwells(document: dict[str, Any]) -> None:
-    """Dwells that were left out as tails of the noise, and those that carry the verdict."""
+    """Print the dwells left out as tails of the noise, and the dwells with the largest influence on the verdict."""
     removed, out = document.get("removed"), console()
     single = document.get("leave_out")
     if single:
@@ -75,7 +76,7 @@ def _dwells(document: dict[str, Any]) -> None:
         names = ", ".join(f"{d['unit']} dwell {d['dwell']} ({d['deviations']:.1f})" for d in tails[:5])
         out.print(
             f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
-            f"{' …' if len(tails) > 5 else ''}; the noise of this run may have tails that reach as far",
+            f"{' …' if len(tails) > 5 else ''}; the tails of the noise of this run may reach as far",
             style="dim",
             markup=False,
             soft_wrap=True,
@@ -84,7 +85,9 @@ def _dwells(document: dict[str, Any]) -> None:
         return
     for group in document["classes"]:
         if group["effects"] != [BAD_DWELL]:
-            text = f"dwells that carry {' or '.join(group['effects'])}: {_carried(group['influence'])}"
+            text = (
+                f"dwells with the largest influence on {' or '.join(group['effects'])}: {_carried(group['influence'])}"
+            )
             without = group["without_influence"]
             if without:
                 text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
@@ -99,11 +102,13 @@ def _dwells(document: dict[str, Any]) -> None:
 
 def _carried(rows: list[dict[str, Any]]) -> str:
     """Dwells with their shares, the first few of them."""
-    return ", ".join(f"{d['unit']} dwell {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in rows[:5]) or "none alone"
+    return (
+        ", ".join(f"{d['unit']} dwell {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in rows[:5]) or "no single dwell"
+    )
 
 
 def symbol_of(name: str) -> str:
-    """The symbol of an effect, or of what handling does."""
+    """The symbol of an effect, or of a handling error."""
     from inertial import effects
     from inertial.criticism.handling import named
 
@@ -118,7 +123,7 @@ def verdict(document: dict[str, Any]) -> str:
     error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
     if error["rms_ug"] is None:
         return (
-            f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; no physics is judged until it is mended."
+            f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; correct the faults, then judge the model."
         )
     sound = len(document["units"]) - len(faulty)
     left = f"residual {short(error['rms_ug'])} µg rms over {sound} unit{'s' if sound != 1 else ''}"
@@ -129,7 +134,7 @@ def verdict(document: dict[str, Any]) -> str:
         return f"CANNOT BE JUDGED: {document.get('reason')}."
     if error["rms_ug"] < SMALL * error["floor_ug"]:
         left += "; the misfit is smaller than the noise, but significant"
-    spoilt = [told_of(group) for group in document["classes"] if group["scope"] == "data"]
+    spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
         rest = f"; also missing: {', and '.join(named)}" if named else ""
@@ -137,14 +142,14 @@ def verdict(document: dict[str, Any]) -> str:
     if named:
         return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
     driver = (document["unexplained"] or {}).get("driver")
-    rest = "nothing that was recorded explains the residual"
+    rest = "no recorded quantity explains the residual"
     if driver:
         rest = f"the residual follows {driver}, and no effect of the catalogue explains it"
     return f"NOT ADEQUATE: {left}; {rest}."
 
 
-def told_of(group: dict[str, Any]) -> str:
-    """What handling did, with the unit and the first dwell that it concerns, and the effects that explain as much."""
+def class_text(group: dict[str, Any]) -> str:
+    """A handling error with its unit and first dwell, and the effects that explain the data equally well."""
     units, dwells = group.get("units") or [], group.get("dwells") or []
     where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
     return f"{' or '.join(group['effects'])} ({where})"
@@ -160,7 +165,7 @@ def chance(p: float | None) -> str:
 
 
 def equal(p: float) -> str:
-    """A probability with its sign: equal, or below the smallest that is told."""
+    """A probability with its sign: equal, or below the smallest value that is printed."""
     text = chance(p)
     return text if text.startswith("<") else f"= {text}"
 
@@ -171,7 +176,7 @@ def _faults(faults: list[dict[str, Any]]) -> None:
         print_table(
             ["fault", "unit", "dwells", "evidence"],
             lines,
-            title="Data faults: mend these first; these units are left out",
+            title="Data faults: correct these first; these units are left out",
         )
 
 
@@ -186,7 +191,7 @@ def _where(places: list[dict[str, Any]]) -> None:
         lines = [
             [p["driver"], " ".join(p["axes"]), f"{100.0 * p['share']:.0f} %", chance(p["p_value"])] for p in places[:8]
         ]
-        print_table(["follows", "axes", "of the excess", "p"], lines, title="Where the model fails")
+        print_table(["driver", "axes", "share of excess", "p"], lines, title="Drivers of the residual")
 
 
 def _classes(document: dict[str, Any]) -> None:
@@ -203,21 +208,20 @@ def _classes(document: dict[str, Any]) -> None:
         errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
         text = group.get("evidence") or values
         lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
-    columns = ["effect", "of the", "size\nµg", "p", "left\nµg", "left out\nµg", "with"]
-    title = "What is missing; effects in one row cannot be told apart by these data"
+    columns = ["effect", "scope", "size\nµg", "p", "residual\nµg", "cross-validated\nµg", "parameters"]
+    title = "Missing effects; these data cannot separate the effects of one row"
     print_table(columns, lines, title=title, whole=6)
     if any(not group["plausible"] for group in document["classes"]):
-        console().print(
-            "(!) a size that this effect has not been seen to reach: look for another cause, too", markup=False
-        )
+        console().print("(!) larger than the usual size of this effect: check other causes, too", markup=False)
     legend = (
-        "left: error after it is added · left out: on dwells not fitted, the worst of poses, soaks, stretches of time"
+        "residual: with the effect added · cross-validated: on dwells not fitted, the worst of poses, soaks, stretches of "
+        "time"
     )
     console().print(legend, style="dim", markup=False)
 
 
 def _parameters_of(group: dict[str, Any], effects: Any) -> str:
-    """Nonlinear parameters with the effect of the class that they are of; several effects may be in one row."""
+    """Nonlinear parameters with the effect that they belong to; a row may have several effects."""
     name = group.get("nonlinear_of") or group["effects"][0]
     if group["scope"] == "data" or not group["nonlinear"]:
         return ""
@@ -236,13 +240,13 @@ def _unexplained(out: Console, document: dict[str, Any], model: Path | None) -> 
     if not found:
         return
     out.print(
-        f"\nReal, but no physics known for it: the error follows {found['driver']} in a {found['shape']} "
+        f"\nSignificant, but of unknown cause: the error follows {found['driver']} as a {found['shape']} "
         f"(p {equal(found['p_value'])}).",
         markup=False,
         soft_wrap=True,
     )
     if document["offer"]:
-        out.print(f"As a formula, to paste into {model or 'a model file'} and refine:\n", markup=False, soft_wrap=True)
+        out.print(f"Formula for {model or 'a model file'}, to be refined:\n", markup=False, soft_wrap=True)
         out.print(document["offer"]["toml"], markup=False, soft_wrap=True)
         out.print(
             f"\nthen  tumbleline extend {model or 'model.toml'} {document['offer']['id']}", markup=False, soft_wrap=True
@@ -270,14 +274,16 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
     added = set(document["recommended"])
     several = [g["effects"] for g in document["classes"] if len(g["effects"]) > 1 and added & set(g["effects"])]
     if several:
-        told = "; ".join(" or ".join(effects) for effects in several)
+        alternatives = "; ".join(" or ".join(effects) for effects in several)
         out.print(
-            f"These data do not tell apart: {told}. What is added is one of the class.", style="dim", soft_wrap=True
+            f"These data do not separate: {alternatives}. The added effect is one of its class.",
+            style="dim",
+            soft_wrap=True,
         )
 
 
 def free_name() -> str:
-    """A name for a new model file: one that is there belongs to another model."""
+    """A name for a new model file; an existing file belongs to another model."""
     from pathlib import Path
 
     names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
@@ -288,18 +294,23 @@ def _unseen(document: dict[str, Any]) -> None:
     if document["unseen"]:
         reasons = document.get("reasons", {})
         lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
-        print_table(["effect", "why, and what would show it"], lines, title="This plan could not have seen", whole=1)
+        print_table(
+            ["effect", "reason, and measurement that shows it"],
+            lines,
+            title="Effects that this plan cannot show",
+            whole=1,
+        )
     parts: dict[str, list[str]] = {}
     for row in document.get("unseen_in_part", ()):
         parts.setdefault(row["effect"], []).append(row["text"])
     if parts:
         lines = [[name, "; ".join(texts)] for name, texts in parts.items()]
-        print_table(["effect", "not visible for"], lines, title="This plan could have seen only in part", whole=1)
+        print_table(["effect", "not visible for"], lines, title="Effects that this plan shows only in part", whole=1)
     _hidden_by_noise(document.get("smallest_named", ()))
 
 
 def _hidden_by_noise(rows: list[dict[str, Any]]) -> None:
-    """Effects that 1/f or random walk of this size imitates, up to what size, and what would show smaller ones."""
+    """Print the effects that 1/f noise or random walk of this size hides, with the measurement for smaller sizes."""
     from inertial import effects
 
     raised = [row for row in rows if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
@@ -313,5 +324,5 @@ def _hidden_by_noise(rows: list[dict[str, Any]]) -> None:
             ]
             for r in raised
         ]
-        columns = ["effect", "named from\nµg rms", "with white noise only\nµg rms", "what would show less"]
-        print_table(columns, lines, title="Slow noise (1/f, random walk) imitates these effects", whole=1)
+        columns = ["effect", "smallest size\nµg rms", "with white noise only\nµg rms", "measurement for smaller sizes"]
+        print_table(columns, lines, title="Effects hidden by slow noise (1/f, random walk)", whole=1)

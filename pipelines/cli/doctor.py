@@ -31,7 +31,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Check the installation and what it is connected to, and say for each fault what to do.
+    """Check the installation and its connections, with a remedy for each fault.
 
     Nothing is moved, and no lease is needed. A file of 1 MiB is written to the archive and to the state folder, read back and
     removed. A station is checked only if --station names it. Exit 1: at least one fault; warnings leave it at 0.
@@ -48,7 +48,7 @@ def command(
 
 
 def _show(document: DoctorDocument) -> None:
-    """A table of the checks, and below it what is not good, the faults last, where they are seen."""
+    """A table of the checks; below it warnings, then faults."""
     from rich.text import Text
 
     checks = document["checks"]

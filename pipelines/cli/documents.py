@@ -34,7 +34,7 @@ class UnitDocument(TypedDict):
     reasons: Annotated[str, "separated by `; `; empty if it passed"]
     rule: str
     figures: Annotated[dict[str, FigureDocument], "by [name](../reference/figures.md); empty if refused"]
-    basis: NotRequired[Annotated[str, "what the uncertainties rest on: `budget` or `noise only`"]]
+    basis: NotRequired[Annotated[str, "basis of the uncertainties:  `budget` or `noise only`"]]
 
 
 RunDocument = TypedDict(
@@ -175,7 +175,7 @@ class FittedUnit(TypedDict):
 
 
 class ImportedFitDocument(TypedDict):
-    """``fit --json (an import)``: a model fitted to an import, its verdict and what the verdict rests on."""
+    """``fit --json (an import)``: a model fitted to an import, its verdict and the basis of the verdict."""
 
     run: Annotated[str, "the run that holds the fit"]
     fit_of: Annotated[str, "the import"]
@@ -262,7 +262,7 @@ class CertifiedBy(TypedDict):
 
 
 class EndedBy(TypedDict):
-    """The ledger entry that ended a calibration."""
+    """The ledger entry that ends a calibration."""
 
     action: str
     sequence: int
@@ -351,7 +351,7 @@ class StationStatusDocument(TypedDict):
     sampling: str
     slots: list[SlotStatus]
     lease: Annotated[LeaseStatus | None, "null: no process drives it"]
-    faults: Annotated[dict[str, str], "message by part; `safe state`: a run left the station without making it safe"]
+    faults: Annotated[dict[str, str], "message by part; `safe state`: a run ended without the safe state"]
     chamber: NotRequired[str]
     vibration_g: NotRequired[Annotated[float | None, "rms"]]
     time_s: NotRequired[Annotated[float, "clock of the station"]]
@@ -373,14 +373,14 @@ class OperatorDocument(TypedDict):
 
 
 class QueryDocument(TypedDict):
-    """``query --json``: the rows of a question to the archive in SQL."""
+    """``query --json``: the rows of an SQL query."""
 
     columns: list[str]
     rows: Annotated[list[dict[str, Any]], "value by column"]
 
 
 class RegisterReading(TypedDict):
-    """A register as it reads now."""
+    """A register with its present value."""
 
     device: str
     device_id: int
@@ -388,11 +388,11 @@ class RegisterReading(TypedDict):
     address: int
     value: str
     unit: str
-    fault: Annotated[str, "why it does not read; empty if it does"]
+    fault: Annotated[str, "reason why it cannot be read; empty otherwise"]
 
 
 class CheckedPart(TypedDict):
-    """One thing that was tested."""
+    """A test of the self-test."""
 
     check: str
     part: str
@@ -414,7 +414,7 @@ class StationCheckDocument(TypedDict):
 
 
 class StationEvent(TypedDict):
-    """Something that happened to a run or a station."""
+    """An event of a run or a station."""
 
     when: Annotated[str, "ISO date and time, UTC"]
     where: Annotated[str, "run or station"]
@@ -426,7 +426,7 @@ class StationEvent(TypedDict):
 
 
 class StationLogDocument(TypedDict):
-    """``station log --json``: what paused or ended runs, and what became of the stations, in order of time."""
+    """``station log --json``: events that paused or ended runs, and events of stations, in order of time."""
 
     events: list[StationEvent]
 

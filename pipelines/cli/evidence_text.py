@@ -1,4 +1,4 @@
-"""What a verdict rests on, for people."""
+"""The basis of a verdict as text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pipelines.cli.options import console, short
 
 
 def evidence_text(document: dict[str, Any]) -> str:
-    """What the verdict rests on, in a line; empty where nothing was judged."""
+    """The basis of the verdict in one line; empty without a verdict."""
     found = document.get("evidence")
     if not found:
         return ""
@@ -25,7 +25,7 @@ def evidence_text(document: dict[str, Any]) -> str:
 
 
 def print_evidence(document: dict[str, Any]) -> None:
-    """What the verdict rests on, and the smallest effect that would have been seen where the dwells are few."""
+    """The basis of the verdict, and with few dwells the smallest effect that they show."""
     from inertial.criticism.evidence import FEW_DOF
 
     found, out = document.get("evidence"), console()
@@ -36,7 +36,7 @@ def print_evidence(document: dict[str, Any]) -> None:
         smallest = found["smallest_cubic_ug"]
         seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"
         out.print(
-            f"few dwells: a cubic term {seen} would not have been seen (probability 0.5)",
+            f"few dwells: a cubic term {seen} is not detected (probability 0.5)",
             style="dim",
             markup=False,
             soft_wrap=True,

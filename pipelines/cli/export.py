@@ -50,7 +50,7 @@ def command(
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b)."""
     from pipelines.archive import Archive
-    from pipelines.certificates.handed_out import signature_remarks
+    from pipelines.certificates.coefficient_remarks import signature_remarks
     from pipelines.export import FORMATS, export_text, unit_calibrations
     from pipelines.jobs.model_files import use_formulas_of
     from schemas.errors import WrongUse, did_you_mean
@@ -63,7 +63,7 @@ def command(
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()
     chosen = unit_calibrations(source, serials, failed=failed, revoked=revoked)
     text = export_text(form, chosen, source.id, nominal)
-    _tell_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
+    _print_certificates(source, chosen, signature_remarks(source, [c.unit for c in chosen]))
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -75,10 +75,10 @@ def command(
         ) from None
 
 
-def _tell_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
+def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
     """Print the state of the certificates of these coefficients on standard error."""
+    from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.certificates.days import today
-    from pipelines.certificates.handed_out import library_remarks
     from pipelines.export import revoked_units
 
     given, day = {c.unit for c in chosen}, today()

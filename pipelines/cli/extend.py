@@ -43,7 +43,7 @@ def command(
     by: Annotated[
         str, typer.Option("--by", metavar="NAME", help="Author of the change; the user's name by default.")
     ] = "",
-    run: Annotated[str, typer.Option("--run", metavar="RUN", help="The run or file that showed it.")] = "",
+    run: Annotated[str, typer.Option("--run", metavar="RUN", help="Run or file with the evidence.")] = "",
     output: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="Write the new version to this file; MODEL is not changed."),
@@ -60,7 +60,7 @@ def command(
 ) -> None:
     """Write the next version of a model with one effect more or less, and who changed it, when and why.
 
-    MODEL that is not there yet is begun: version 1 holds the starting model, version 2 the effect. A removed effect stays in the
+    A MODEL that does not exist is created: version 1 has the starting model, version 2 the effect. A removed effect stays in the
     history of the file, with the reason.
     """
     from pipelines.cli.inputs import add_effect_files
@@ -91,8 +91,8 @@ def command(
     out = console()
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
-        out.print(f"{target}: begun with version 1: {first}", markup=False, soft_wrap=True)
-    change = f"is without {step.effect}" if remove else f"has {step.effect}"
+        out.print(f"{target}: created with version 1: {first}", markup=False, soft_wrap=True)
+    change = f"removes {step.effect}" if remove else f"has {step.effect}"
     out.print(f"{target}: version {after.model.version} {change} ({step.why})", markup=False, soft_wrap=True)
 
 
@@ -126,7 +126,7 @@ def model_step(effect: str, why: str, by: str, run: str) -> ModelStep:
 
 
 def _start(model: Path, effects: str, step: ModelStep) -> tuple[str, bool]:
-    """The text to extend, and whether it was begun just now."""
+    """The text to extend, and whether the file is new."""
     from pipelines.jobs.model_files import STARTING_MODEL, model_text, new_model
 
     if model.exists():

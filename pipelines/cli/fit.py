@@ -36,7 +36,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a model to archived data again; the result is a run of its own beside the old one, on the same capture.
+    """Fit a model to archived data again; the result is a new run on the same capture; the old run is kept.
 
     An import is fitted with known poses or, without them, by the norm of gravity. Exit status 1: the model is not adequate, it
     cannot be judged, or a unit did not pass.
@@ -54,8 +54,8 @@ def command(
         raise typer.Exit(fit_import(found, (effects, model, limits), leave_out, as_json=as_json))
     if leave_out:
         raise WrongUse(f"run {found.id}: --leave-out is for imports, this run was captured; measure the dwell again")
-    wanted = [name.strip() for name in effects.split(",")] if effects else []
-    job = job_of_run(store.run(run), effects=wanted, model=model, limits=limits)
+    listed = [name.strip() for name in effects.split(",")] if effects else []
+    job = job_of_run(store.run(run), effects=listed, model=model, limits=limits)
     runner = Runner(job, store)
     try:
         for done in runner.all():

@@ -53,7 +53,7 @@ def command(
     """
     from pipelines.cli.compare import compared
     from pipelines.cli.inputs import add_effect_files, both_runs
-    from pipelines.diagnosis.model_history import FIGURES, JUDGED, evolution, told
+    from pipelines.diagnosis.model_history import FIGURES, JUDGED, change_row, evolution
     from pipelines.jobs.model_files import read_model, versions
 
     add_effect_files(effect_file)
@@ -64,7 +64,7 @@ def command(
         rows = evolution(versions(found), lambda effects, before: compared(effects, *tables, before=before))
     else:
         rows = [
-            {**told(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}
+            {**change_row(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}
             for version in versions(found)
         ]
     if picture is not None:
@@ -103,20 +103,20 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
     keys = ["fitted_ug", "heldout_ug", *(["fresh_ug"] if fresh else []), "floor_ug"]
     heads = {
         "fitted_ug": "fitted\nµg",
-        "heldout_ug": "left out\nµg",
+        "heldout_ug": "cross-validated\nµg",
         "fresh_ug": "fresh run\nµg",
-        "floor_ug": "noise assumed\nµg",
+        "floor_ug": "assumed noise\nµg",
     }
     errors = [[str(row["version"]), *(short(row[key]) for key in keys), row["text"]] for row in rows]
     print_table(
-        ["version", *(heads[k] for k in keys), "judged by data that were not fitted"],
+        ["version", *(heads[k] for k in keys), "verdict by data not fitted"],
         errors,
         title="Error, rms",
         whole=5,
     )
     out.print(
-        "left out: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, each unit's "
-        "bias of that day in it · noise assumed: by the fit of each version, with what is missing from it",
+        "cross-validated: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "
+        "of each unit included · assumed noise: of the fit of each version, missing effects included",
         style="dim",
         soft_wrap=True,
     )
@@ -125,8 +125,7 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
     refuted = [name for row in rows if row["confirmed"] is False for name in row["added"]]
     if refuted:
         out.print(
-            f"{', '.join(refuted)}: evidence against it. The change that it predicts did not come again; "
-            "take it out of the model.",
+            f"{', '.join(refuted)}: refuted. The fresh run does not show the predicted change; remove it from the model.",
             style="bold red",
             soft_wrap=True,
         )

@@ -1,4 +1,4 @@
-"""``tumbleline import``: recordings of others into the archive, with a fit on the way where one is wanted."""
+"""``tumbleline import``: recordings of other systems into the archive, with an optional fit."""
 
 from __future__ import annotations
 
@@ -50,18 +50,23 @@ def command(
         ),
     ],
     columns: Annotated[
-        str, typer.Option("--map", metavar="time=…,x=…,y=…,z=…", help="What each column of the file means.")
+        str, typer.Option("--map", metavar="time=…,x=…,y=…,z=…", help="Meaning of the columns of the file.")
     ] = "",
     mapping: Annotated[
-        Path | None, typer.Option("--mapping", metavar="TOML", help="The same as a file; options here come first.")
+        Path | None,
+        typer.Option(
+            "--mapping", metavar="TOML", help="TOML file with these options; options given here have priority."
+        ),
     ] = None,
     units: Annotated[
         str, typer.Option("--units", metavar="output=LSB,time=s,temperature=degC", help="Units of the columns.")
     ] = "",
     unit: Annotated[str, typer.Option("--unit", metavar="SN", help="Serial number, if no column has it.")] = "",
-    rows: Annotated[str, typer.Option("--rows", metavar="samples|dwells", help="What one row is; samples.")] = "",
+    rows: Annotated[
+        str, typer.Option("--rows", metavar="samples|dwells", help="Content of a row; samples by default.")
+    ] = "",
     rate: Annotated[float | None, typer.Option("--rate", metavar="HZ", help="Rate of samples without a time.")] = None,
-    axes: Annotated[str, typer.Option("--axes", metavar="x,y,z", help="Mapped axes in the order wanted.")] = "",
+    axes: Annotated[str, typer.Option("--axes", metavar="x,y,z", help="Order of the mapped axes.")] = "",
     signs: Annotated[str, typer.Option("--signs", metavar="+,+,+", help="Signs of the axes in that order.")] = "",
     poses: Annotated[
         str, typer.Option("--poses", metavar="LABEL=+x,…", help="Dwells to keep by label, with the face that is up.")
@@ -74,53 +79,63 @@ def command(
         int | None, typer.Option("--positions", metavar="N", help="Positions logged back to back, without the moves.")
     ] = None,
     window: Annotated[
-        float | None, typer.Option("--window", metavar="S", help="Sliding window that finds dwells; 1 s.")
+        float | None,
+        typer.Option("--window", metavar="S", help="Sliding window of the search for dwells; 1 s by default."),
     ] = None,
     threshold: Annotated[
         float | None,
         typer.Option(
-            "--threshold", metavar="SD", help="Standard deviation in a window above which it moves, in --units output."
+            "--threshold", metavar="SD", help="Standard deviation in a window that means motion, in the output unit."
         ),
     ] = None,
     shortest: Annotated[
-        float | None, typer.Option("--shortest", metavar="S", help="Shortest dwell that counts; 1 s.")
+        float | None, typer.Option("--shortest", metavar="S", help="Shortest dwell; 1 s by default.")
     ] = None,
     gaps: Annotated[
-        str, typer.Option("--gaps", metavar="refuse|split", help="Rows without a number and gaps in time; refuse.")
+        str,
+        typer.Option(
+            "--gaps", metavar="refuse|split", help="Rows without a number, and gaps in time; refuse by default."
+        ),
     ] = "",
     faulty: Annotated[
         str,
-        typer.Option("--faulty", metavar="refuse|leave-out|keep", help="Axes that stand still and torn words; refuse."),
+        typer.Option(
+            "--faulty", metavar="refuse|leave-out|keep", help="Constant axes and torn words; refuse by default."
+        ),
     ] = "",
     join: Annotated[
         str,
-        typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined."),
+        typer.Option("--join", metavar="rows|columns", help="Join several files into one recording."),
     ] = "",
     group: Annotated[
-        str, typer.Option("--group", metavar="NAME", help="Group of channels of a file that has several.")
+        str, typer.Option("--group", metavar="NAME", help="Group of channels, if the file has several.")
     ] = "",
     list_dwells: Annotated[
         bool, typer.Option("--list-dwells", help="List every dwell: start, end, mean, sd, residual, influence.")
     ] = False,
     local_g: Annotated[
-        float | None, typer.Option("--local-g", metavar="M/S2", help="Gravity where it was measured, m/s².")
+        float | None,
+        typer.Option("--local-g", metavar="M/S2", help="Local gravity at the place of the measurement, m/s²."),
     ] = None,
-    fit: Annotated[str, typer.Option("--fit", metavar="norm|faces|temperature", help="Fit and judge at once.")] = "",
+    fit: Annotated[str, typer.Option("--fit", metavar="norm|faces|temperature", help="Fit, and judge the fit.")] = "",
     procedure: Annotated[
         str,
-        typer.Option("--procedure", metavar="sweep", help="A dynamic measurement: the transfer function of a sweep."),
+        typer.Option("--procedure", metavar="sweep", help="Dynamic measurement: the transfer function of a sweep."),
     ] = "",
     effects: Annotated[
-        str, typer.Option("--effects", metavar="a,b,…", help="Model of the transfer function; second_order,delay.")
+        str,
+        typer.Option(
+            "--effects", metavar="a,b,…", help="Model of the transfer function; second_order,delay by default."
+        ),
     ] = "",
     archive: ArchiveOption = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Bring recordings of others into the archive: a raw record and its dwells in the exchange format.
+    """Import recordings of other systems into the archive: a raw record and its dwells in the exchange format.
 
-    Columns are named, or numbered from 1. What a file does not state and its numbers do not show is not guessed but asked for.
-    Exit status 1: the fit asked for is not adequate for these data, or they cannot tell.
+    Columns are named, or numbered from 1. Nothing is guessed: what neither the file nor its numbers show must be given. Exit
+    status 1: the requested fit is not adequate, or cannot be judged.
     """
     if procedure:
         raise typer.Exit(_transfer(files, procedure, unit, effects, archive, as_json=as_json))
@@ -148,10 +163,10 @@ def command(
         "signs": [part.strip() for part in signs.split(",")] if signs else None,
         "local_gravity_m_s2": local_g,
     }
-    wanted = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
+    keys = given | {key: value for key, value in options.items() if value not in ("", None, {}, [])}  # 0 is a value
     _refuse_unknown_fit(fit)
-    sets = [files] if wanted.get("join") else [[path] for path in files]
-    imports = [_import_one(paths, wanted, str(mapping or "import"), fit, archive) for paths in sets]
+    sets = [files] if keys.get("join") else [[path] for path in files]
+    imports = [_import_one(paths, keys, str(mapping or "import"), fit, archive) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     if as_json:
@@ -163,7 +178,7 @@ def command(
 
 
 def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archive: str | None, *, as_json: bool) -> int:
-    """Judge and keep transfer functions; the exit status: part failed where one is not adequate, or cannot be judged."""
+    """Judge and store transfer functions; the exit status is 1 if one is not adequate or cannot be judged."""
     from pipelines.importers.transfer import import_transfer
 
     if procedure != "sweep":
@@ -187,19 +202,19 @@ def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archiv
     return DONE if all(one["adequate"] is True for one in found) else PART_FAILED
 
 
-def _mapping(wanted: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
+def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
     """The mapping, with the unit that the file states where none was given; one without columns or unit is refused."""
     from pipelines.importers import mapping as mapped
     from pipelines.importers import stated_units
 
-    if "columns" not in wanted:
+    if "columns" not in keys:
         raise WrongUse(
             f"import: no column of {name} is mapped, x, y and z are needed at least (its columns: "
             f"{', '.join(map(str, content.table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping "
             f"FILE.toml; 'tumbleline inspect {name}' proposes a command"
         )
-    complete = stated_units.completed(wanted, content)
-    if "output" not in complete.get("units", {}) and all(axis in wanted["columns"] for axis in mapped.NEEDED):
+    complete = stated_units.completed(keys, content)
+    if "output" not in complete.get("units", {}) and all(axis in keys["columns"] for axis in mapped.NEEDED):
         raise WrongUse(
             f"import: the unit of the output is not given and {name} states none, one of {', '.join(mapped.OUTPUT_UNITS)} is "
             f"needed; add --units output=…; 'tumbleline inspect {name}' shows the size of the numbers"
@@ -216,22 +231,22 @@ def _refuse_unknown_fit(fit: str) -> None:
         )
 
 
-def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
-    """Read, judge and keep one recording; the document for JSON."""
+def _import_one(paths: list[Path], keys: dict[str, Any], where: str, fit: str, archive: str | None) -> dict[str, Any]:
+    """Read, judge and store one recording; the document for JSON."""
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
     from pipelines.importers.dwell_list import dwell_rows
 
     name = " + ".join(path.name for path in paths)
-    columns, units = wanted.get("columns"), wanted.get("units")
+    columns, units = keys.get("columns"), keys.get("units")
     if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
-        mapped.build(wanted, where)  # a slip in the mapping is said before anything is read
+        mapped.build(keys, where)  # an error of the mapping is reported before a file is read
     with error_console().status(f"reading {name}"):
         time = str(columns.get("time", "")) if isinstance(columns, dict) else ""
         content, source, breaks = sources.read(
-            paths, join=str(wanted.get("join", "")), time=time, group=str(wanted.get("group", ""))
+            paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
         )
-        how = _mapping(wanted, content, where, name)
+        how = _mapping(keys, content, where, name)
         data = record.imported(content.table, how, name, content, breaks)
     judged = None
     if fit:
@@ -260,7 +275,7 @@ def _import_one(paths: list[Path], wanted: dict[str, Any], where: str, fit: str,
 def _slips(how: Mapping) -> list[str]:
     """A sentence for every covariate whose name is close to a known one."""
     return [
-        f"'{shown(name)}' is taken for a covariate; if {' or '.join(close)} was meant, import again with that name"
+        f"'{shown(name)}' is imported as a covariate; if you mean {' or '.join(close)}, import again with that name"
         for name, close in how.likely_slips.items()
     ]
 

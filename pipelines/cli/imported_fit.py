@@ -1,4 +1,4 @@
-"""``tumbleline fit`` of an import: a model fitted to its dwells, with the verdict and what the verdict rests on."""
+"""``tumbleline fit`` of an import: a model fitted to its dwells, with the verdict and its basis."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
 
     Parameters
     ----------
-    change : effects, model file and limits as they were given; empty or None where not
+    change : effects, model file and limits; empty or None if not given
     leave_out : dwells as UNIT:DWELL,…
     """
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.rerun import again
     from pipelines.tables.leave_out import named_dwells
 
@@ -37,7 +37,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
         outcome = again(
             Archive(run.archive.root),
             run.id,
-            wanted(effects, model, limits, where="fit"),
+            change_from_options(effects, model, limits, where="fit"),
             left_out=named_dwells(leave_out),
         )
         done = Archive(run.archive.root).run(outcome.new)
@@ -51,7 +51,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
 
 
 def fit_document(done: Run, source: str) -> dict[str, Any]:
-    """What is known of the fit of an import: verdict, evidence, and decisions where there are limits."""
+    """The result of the fit of an import: verdict, evidence, and decisions if there are limits."""
     from pipelines.diagnosis.imported_norms import fitted
     from pipelines.rerun.steps import gravity_of_import, has_poses
     from pipelines.tables.frames import rows_of
@@ -60,10 +60,10 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
     past = done.table("history") if "history" in done.tables() else None
     effects = list(done.about["recipe"]["effects"])
     if has_poses(dwells):
-        told = _known_poses(dwells, past, effects)
+        fitted = _known_poses(dwells, past, effects)
     else:
         answer = fitted(dwells, past, effects, gravity_of_import(done.about), str(dwells["out_unit"].iloc[0]))
-        told = {**answer.document, "lines": list(answer.lines)}
+        fitted = {**answer.document, "lines": list(answer.lines)}
     grades = rows_of(done.table("grades")) if "grades" in done.tables() else []
     keys = ("adequate", "reason", "error", "evidence", "leave_out", "missing", "lines")
     return {
@@ -72,12 +72,12 @@ def fit_document(done: Run, source: str) -> dict[str, Any]:
         "effects": effects,
         "left_out": list(done.about.get("left_out", [])),
         "units": [{key: row[key] for key in ("unit", "outcome", "grade", "reasons")} for row in grades],
-        **{key: told[key] for key in keys},
+        **{key: fitted[key] for key in keys},
     }
 
 
 def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
-    """The verdict on a fit with commanded poses, and in lines what it rests on."""
+    """The verdict on a fit with commanded poses, and its basis as lines."""
     from pipelines.cli.diagnosis_text import verdict
     from pipelines.cli.evidence_text import evidence_text
     from pipelines.diagnosis.diagnose import diagnose

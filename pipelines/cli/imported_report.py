@@ -1,4 +1,4 @@
-"""The report of an import that was fitted: its coefficients, its verdict with pictures, and what the verdict rests on."""
+"""The report of an import that was fitted: its coefficients, its verdict with pictures, and the basis of the verdict."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MODULES = ("pipelines.report.diagnosis", "pipelines.diagnosis.diagnose", "schema
 
 
 def make_imported_report(run: Run) -> bool:
-    """Whether the report of an import was there already, made from its tables as they are; it is now.
+    """Write the report of an import if it is missing or older than its tables; return whether it was up to date.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def make_imported_report(run: Run) -> bool:
     if not effects or not set(names) <= set(run.tables()):
         raise WrongUse(
             f"report: run {run.id} was imported and not fitted, coefficients are needed; fit it with 'tumbleline fit {run.id} "
-            "--effects bias,scale,misalignment' and ask for the report of the run that this makes"
+            "--effects bias,scale,misalignment' then give this command for the new run"
         )
     use_formulas_of(run)
     past = run.table("history") if "history" in run.tables() else None
@@ -41,6 +41,6 @@ def make_imported_report(run: Run) -> bool:
         run.seal()
         return True
     rows = rows_of(run.table("coefficients"))
-    _, page = diagnosed(run.table("dwells"), past, effects, f"run {run.id}", wanted=True, coefficients=rows)
+    _, page = diagnosed(run.table("dwells"), past, effects, f"run {run.id}", with_report=True, coefficients=rows)
     run.save_report(key, page, {"inputs": inputs, "parameters": parameters, "code": code})
     return False

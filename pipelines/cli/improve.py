@@ -69,7 +69,7 @@ def command(
     *,
     yes: Annotated[
         bool,
-        typer.Option("--yes", "-y", help="Answer yes; a class of several effects is not decided by it, --effect is."),
+        typer.Option("--yes", "-y", help="Answer yes; a class of several effects needs --effect."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -131,7 +131,7 @@ class _Improvement:
     archive: str | None
 
     def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> dict[str, Any]:
-        """The document of the command; the model file is written last, when nothing can be refused any more."""
+        """The document of the command; the model file is written last, after all checks."""
         from pipelines.cli.improve_text import next_lines, print_heading
         from pipelines.jobs.model_files import publish_model
 
@@ -172,7 +172,7 @@ class _Improvement:
         from pipelines.cli.improve_text import print_verdict
 
         tables = self.tables
-        document, _ = diagnosed(tables.dwells, tables.history, effects, self.data, wanted=False)
+        document, _ = diagnosed(tables.dwells, tables.history, effects, self.data, with_report=False)
         document["history"] = self.used_history or None
         if not self.quiet:
             if full:
@@ -276,13 +276,13 @@ class _Improvement:
 
 
 def _target(model: Path | None, output: Path | None) -> Path:
-    """The model file to write; one that is there and is not the judged one is refused."""
+    """The model file to write; another existing file is refused."""
     from pipelines.cli.diagnosis_text import free_name
 
     target = output or model or Path(free_name())
     if target != model and target.exists():
         raise WrongUse(
-            f"improve: {target} is there and is not the model that is judged; give --model {target} to extend it, or another "
+            f"improve: {target} exists and is not the model that is judged; give --model {target} to extend it, or another "
             "--out"
         )
     return target

@@ -1,4 +1,4 @@
-"""What the commands that judge models are given: dwells with their history, a model, effects from outside."""
+"""Inputs of the commands that judge models: dwells with their history, a model, effects of the user."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
     Parameters
     ----------
-    history : a file; empty for the run's own, or for the one that stands beside a file of dwells
+    history : a file; empty for the run's own, or for the one beside a file of dwells
     """
     from pipelines.cli.options import error_console
     from pipelines.diagnosis import inputs

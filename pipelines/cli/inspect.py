@@ -1,4 +1,4 @@
-"""``tumbleline inspect``: a first look at files of others, and the import command for them."""
+"""``tumbleline inspect``: the content of files of other systems, and the import command for them."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings in any format that import reads.")],
     join: Annotated[
         str,
-        typer.Option("--join", metavar="rows|columns", help="Several files are one recording: how they are joined."),
+        typer.Option("--join", metavar="rows|columns", help="Join several files into one recording."),
     ] = "",
     group: Annotated[
-        str, typer.Option("--group", metavar="NAME", help="Group of channels of a file that has several.")
+        str, typer.Option("--group", metavar="NAME", help="Group of channels, if the file has several.")
     ] = "",
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE", help="Draw the record: .svg, .png or .pdf.")
     ] = None,
     page: Annotated[
-        Path | None, typer.Option("--page", metavar="FILE.html", help="Write the first look as a page.")
+        Path | None, typer.Option("--page", metavar="FILE.html", help="Write the result as an HTML page.")
     ] = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Say what a file holds and may mean, with reasons: columns, units, rate, gaps, faults, static intervals. Nothing is kept.
+    """Show the content of a file and its probable meaning, with reasons: columns, units, rate, gaps, faults, static intervals.
 
-    The last line is the import command that fits; what the file does not say stands in it in capitals. Exit status 1: there is
-    such a gap in the command.
+    Nothing is stored. The last line is the import command; values that the file does not state are in capitals. Exit status 1:
+    such values are missing.
     """
     from pipelines.importers.inspection import inspect
 
@@ -84,7 +84,7 @@ def _write(found: Inspection, picture: Path | None, page: Path | None) -> None:
 
 
 def _print(one: InspectDocument) -> None:
-    """A first look for people."""
+    """Print the content of a recording."""
     out = console()
     names = " + ".join(Path(name).name for name in one["files"])
     rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
@@ -100,7 +100,7 @@ def _print(one: InspectDocument) -> None:
     if one["gaps"]:
         out.print(f"  {one['gaps']} gaps in time longer than five samples", soft_wrap=True)
     for fault in one["faults"][:MOST_FAULTS]:
-        what = "stands still" if fault["fault"] == "stuck_output" else "has torn words"
+        what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
         out.print(
             f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on",
             soft_wrap=True,

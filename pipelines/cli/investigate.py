@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
 
-    from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
+    from pipelines.inquiry.inquiry import FollowUp, Inquiry
+    from pipelines.inquiry.joint_diagnosis import JointDiagnosis
     from pipelines.inquiry.loop import Approval, Consent, Settings
     from pipelines.jobs.job import Request
 

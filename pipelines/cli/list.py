@@ -50,7 +50,7 @@ def _line(info: RunInfo) -> list[str]:
 
 
 def _result(info: RunInfo) -> str:
-    """The number of units that passed, or how far the run is."""
+    """The number of units that passed, or the state of the run."""
     if info.graded is not None and info.finished:
         return f"{info.passed} of {info.graded}"
     return "not graded" if info.finished else "unfinished"

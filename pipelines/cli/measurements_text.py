@@ -1,4 +1,4 @@
-"""What to measure next, for people: the steps, what they cost and bring, and what no steps of the station part."""
+"""The next measurement as text: steps, station time, expected separation, and what no steps of the station separate."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def measurements_table(proposed: list[dict[str, Any]], out: Console | None = None) -> None:
-    """Print what to measure next, step by step, with what it costs and brings.
+    """Print the next measurement step by step, with station time and expected separation.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def measurements_table(proposed: list[dict[str, Any]], out: Console | None = Non
         [
             short(p["outer_deg"]),
             short(p["inner_deg"]),
-            short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (on the way)"),
+            short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (during the ramp)"),
             short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if p.get("off_s") else ""),
             str(p.get("repeats", 1)),
             p["why"],
@@ -31,7 +31,7 @@ def measurements_table(proposed: list[dict[str, Any]], out: Console | None = Non
     ]
     where = out or console()
     if lines:
-        columns = ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "decides between"]
+        columns = ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "purpose"]
         print_table(columns, lines, title="Measure next, in this order", out=out)
     for row in {p["why"]: p for p in steps if "minutes" in p}.values():
         where.print(brings(row), style="dim", markup=False, soft_wrap=True)
@@ -41,7 +41,7 @@ def measurements_table(proposed: list[dict[str, Any]], out: Console | None = Non
 
 
 def brings(row: dict[str, Any]) -> str:
-    """What the steps of a row's measurement cost and bring."""
+    """Station time and expected separation of the steps of a row."""
     text = f"{row['why']}: {short(row['minutes'])} min of station time; "
     expected = row.get("separation_if")
     if not expected:
@@ -50,4 +50,4 @@ def brings(row: dict[str, Any]) -> str:
         )
     after = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
     text += f"χ² between the two {row['separation_before']:.1f} now, expected {after}"
-    return text + (f"; not told from the first by it: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")
+    return text + (f"; not separated from the first: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")

@@ -117,20 +117,20 @@ WorkersOption = Annotated[
 ]
 
 NARROW = 24
-"""Characters that a column of words keeps where room is scarce."""
+"""Smallest width of a text column in a narrow terminal, characters."""
 
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
 
 def console() -> Console:
-    """Where results for people go; what stands in brackets or between colons is somebody's text, never markup."""
+    """The console for results; brackets and colons in it are text, never markup."""
     from rich.console import Console
 
     return Console(highlight=False, markup=False, emoji=False)
 
 
 def error_console() -> Console:
-    """Where progress and remarks go, so that standard output holds results only."""
+    """The console for progress and remarks: standard output has results only."""
     from rich.console import Console
 
     return Console(stderr=True, highlight=False, markup=False, emoji=False)
@@ -139,7 +139,7 @@ def error_console() -> Console:
 def print_json(document: Any) -> None:
     """One JSON document on standard output; numbers that JSON does not know become null."""
     sys.stdout.write(json.dumps(json_value(document), ensure_ascii=False, indent=1, allow_nan=False) + "\n")
-    sys.stdout.flush()  # a command that goes on, such as a server, has readers that wait for the document
+    sys.stdout.flush()  # the readers of a running server wait for the document
 
 
 def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -185,7 +185,7 @@ def print_table(
 
 
 def _longest(texts: Sequence[str], between: str | None) -> int:
-    """The longest line of texts, or the longest word where words are parted ``between``."""
+    """The longest line of texts, or the longest word with line breaks ``between`` words."""
     pieces = (piece for text in texts for line in text.splitlines() for piece in line.split(between or "\n"))
     return max(map(len, pieces), default=0)
 
@@ -195,7 +195,7 @@ def _is_number(text: str) -> bool:
 
 
 def short(value: float | None, digits: int = 3) -> str:
-    """A number for people: so many significant digits, no exponent where it can be helped, empty where there is none."""
+    """A number for people: so many significant digits, without an exponent if possible, empty for None."""
     if value is None or not math.isfinite(value):
         return ""
     if value == 0.0:

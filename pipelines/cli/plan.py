@@ -14,12 +14,9 @@ from pipelines.cli.options import (
     ModelOption,
     RecipeArgument,
     StationOption,
-    console,
     print_json,
-    print_table,
-    short,
 )
-from pipelines.cli.reach_text import print_reach
+from pipelines.cli.plan_text import print_plan
 from schemas.errors import PART_FAILED
 
 if TYPE_CHECKING:
@@ -37,8 +34,6 @@ EXAMPLES = (
     "tumbleline plan optimise my.toml",
 )
 
-RAISED = 3.0
-"""Factor by which 1/f and random walk must raise a floor to be listed."""
 
 RECIPE = "recipe"
 
@@ -130,7 +125,7 @@ def command(
     if as_json:
         print_json(document)
     else:
-        _print(document)
+        print_plan(document)
     stated = document.get("uncertainty")
     if stated is not None and stated["unreachable"]:
         raise typer.Exit(PART_FAILED)
@@ -162,7 +157,7 @@ def optimise(
             help="Further effects that must be visible; those of the textbook plan by default.",
         ),
     ] = "",
-    wanted: Annotated[
+    required_errors: Annotated[
         list[str] | None,
         typer.Option(
             "--wanted", metavar="EFFECT=µg", help="Required error (1σ) of an effect's coefficients; may be repeated."
@@ -230,14 +225,15 @@ def optimise(
     10 s) over the same temperatures, and every effect that is visible under it stays visible. With --criterion T --part a,b: the
     recipe with the least station time that discriminates between these effects.
     """
-    from pipelines.cli.optimal import OptimiseOptions, cheapest_recipe, missing_limits, print_optimum, written
+    from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
+    from pipelines.cli.optimise_options import OptimiseOptions
     from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
 
     config = load_station(station)
     base = with_model(recipe, effects, model, archive, config.name)
     options = OptimiseOptions(
-        see, tuple(wanted or ()), factor, temperatures, poses, criterion, verification, part, size, separation
+        see, tuple(required_errors or ()), factor, temperatures, poses, criterion, verification, part, size, separation
     )
     optimum, document = cheapest_recipe(
         base, Path(recipe).name, config, noise_of(base, device or base.device, noise, wander), options
@@ -314,110 +310,3 @@ def _draw(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
     for name, text in pictures(document, context).items():
         if text:
             _save(folder / f"{document['recipe']}-{name}.svg", text)
-
-
-def _print(document: dict[str, Any]) -> None:
-    minutes, error = document["minutes"], document["dwell_error_ug"]
-    out = console()
-    out.print(
-        f"{document['recipe']} with {document['device']} on station {document['station']}: "
-        f"{document['dwells']} dwells in {document['poses']} poses at {_soaks(len(document['temperatures_C']))}"
-    )
-    parts = " + ".join(f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total")
-    out.print(f"{minutes['total']:.0f} min of station time: {parts}")
-    out.print(
-        f"error of a dwell (1σ): {short(error['together'])} µg; white {short(error['white'])}, wander {short(error['wander'])}"
-        f"{_longer(document['dwell_s'])}"
-    )
-    print_table(["coefficient", "error x, 1σ", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
-    if document["bias"] is not None:
-        bias = document["bias"]
-        again = (
-            "no repeatability is stated" if bias["switch_on_u_ug"] is None else f"{short(bias['switch_on_u_ug'])} µg"
-        )
-        out.print(
-            f"bias, 1σ of the worst axis: as the mean of the record {short(bias['record_u_ug'])} µg, of the day after it "
-            f"{short(bias['long_u_ug'])} µg; after the next switch-on: {again}"
-        )
-    print_reach(document.get("uncertainty"))
-    seen = [row for row in document["effects"] if row["seen"]]
-    print_table(
-        ["visible effect", "v", "1/v²", "floor, µg", "coefficient", "unit", "confounded with"],
-        [_visible_line(row) for row in seen],
-    )
-    faint = [row["effect"] for row in seen if row["faint"]]
-    if faint:
-        names = ", ".join(faint)
-        out.print(f"* floor above the typical size: {names}")
-    out.print(
-        "v: fraction of the effect's column that remains after the model; 1/v²: variance inflation; floor: smallest detectable "
-        "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
-        style="dim",
-    )
-    raised = [r for r in seen if r["floor_white_ug"] and r["floor_size_ug"] > RAISED * r["floor_white_ug"]]
-    if raised:
-        raised.sort(key=lambda r: -r["floor_size_ug"] / r["floor_white_ug"])
-        lines = [[r["effect"], short(r["floor_size_ug"]), short(r["floor_white_ug"]), r["breaker"]] for r in raised[:5]]
-        heads = ["raised by slow noise", "floor\nµg", "white only\nµg", "what lowers it"]
-        print_table(heads, lines)
-    in_part = [
-        [row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]
-    ]
-    if in_part:
-        print_table(["effect visible in part", "not visible for"], in_part)
-    invisible = [row for row in document["effects"] if not row["seen"]]
-    print_table(
-        ["effect not visible", "reason; what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in invisible]
-    )
-    if "page" in document:
-        out.print(f"Page: {document['page']}")
-
-
-def _soaks(count: int) -> str:
-    return f"{count} soak{'' if count == 1 else 's'}"
-
-
-def _longer(dwell: dict[str, float]) -> str:
-    """The effect of longer dwells on the error, as a clause; empty without wander."""
-    import math
-
-    balanced = dwell["white_as_large_as_wander"]
-    if not math.isfinite(balanced):
-        return ""
-    if balanced < dwell["planned"]:
-        return "; longer dwells hardly reduce it"
-    return f"; longer dwells reduce it, up to {short(balanced, 2)} s"
-
-
-def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
-    """One line per coefficient with its three axes; one value for parameters of the station."""
-    lines: dict[tuple[str, int], list[str]] = {}
-    count: dict[tuple[str, str], int] = {}
-    for row in rows:
-        place = count.get((row["effect"], row["axis"]), 0)
-        count[row["effect"], row["axis"]] = place + 1
-        key = (row["effect"], place if row["axis"] != "*" else 100 + place)
-        line = lines.setdefault(key, [row["effect"] if place == 0 else "", "", "", "", row["unit"]])
-        line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
-    return list(lines.values())
-
-
-def _visible_line(row: dict[str, Any]) -> list[str]:
-    size = short(row["floor_size_ug"]) + (" *" if row["faint"] else "")
-    v, inflation = short(row["left"]), short(row["variance_inflation"])
-    return [row["effect"], v, inflation, size, scientific(row["floor_ug"]), row["floor_unit"], _aliases(row)]
-
-
-def scientific(value: float) -> str:
-    """A number for people, from a million on as a power of ten."""
-    import math
-
-    if abs(value) < 1e6:
-        return short(value)
-    exponent = math.floor(math.log10(abs(value)))
-    return f"{value / 10.0**exponent:.2f}·10{str(exponent).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
-
-
-def _aliases(row: dict[str, Any]) -> str:
-    exact = set(row["alias_exact"])
-    return ", ".join(f"={name}" if name in exact else name for name in row["alias"]) or "–"

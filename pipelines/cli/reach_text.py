@@ -1,4 +1,4 @@
-"""The uncertainty that a plan can reach, for people."""
+"""The uncertainty that a plan can reach, as text."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ TITLES = {
     "bias_error_period": "error over the period, RMS",
 }
 LEAST = 0.01
-"""Share of a contribution from which it is named."""
+"""Smallest share of a contribution that is printed."""
 
 
 def print_reach(found: dict[str, Any] | None) -> None:
-    """A table of the quantities with what rules them, limits that cannot be met, and remarks."""
+    """A table of the quantities with their largest contributions, limits that cannot be met, and remarks."""
     out = console()
     if found is None:
         out.print(
@@ -35,9 +35,9 @@ def print_reach(found: dict[str, Any] | None) -> None:
     period = f"period of validity {found['validity_months']} months, frame {found['frame']}"
     out.print(f"{period}; references by {found['grade_source'].replace('_', ' ')}", style="dim", markup=False)
     if found["grade_source"] == "assumed":
-        out.print("references: assumed figures, nothing is certified with them", markup=False)
+        out.print("references: assumed values, which allow no certificate", markup=False)
     for name, rules in found["not_stated"].items():
-        out.print(f"not stated: {name} (rules {rules})", markup=False)
+        out.print(f"not stated: {name} (dominates {rules})", markup=False)
     for line in (*found["remarks"], *(f"cannot be met: {one}" for one in found["unreachable"])):
         out.print(line, markup=False, soft_wrap=True)
 

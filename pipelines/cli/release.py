@@ -68,14 +68,16 @@ def command(
 def _released(
     store: Archive, model: Path | None, since: str, effect_file: list[Path] | None, how: dict[str, Any]
 ) -> Release:
-    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.jobs.releases import release
     from pipelines.rerun.selection import moment
 
     if model is None or not since:
         missing = "a model file" if model is None else "--from DATE"
         raise WrongUse(f"release: {missing} is missing, both are needed; give a model file and a date, or --list")
-    return release(store, wanted("", model, "", effect_file, where="release"), moment(since, "--from"), **how)
+    return release(
+        store, change_from_options("", model, "", effect_file, where="release"), moment(since, "--from"), **how
+    )
 
 
 def _refuse_both(model: Path | None) -> None:

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
 
 
-def tell_of(run: Run, serials: Sequence[str]) -> None:
+def print_remarks(run: Run, serials: Sequence[str]) -> None:
     """Print missing or foreign signatures and differing library versions on standard error."""
-    from pipelines.certificates.handed_out import library_remarks, signature_remarks
+    from pipelines.certificates.coefficient_remarks import library_remarks, signature_remarks
 
     for line in (*signature_remarks(run, serials), *library_remarks(run)):
         error_console().print(f"show: {line}", markup=False, soft_wrap=True)

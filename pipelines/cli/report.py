@@ -1,4 +1,4 @@
-"""``tumbleline report``: where a run's report is."""
+"""``tumbleline report``: the path of a run's report."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EXAMPLES = (
 
 
 def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
-    """Say where a run's report is; make it again where it is missing or the run's tables are newer."""
+    """Print the path of a run's report; write the report if it is missing or older than the run's tables."""
     from pipelines.archive import Archive
     from pipelines.report import make_report
 

@@ -65,11 +65,11 @@ def command(
     Exit status 1: a run could not be re-analysed, or with --check was not reproduced.
     """
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import wanted
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.parallel import processors
     from pipelines.rerun.selection import selected
 
-    change = wanted(effects, model, limits, effect_file)
+    change = change_from_options(effects, model, limits, effect_file)
     _refuse_check_of_another(check and bool(effects or model or limits))
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection)]
@@ -114,7 +114,7 @@ def _mapped(
     """Results of a function for the runs, in their order, computed here or on a cluster."""
     from pathlib import Path as LocalPath
 
-    from pipelines.flows.spread import on_dask
+    from pipelines.flows.dask_cluster import on_dask
     from pipelines.parallel import map_partitions
     from pipelines.rerun.partition import parts
 

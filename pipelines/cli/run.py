@@ -70,7 +70,7 @@ def command(
     result. A lot that is larger than the fixture is measured in several fillings, if an operator at the terminal seats the units.
     """
     from pipelines.archive import Archive
-    from pipelines.certificates.handed_out import library_remarks
+    from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
     from pipelines.jobs.job import Request

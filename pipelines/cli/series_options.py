@@ -1,4 +1,4 @@
-"""The record that ``allan`` and ``psd`` are given: a file of samples, or a run of the archive."""
+"""The input of ``allan`` and ``psd``: a file of samples, or a run of the archive."""
 
 from __future__ import annotations
 

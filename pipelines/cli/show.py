@@ -15,7 +15,7 @@ from pipelines.cli.options import (
     rows,
     short,
 )
-from pipelines.cli.remarks import tell_of
+from pipelines.cli.remarks import print_remarks
 from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED
 
@@ -82,7 +82,7 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     from pipelines.cli.summary import print_summary, summary
 
     tables = run.tables()
-    tell_of(run, [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])])
+    print_remarks(run, [str(unit["serial"]) for unit in run.about.get("lot", {}).get("units", [])])
     document = {
         **(summary(run) if "grades" in tables else {"run": run.id, "units": []}),
         "tables": tables,

@@ -34,14 +34,14 @@ NOISE_ONLY = (
 )
 
 LEGEND = (
-    "fit: rms residual · verify: largest | |a| − g | of a pose not used, mean of its dwells · error: rms of the worst axis "
-    "there · period: the same, expected over the period of validity\n"
+    "fit: rms residual · verify: largest | |a| − g | of a pose not used, mean of its dwells · error: rms of the worst axis in "
+    "these poses · period: the same, expected over the period of validity\n"
     "N, B: noise of the worst axis, an upper limit where a term is not identified"
 )
 
 
 def summary(run: Run) -> dict[str, Any]:
-    """What a run came to: per unit outcome, grade, reasons and figures; the yield; where the report is."""
+    """The result of a run: outcome, grade, reasons and figures of each unit; the yield; the path of the report."""
     grades, figures = run.table("grades"), run.table("figures")
     units = [_unit(row, figures) for row in rows_of(grades.sort_values("slot"))]
     passed = sum(unit["outcome"] == "pass" for unit in units)
@@ -121,7 +121,7 @@ def _listed(document: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _interrupted(found: Interruptions | None) -> list[str]:
-    """What interrupted a run, in lines; none where nothing did."""
+    """The interruptions of a run as lines; empty if there were none."""
     if not found or not found["events"]:
         return []
     door = f", the door was opened {found['door_opened']} times" if found["door_opened"] else ""

@@ -41,12 +41,12 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, with the code, libraries and data that made them."""
     from pipelines.archive import Run
     from pipelines.certificates.certified_coefficients import coefficients_of
-    from pipelines.cli.remarks import tell_of
+    from pipelines.cli.remarks import print_remarks
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():
         return {"coefficients": None, "made": None}
-    tell_of(run, [valid.serial])
+    print_remarks(run, [valid.serial])
     manifest = run.manifest("coefficients")
     return {
         "coefficients": coefficients_of(run, valid),
@@ -57,10 +57,10 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
 def _print(serial: str, day: str, valid: Calibration | None, history: list[Calibration], made: dict[str, Any]) -> None:
     out = console()
     if valid is None:
-        out.print(f"{serial}: no calibration holds on {day}", style="bold red", markup=False)
+        out.print(f"{serial}: no calibration is valid on {day}", style="bold red", markup=False)
     else:
         event = valid.event
-        out.print(f"{serial}: certificate {valid.certificate} holds on {day}", style="bold green", markup=False)
+        out.print(f"{serial}: certificate {valid.certificate} is valid on {day}", style="bold green", markup=False)
         out.print(f"  valid    {valid.start} until {valid.until}, grade {event.grade}", markup=False)
         out.print(f"  from     run {valid.run}, recipe {event.recipe}, station {event.station}", markup=False)
         out.print(f"  by       {event.who} on {event.where}, {event.when}", markup=False)

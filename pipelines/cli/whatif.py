@@ -25,7 +25,6 @@ from schemas.counts import number_of
 if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
-    from pipelines.rerun.lot_comparison import Fresh, LotComparison
 
 PART = "Old data, new models"
 ORDER = 540
@@ -58,23 +57,14 @@ def command(
     status 1: the model is not better.
     """
     from pipelines.archive import Archive
-    from pipelines.jobs.model_change import wanted
-    from pipelines.jobs.releases import keep_evidence
+    from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.selection import selected
-    from pipelines.rerun.whatif import BETTER, summary
+    from pipelines.rerun.whatif import BETTER
 
-    change = wanted("", model, limits, effect_file, where="whatif")
+    change = change_from_options("", model, limits, effect_file, where="whatif")
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
-    judged, fresh = _judged(store, runs, change, dask, workers)
-    document: dict[str, Any] = {
-        "name": change.model_name,
-        "version": change.model_version,
-        "effects": list(change.effects or ()),
-        "limits": change.limits_name or "as each lot had them",
-        **summary(judged, fresh),
-    }
-    document["evidence"] = keep_evidence(store, change, document, runs)
+    document = _evaluated(store, runs, change, dask, workers)
     if as_json:
         print_json({"archive": str(store.root), **document})
     else:
@@ -82,29 +72,19 @@ def command(
     raise typer.Exit(0 if document["verdict"] == BETTER else 1)
 
 
-def _judged(
-    store: Archive, runs: list[str], change: ModelChange, dask: str, workers: int | None
-) -> tuple[list[LotComparison], list[Fresh]]:
+def _evaluated(store: Archive, runs: list[str], change: ModelChange, dask: str, workers: int | None) -> dict[str, Any]:
     """Every lot with both models, and the errors on later runs of units that were measured before."""
     from pathlib import Path as LocalPath
 
-    from pipelines.flows.spread import on_dask
-    from pipelines.parallel import map_partitions, processors
-    from pipelines.rerun.lot_comparison import fresh, judged
-    from pipelines.rerun.partition import parts
-    from pipelines.rerun.whatif import fresh_tasks
+    from pipelines.flows.dask_cluster import on_dask
+    from pipelines.parallel import processors
+    from pipelines.rerun.whatif import evaluated
 
     count = max(1, min(workers or processors(), len(runs)))
     home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
-    spread = on_dask(dask, count, home)
+    distribute = on_dask(dask, count, home)
     with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
-        portions = map_partitions(judged, parts(store, runs, change, count), spread, workers=count, name="what if")
-        lots = [one for portion in portions for one in portion]
-        tasks = fresh_tasks(lots, store.address, change)
-        size = max(1, -(-len(tasks) // (4 * count)))
-        chunks = [tasks[start : start + size] for start in range(0, len(tasks), size)]
-        done = map_partitions(fresh, chunks, spread, workers=count, name="what if, fresh runs")
-    return lots, [one for chunk in done for one in chunk]
+        return evaluated(store, runs, change, distribute, count)
 
 
 def _print(document: dict[str, Any]) -> None:

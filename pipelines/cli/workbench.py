@@ -1,4 +1,4 @@
-"""``tumbleline workbench``: the archive, the model and what is missing, in a browser."""
+"""``tumbleline workbench``: archive, models and missing effects in a browser."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 205
-SUMMARY = "Show the archive, the model and what is missing in a browser."
+SUMMARY = "Show archive, models and missing effects in a browser."
 EXAMPLES = (
     "tumbleline workbench",
     "tumbleline workbench archive --port 8765",
@@ -28,14 +28,14 @@ def command(
     ] = "",
     folder: Annotated[
         Path,
-        typer.Option("--folder", metavar="DIR", help="Folder of files of dwells, recipes, models, uploads and lots."),
+        typer.Option("--folder", metavar="DIR", help="Folder for files of dwells, recipes, models, uploads and lots."),
     ] = Path("workbench"),
     station: StationOption = None,
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: a free one.")] = 8321,
-    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Where it listens.")] = "127.0.0.1",
+    host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Interface to listen on.")] = "127.0.0.1",
     name: Annotated[
         list[str] | None,
-        typer.Option("--name", metavar="HOST", help="A further host name by which it is called; may be repeated."),
+        typer.Option("--name", metavar="HOST", help="Further host name of this server; may be repeated."),
     ] = None,
     certificate: Annotated[
         Path | None, typer.Option("--certificate", metavar="FILE.pem", help="Certificate for HTTPS.")
@@ -52,8 +52,8 @@ def command(
 ) -> None:
     """Serve pages on this machine: units, what is missing, upload, operator, plan, station and audit.
 
-    Open the address that is printed: its token lets this browser start work; without it a browser on this machine may look.
-    Nothing is loaded from elsewhere, and nothing is sent.
+    Open the address that is printed: its token allows this browser to start work; without it the pages are read only. The pages
+    load nothing from other servers and send nothing to them.
     """
     import os
     import socket

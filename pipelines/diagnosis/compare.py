@@ -48,7 +48,7 @@ def compare(
     ----------
     dwells, fresh : exchange format; the model is fitted to ``dwells`` only
     history, fresh_history : temperatures against time of the two runs
-    before : the model that this one was extended from; what was added to it is judged then
+    before : the model that this one was extended from; the effects added to it are then judged
 
     Raises
     ------
@@ -104,27 +104,27 @@ def _compared(
         lot = None if again is None else lot_of(again, like=found, square=square)
         answer["progress"] = progress(lesser, model, out, lot)
         if again is not None and _remember(again, [t for t in model.terms if t.effect.id not in set(before)]):
-            answer["progress"]["confirmed"] = None  # what it predicts there cannot be computed
+            answer["progress"]["confirmed"] = None  # its prediction cannot be computed
     if again is not None:
         answer["warnings"] += [
-            f"{name} depends on the temperature between the dwells, and no history of the fresh run was given: what it predicts "
-            "there is of little worth; give --fresh-history FILE"
+            f"{name} depends on the temperature between the dwells, and no history of the fresh run was given: its prediction "
+            "there is unreliable; give --fresh-history FILE"
             for name in _remember(again, model.terms)
         ]
     return answer
 
 
 def without_history(found: Measured, terms: Sequence[Term]) -> list[str]:
-    """A sentence for every effect that remembers the temperature between the dwells where no history of it was given."""
+    """A warning for every effect that depends on the temperature between the dwells if its history is missing."""
     return [
-        f"{name} depends on the temperature between the dwells, and no history was given: its size is of little worth; "
-        "give --history FILE"
+        f"{name} depends on the temperature between the dwells, and no history was given: its size is unreliable; give "
+        "--history FILE"
         for name in _remember(found, terms)
     ]
 
 
 def _remember(found: Measured, terms: Sequence[Term]) -> list[str]:
-    """The effects that remember the temperature between the dwells; none where a history of it was given."""
+    """The effects that depend on the temperature between the dwells; none if its history is given."""
     if found.state.temperature is None or found.state.history is not None:
         return []
     own = [t.effect for t in terms if not isinstance(t.effect, Handling)]

@@ -1,4 +1,4 @@
-"""Long runs made shorter: consecutive dwells of one pose averaged, or every so many-th dwell kept."""
+"""Reduction of long runs: consecutive dwells of one pose are averaged, or every k-th dwell is kept."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MOST = 500
-"""Dwells of a unit whose full covariance is still handled: it grows with their square, the work with their cube."""
+"""Largest number of dwells of a unit for a full covariance: its size grows with the square, the work with the cube."""
 
 _REFERENCE = ("force_x", "force_y", "force_z", "outer_deg", "inner_deg")
 _SUMS = ("n", "duration_s")
 
 
 def condense(dwells: pd.DataFrame, most: int = MOST) -> pd.DataFrame:
-    """Dwells of which no unit has more than about ``most``: neighbours in one pose averaged, else thinned out evenly.
+    """Dwells of which no unit has more than about ``most``: neighbours in one pose averaged, else thinned out.
 
-    What is averaged keeps its scatter ``sd_*`` and adds up its samples ``n``; texts are those of the first dwell.
+    Averages
+    keep the scatter ``sd_*`` and add the samples ``n``; texts are those of the first dwell.
     """
     numbers = np.unique(dwells["dwell"].to_numpy())
     if len(numbers) <= most:
@@ -41,12 +42,12 @@ def condense(dwells: pd.DataFrame, most: int = MOST) -> pd.DataFrame:
     grouped = dwells.assign(dwell=dwells["dwell"].map(place)).groupby(["unit", "dwell"], as_index=False, sort=True)
     joined = grouped.agg(how)
     for axis in "xyz":
-        # single samples have no scatter of their own: that of the group takes its place
+        # single samples have no scatter of their own: the scatter of the group is used
         own = joined[f"sd_{axis}"] if f"sd_{axis}" in joined.columns else pd.Series(np.nan, index=joined.index)
         joined[f"sd_{axis}"] = own.where(own > 0.0, grouped[f"out_{axis}"].std()[f"out_{axis}"])
     if "n" not in joined.columns:
         joined["n"] = grouped.size()["size"]
-    whole = grouped.size()["size"] >= 0.5 * size  # the rest of a stretch holds too little to stand beside the others
+    whole = grouped.size()["size"] >= 0.5 * size  # the remainder of a stretch is too short for a dwell of its own
     return joined[whole].dropna(subset=["sd_x", "sd_y", "sd_z"])
 
 

@@ -1,4 +1,4 @@
-"""Whether what was added to a model is there: by a fresh run where there is one, else by dwells left out."""
+"""Test of the effects added to a model: by a fresh run if there is one, else by dwells left out."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.criticism.came_again import came_again
 from inertial.criticism.comparison import estimate, residuals_of, rms
 from inertial.criticism.decisions import BLOCKS, LEFT_OUT, RISES
 from inertial.criticism.left_out import left_out
 from inertial.criticism.problem import Problem
+from inertial.criticism.reproduced_change import reproduced_change
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 def progress(before: Model, after: Model, out: LeftOut, fresh: Lot | None) -> dict[str, Any]:
-    """What is known of the effects by which two models differ.
+    """The evidence on the effects by which two models differ.
 
     Parameters
     ----------
     before, after : fitted to the same dwells; out : of ``after``, on dwells left out
-    fresh : the fresh run in the scale of the first; None where there is none
+    fresh : the fresh run in the scale of the first; None if there is none
 
     Returns
     -------
@@ -40,7 +40,7 @@ def progress(before: Model, after: Model, out: LeftOut, fresh: Lot | None) -> di
 
 def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str, Any]:
     old, new = estimate(before), estimate(after)
-    found = came_again(fresh, old, new)
+    found = reproduced_change(fresh, old, new)
     problem = Problem(fresh)
     rises = None
     if found.confirmed is True:
@@ -85,7 +85,7 @@ def _by_left_out(before: LeftOut, after: LeftOut) -> dict[str, Any]:
 
 
 def _rise(what: str, before: float, after: float) -> str | None:
-    """Which error rises with what was added, in words; None where it does not, or nothing can tell."""
+    """The error that rises with the added effects, as text; None if none rises or none can be judged."""
     if not (np.isfinite(before) and np.isfinite(after)):
         return None
     if after <= (1.0 + RISES) * before:
@@ -101,7 +101,7 @@ def _worst(before: Model, after: LeftOut) -> tuple[float, float]:
 
 
 def _error(before: np.ndarray, after: np.ndarray) -> float:
-    """Standard error of the fall of the RMS, stretches of time left out in turn."""
+    """Standard error of the decrease of the RMS, by leaving out stretches of time in turn."""
     n = before.shape[1]
     stretch = np.arange(n) * min(BLOCKS, n) // n
     falls = []

@@ -47,13 +47,13 @@ THERMAL = ("bias_temperature", "scale_temperature")
 _WARM = 5.0
 _SAME_G, _SAME_DEG = 0.02, 1.0
 _SEED = 1293
-"""Noise that adequacy is measured against is drawn anew, but alike, for every diagnosis: the same data give the same answer."""
+"""Seed of the noise that adequacy is compared with: the same data give the same result."""
 
 
 def default_model(dwells: pd.DataFrame) -> list[str]:
-    """The model that is judged where none is named: with temperature terms when it varies by more than 5 °C.
+    """The model that is judged by default: with temperature terms when it varies by more than 5 °C.
 
-    One pose tells a bias and what drives it, neither scale nor misalignment.
+    One pose shows a bias and its drivers, but neither scale nor misalignment.
     """
     if _one_pose(dwells):
         return ["bias", *(THERMAL[:1] if "bias_temperature" in _of_temperature(dwells) else ())]
@@ -83,19 +83,19 @@ def diagnose(
     Parameters
     ----------
     dwells : exchange format
-    history : temperatures against time; lag and hysteresis read it where it is there
+    history : temperatures against time; for lag and hysteresis, if available
     effects : the model to judge; :func:`default_model` where None
 
     Raises
     ------
     DataRejected
-        Nothing is left to diagnose, or the model asks for what the dwells do not carry.
+        Nothing is left to diagnose, or the dwells lack a quantity of the model.
     """
     return document(*examined(dwells, history, effects))
 
 
 MISSING = frozenset({"dropped_samples", "truncated_file"})
-"""Names of the faults of a unit that lacks dwells which others have."""
+"""Names of the faults of a unit without dwells that other units have."""
 
 
 def examined(
@@ -108,7 +108,7 @@ def examined(
 
     Parameters
     ----------
-    left_out : ``UNIT:DWELL``, taken out of ``dwells`` on purpose: that a unit lacks these is no fault
+    left_out : ``UNIT:DWELL``, removed from ``dwells`` on purpose, so that it is no fault if a unit lacks them
     """
     model = list(effects) if effects else default_model(dwells)
     catalogue.get_all(model)
@@ -120,7 +120,7 @@ def examined(
     if not sound:
         return found, faults, None
     try:
-        # two threads on small matrices wait for each other: on a busy machine sixty times as long
+        # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
         with threadpool_limits(1):
             lot = lot_of(found.pick(sound) if blocked else found, square="misalignment" not in model)
             return found, faults, diagnose_lot(lot, model, np.random.default_rng(_SEED))
@@ -129,7 +129,7 @@ def examined(
 
 
 def _on_purpose(found: Measured, fault: Fault, left_out: Collection[str]) -> bool:
-    """Whether a fault says no more than that dwells were left out."""
+    """Whether a fault is only that dwells were left out."""
     named = {f"{found.units[fault.unit]}:{int(found.dwells[k])}" for k in fault.dwells}
     return fault.name in MISSING and bool(named) and named <= set(left_out)
 
@@ -137,17 +137,17 @@ def _on_purpose(found: Measured, fault: Fault, left_out: Collection[str]) -> boo
 def document(
     found: Measured, faults: list[Fault], diagnosis: Diagnosis | None, following: Proposed | None = None
 ) -> dict[str, Any]:
-    """The document of a diagnosis; where every unit has a data fault, nothing is said of physics.
+    """The document of a diagnosis; if every unit has a data fault, no effect is judged.
 
     Parameters
     ----------
-    following : what to measure next; by what the run itself shows of its station where None
+    following : what to measure next; by the capabilities of the station that the run shows if None
     """
     blocked = [_fault(found, f) for f in faults]
     if diagnosis is None:
         return {
             "adequate": None,
-            "reason": f"every unit ({len({f.unit for f in faults})}) has a data fault; no physics is judged until it is mended",
+            "reason": f"every unit ({len({f.unit for f in faults})}) has a data fault; correct the faults, then judge the model",
             "blocked_by": blocked,
             "evidence": None,
             "leave_out": None,

@@ -12,7 +12,7 @@ from typing_extensions import TypedDict
 
 
 class BlockingFault(TypedDict):
-    """A data fault; no physics is judged in its units."""
+    """A data fault; its units are not judged."""
 
     fault: str
     units: list[str]
@@ -37,7 +37,7 @@ class ErrorFigures(TypedDict):
 
 
 class FailingDriver(TypedDict):
-    """A recorded quantity along which the model fails."""
+    """A recorded quantity that the residual follows."""
 
     driver: str
     axes: list[str]
@@ -46,15 +46,15 @@ class FailingDriver(TypedDict):
 
 
 class InfluentialDwell(TypedDict):
-    """A dwell that carries the verdict."""
+    """A dwell with a large influence on the verdict."""
 
     unit: str
     dwell: int
-    share: Annotated[float, "share of the evidence that rests on the dwell"]
+    share: Annotated[float, "share of the dwell in the evidence"]
 
 
 class WithoutInfluence(TypedDict):
-    """The verdict without the dwells that carry it."""
+    """The verdict without the dwells of largest influence."""
 
     dwells: Annotated[int, "number of dwells left out"]
     p_value: float
@@ -73,12 +73,12 @@ class EffectClassDocument(TypedDict):
     p_value: float
     size_ug: Annotated[float, "size of the effect, µg"]
     nonlinear: NotRequired[Annotated[dict[str, Any], "estimated time constants, widths, …"]]
-    nonlinear_of: NotRequired[Annotated[str | None, "the effect of the class that they are of"]]
+    nonlinear_of: NotRequired[Annotated[str | None, "the effect of the class that they belong to"]]
     plausible: NotRequired[Annotated[bool, "whether the size is in the usual range of the effect"]]
     units: NotRequired[Annotated[list[str], "of scope data: the units concerned"]]
     dwells: NotRequired[Annotated[list[int], "of scope data: the dwells concerned"]]
-    evidence: NotRequired[Annotated[str, "of scope data: what happened"]]
-    influence: NotRequired[Annotated[list[InfluentialDwell], "dwells that carry the verdict on this class"]]
+    evidence: NotRequired[Annotated[str, "of scope data: description of the fault"]]
+    influence: NotRequired[Annotated[list[InfluentialDwell], "dwells with the largest influence on this class"]]
     without_influence: NotRequired[Annotated[WithoutInfluence | None, "the verdict on this class without these dwells"]]
 
 
@@ -90,38 +90,38 @@ class NamedDwell(TypedDict):
 
 
 class StudentisedDwell(NamedDwell):
-    """A dwell and how far it is off its prediction by all others."""
+    """A dwell and its deviation from the prediction by all other dwells."""
 
     studentised: Annotated[float | None, "residual over its standard deviation without the dwell"]
 
 
 class VerdictEvidence(TypedDict):
-    """What a verdict rests on."""
+    """The basis of a verdict."""
 
     degrees_of_freedom: int
     condition: Annotated[float | None, "of the whitened columns of unit length"]
     bias_jackknife_ug: Annotated[float | None, "jackknife standard deviation of the bias, worst axis, µg"]
-    bias_change_ug: Annotated[float | None, "largest change of the bias by leaving out one dwell, µg"]
+    bias_change_ug: Annotated[float | None, "largest change of the bias if one dwell is left out, µg"]
     bias_change_by: Annotated[NamedDwell | None, "the dwell of that change"]
-    largest_residual: Annotated[StudentisedDwell | None, "the dwell that is farthest off"]
-    smallest_cubic_ug: Annotated[float | None, "smallest cubic term seen with probability 0.5, µg/g³; null: none"]
+    largest_residual: Annotated[StudentisedDwell | None, "the dwell with the largest deviation"]
+    smallest_cubic_ug: Annotated[float | None, "smallest cubic term detected with probability 0.5, µg/g³; null: none"]
 
 
 class LeaveOut(TypedDict):
-    """Single dwells that are off."""
+    """Single dwells with a fault."""
 
     dwells: Annotated[list[NamedDwell], "for `--leave-out`"]
     adequate_without: Annotated[bool | None, "the verdict on the other dwells"]
 
 
 class RemovedDwell(TypedDict):
-    """A dwell that was left out before physics was judged."""
+    """A dwell that was left out before effects were judged."""
 
     unit: str
     dwell: int
     off_ug: Annotated[float, "distance from the model, µg"]
     deviations: Annotated[float, "the same in standard deviations"]
-    tail: NotRequired[Annotated[bool, "whether the tails of the noise reach as far; no fault then"]]
+    tail: NotRequired[Annotated[bool, "whether it is within the tails of the noise, and so no fault"]]
 
 
 class RemovedDwells(TypedDict):
@@ -132,7 +132,7 @@ class RemovedDwells(TypedDict):
 
 
 class UnexplainedExcess(TypedDict):
-    """Residual that follows a quantity, but no effect of the catalogue."""
+    """Residual that follows a quantity, without an effect of the catalogue that explains it."""
 
     driver: str
     shape: str
@@ -147,17 +147,17 @@ class NextMeasurement(TypedDict):
     chamber_C: float
     why: Annotated[str, "effects that it separates, or `not seen so far: …`"]
     wait_s: NotRequired[Annotated[float, "time at rest before the dwell, s"]]
-    soaked: NotRequired[Annotated[bool, "false: read before the temperature has settled"]]
+    soaked: NotRequired[Annotated[bool, "false: measured before the temperature has settled"]]
     off_s: NotRequired[Annotated[float, "time with the devices switched off before the step, s"]]
     repeats: NotRequired[Annotated[int, "dwells in a row"]]
     minutes: NotRequired[Annotated[float, "station time of all rows with the same `why`"]]
-    separation_before: NotRequired[Annotated[float, "χ² so far between the two effects of `why`"]]
+    separation_before: NotRequired[Annotated[float, "present χ² between the two effects of `why`"]]
     separation_after: NotRequired[
-        Annotated[float, "χ² expected with these rows measured, whichever of the two is true"]
+        Annotated[float, "χ² expected after these rows, the smaller for either effect being true"]
     ]
-    separation_if: NotRequired[Annotated[dict[str, float], "the same by which of the two is true"]]
-    not_parted: NotRequired[Annotated[list[str], "effects of the class that these rows do not tell from the best"]]
-    measurable: NotRequired[Annotated[bool, "false: no steps; `why` says what is needed"]]
+    separation_if: NotRequired[Annotated[dict[str, float], "χ² expected after these rows, by true effect"]]
+    not_parted: NotRequired[Annotated[list[str], "effects of the class that these rows do not separate from the best"]]
+    measurable: NotRequired[Annotated[bool, "false: no steps; `why` states what is needed"]]
 
 
 UnseenInPart = TypedDict(
@@ -169,18 +169,18 @@ UnseenInPart = TypedDict(
         "from": Annotated[float, "lowest value at which the plan cannot see the effect"],
         "to": float,
         "text": Annotated[str, "the range in words"],
-        "breaker": Annotated[str, "a measurement that would show it"],
+        "breaker": Annotated[str, "measurement that shows it"],
     },
 )
-"""Values of a parameter at which this plan could not have seen an effect that it sees at others."""
+"""Parameter values at which this plan does not show an effect that it shows at other values."""
 
 
 class SmallestNamed(TypedDict):
-    """The size from which an effect would have been named, RMS over the dwells."""
+    """The smallest size of an effect that is detected, RMS over the dwells."""
 
     effect: str
-    size_ug: Annotated[float, "beside the noise of this measurement, µg"]
-    without_slow_noise_ug: Annotated[float, "beside its white part alone, µg"]
+    size_ug: Annotated[float, "with the noise of this measurement, µg"]
+    without_slow_noise_ug: Annotated[float, "with its white part only, µg"]
 
 
 class SuggestedFormula(TypedDict):
@@ -202,14 +202,14 @@ class DiagnosisDocument(TypedDict):
     classes: Annotated[list[EffectClassDocument], "best first"]
     recommended: Annotated[list[str], "one effect per class; empty if the model is adequate or the cause unknown"]
     unexplained: UnexplainedExcess | None
-    unseen: Annotated[list[str], "effects that this plan could not have seen"]
+    unseen: Annotated[list[str], "effects that this plan cannot show"]
     unseen_in_part: list[UnseenInPart]
-    smallest_named: Annotated[list[SmallestNamed], "most hidden by slow noise first"]
+    smallest_named: Annotated[list[SmallestNamed], "those that slow noise hides most first"]
     next_measurements: list[NextMeasurement]
     influence: Annotated[list[InfluentialDwell], "largest share first"]
     reason: NotRequired[Annotated[str | None, "why it cannot be judged; null: it can"]]
     evidence: NotRequired[VerdictEvidence | None]
-    leave_out: NotRequired[Annotated[LeaveOut | None, "null: no single dwell is off"]]
+    leave_out: NotRequired[Annotated[LeaveOut | None, "null: no such dwell"]]
     without_influence: NotRequired[
         Annotated[
             WithoutInfluence | None,
@@ -221,8 +221,8 @@ class DiagnosisDocument(TypedDict):
     history: NotRequired[Annotated[str | None, "file of the temperature history that was read"]]
     effects: NotRequired[Annotated[list[str], "the model that was judged"]]
     units: NotRequired[list[str]]
-    breakers: NotRequired[Annotated[dict[str, str], "per unseen effect, a measurement that would show it"]]
-    reasons: NotRequired[Annotated[dict[str, str], "per unseen effect, what hides it in this plan"]]
+    breakers: NotRequired[Annotated[dict[str, str], "per unseen effect, measurement that shows it"]]
+    reasons: NotRequired[Annotated[dict[str, str], "per unseen effect, the reason why this plan does not show it"]]
     offer: NotRequired[SuggestedFormula | None]
 
 

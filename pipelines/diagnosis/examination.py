@@ -1,4 +1,4 @@
-"""A diagnosis with everything that is told of it: the document for programs, the readings, the search."""
+"""A diagnosis with all its results: the document for programs, the readings, the search."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class Examination:
     """A diagnosis of dwells.
 
-    document : for programs, with what is told beyond its fixed keys
-    found, diagnosis : the readings, and what was found in them; None where every unit has a data fault
+    document : for programs, with keys beyond the fixed ones
+    found, diagnosis : the readings, and their diagnosis; None if every unit has a data fault
     """
 
     document: dict[str, Any]
@@ -42,17 +42,17 @@ def examination(
 
     Parameters
     ----------
-    judged : the model; the default one where None
-    left_out : ``UNIT:DWELL``, which were taken out of ``table`` on purpose
+    judged : the model; the default one if None
+    left_out : ``UNIT:DWELL``, which were removed from ``table`` on purpose
     """
     effects = list(judged) if judged else default_model(table)
     found, faults, diagnosis = examined(table, history, effects, left_out)
-    told = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
-    return Examination(told, found, diagnosis)
+    whole = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
+    return Examination(whole, found, diagnosis)
 
 
 def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
-    """What the document says beyond its fixed keys: the model judged, breakers of what was unseen, the suggested formula."""
+    """Keys of the document beyond the fixed ones: the judged model, breakers of unseen effects, the suggested formula."""
     extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
     if diagnosis is None:
         return extras

@@ -1,4 +1,4 @@
-"""The fits that an import may ask for, by name: labelled faces, a temperature ramp, or gravity's norm."""
+"""The fits of an import, by name: labelled faces, a temperature ramp, or gravity's norm."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {"norm": norm, "f
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
-    if silent:  # more poses, which the fit would ask for, would not help
+    if silent:  # more poses, which the fit requests, do not help
         raise DataRejected(
-            f"import: axis {silent}; three axes that answer to gravity are needed for --fit norm; correct --map {silent[0]}=…"
+            f"import: axis {silent}; three axes that respond to gravity are needed for --fit norm; correct --map {silent[0]}=…"
         )
     return METHODS[method](data, mapping)

@@ -1,4 +1,4 @@
-"""A fit to dwells of unknown orientation with its verdict: the same fit, noise and verdict as ``fit`` and ``diagnose`` have."""
+"""A fit to dwells of unknown orientation with its verdict, by the methods of ``fit`` and ``diagnose``."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TEMPERATURE = "bias_temperature"
 
 
 def norm(data: Imported, mapping: Mapping) -> FitAnswer:
-    """The answer of ``import --fit norm``: bias, scale and misalignment, with temperature terms where it moves by 5 °C."""
+    """The result of ``import --fit norm``: bias, scale and misalignment, with temperature terms if it varies by 5 °C."""
     dwells = dwells_of(data)
     effects = default_model(dwells)
     answer = fitted(dwells, None, effects, gravity_of(mapping), str(data.out_unit))
@@ -55,7 +55,7 @@ class NormAnswer:
 def fitted(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float, out_unit: str
 ) -> NormAnswer:
-    """The fit of a model to dwells of unknown orientation and its verdict, of the first unit in words.
+    """The fit of a model to dwells of unknown orientation and its verdict, with that of the first unit as text.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def fitted(
 def _smaller(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float
 ) -> FittedNorms | None:
-    """The same model with axes taken as square; None where it has no misalignment, or that is not determined."""
+    """The same model with orthogonal axes; None if it has no misalignment, or this is not determined."""
     if "misalignment" not in effects:
         return None
     try:
@@ -127,13 +127,13 @@ def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str,
 
 
 def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any], out_unit: str) -> list[str]:
-    """The fit and what its verdict rests on."""
+    """The fit and the basis of its verdict."""
     error, evidence = verdict["error"], verdict["evidence"]
     count = int(done.found.readings.there[0].sum())
     free = count - int(done.fit.dof[0])
     left = done.fit.left[done.found.readings.there] / done.gravity
     worst = MICRO * float(np.max(np.abs(left)))
-    without = "" if smaller is None else f"; axes taken as square leave {MICRO * smaller.rms:.1f}"
+    without = "" if smaller is None else f"; with orthogonal axes {MICRO * smaller.rms:.1f}"
     lines = [
         f"{free} parameters, {count} dwells: norm residual {MICRO * done.rms:.1f} µg rms, worst {worst:.1f} µg{without}",
         _noise_line(error, count),
@@ -155,9 +155,9 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
 
 
 def _noise_line(error: dict[str, Any], count: int) -> str:
-    """Noise floor and probability; where a long record was judged by a part of its dwells, that part's residual too."""
+    """Noise floor and probability; for a long record judged by a part of its dwells also the residual of that part."""
     white = "" if error.get("white_noise_ug") is None else f" (white noise alone {error['white_noise_ug']:.1f} µg)"
-    judged = f"; judged on {MOST} of the dwells, which leave {error['rms_ug']:.1f} µg" if count > MOST else ""
+    judged = f"; judged by {MOST} of the dwells, residual {error['rms_ug']:.1f} µg" if count > MOST else ""
     return f"noise floor between dwells {error['floor_ug']:.1f} µg{white}; p = {error['p_value']:.2g}{judged}"
 
 
@@ -170,15 +170,15 @@ def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dic
         parts.append(f"bias ± {level:.2g} {out_unit} by leaving out single dwells")
     if smaller is not None:
         moved = float(np.max(np.abs((_bias(done) - _bias(smaller))[0])))
-        parts.append(f"bias differs by up to {moved:.2g} {out_unit} from the fit with square axes")
+        parts.append(f"bias differs by up to {moved:.2g} {out_unit} from the fit with orthogonal axes")
     return "; ".join(parts)
 
 
 def _bad_line(out: dict[str, Any], verdict: dict[str, Any]) -> str:
     names = ",".join(f"{d['unit']}:{d['dwell']}" for d in out["dwells"])
-    judged = {True: "adequate", False: "not adequate", None: "not to be judged"}[out["adequate_without"]]
+    judged = {True: "is adequate", False: "is not adequate", None: "cannot be judged"}[out["adequate_without"]]
     why = f" ({verdict['reason']})" if verdict["reason"] else ""
-    left = f"the residual is {verdict['error']['rms_ug']:.1f} µg and the model is {judged}{why}"
+    left = f"the residual is {verdict['error']['rms_ug']:.1f} µg and the model {judged}{why}"
     return f"bad dwells: {names}; without them {left}; to leave them out: tumbleline fit RUN --leave-out {names}"
 
 

@@ -1,4 +1,4 @@
-"""What a judgement of a model is made from: dwells with their history, a model, formulas, and dwells that are left out."""
+"""Inputs of the judgement of a model: dwells with their history, a model, formulas, and dwells left out."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
     Parameters
     ----------
-    history : a file; empty for the run's own, or for the one that stands beside a file of dwells
+    history : a file; empty for the run's own, or for the one beside a file of dwells
     """
     dwells = read_dwells(source, archive=archive)
     beside = history or (history_beside(source) if is_file(source) else "")
@@ -48,11 +48,11 @@ def history_beside(source: str) -> str:
 
 
 def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:
-    """The model that is judged: the one given, else a run's own; None where there is neither.
+    """The model that is judged: the one given, else that of the run; None if there is neither.
 
     Parameters
     ----------
-    listed : effects, divided by commas; empty where none is named
+    listed : effects, divided by commas; empty if none is named
     where : the command, for its messages
     """
     chosen = chosen_effects(listed, model, where)
@@ -72,7 +72,7 @@ def use_written_formulas(written: Sequence[str], where: str) -> list[str]:
     WrongUse
         One has no id or no expression.
     RecipeInvalid
-        One is no formula.
+        An expression is not valid.
     """
     specs = [_specified(text, where) for text in written]
     use_formulas(specs, where)

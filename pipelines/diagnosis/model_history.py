@@ -1,4 +1,4 @@
-"""A model's versions against the same measurements: whether the error fell where the model had not been fitted."""
+"""A model's versions against the same measurements: the errors on data that were not fitted."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ FIGURES = {
     "fresh_ug": "fresh_rms_ug",
     "floor_ug": "floor_ug",
 }
-"""Figures of a version, and what a comparison calls them."""
+"""Figures of a version, with their keys in a comparison."""
 
 JUDGED = ("fall_ug", "fall_u_ug", "confirmed")
 
 
 class Compare(Protocol):
-    """Errors of a model as :func:`pipelines.diagnosis.compare.compare` tells them."""
+    """Errors of a model as :func:`pipelines.diagnosis.compare.compare` states them."""
 
     def __call__(self, effects: list[str], before: list[str] | None) -> dict[str, Any]:
-        """The comparison of a model; what was added to ``before`` is judged where that is given."""
+        """The comparison of a model; the effects added to ``before`` are judged, if given."""
         ...
 
 
 def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, Any]]:
-    """One row per version: what changed, its errors, and in words whether the change is confirmed.
+    """One row per version: the change, its errors, and the verdict on the change as text.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, A
         effects = list(version.effects)
         errors = compare(effects, before if version.added else None)
         progress = errors.get("progress")
-        row = {**told(version), **{name: errors[key] for name, key in FIGURES.items()}}
+        row = {**change_row(version), **{name: errors[key] for name, key in FIGURES.items()}}
         row |= {name: None if progress is None else progress[name] for name in JUDGED}
         text = text_of(row, progress) if before is not None else "the model to begin with"
         rows.append({**row, "text": text, "warnings": errors.get("warnings", [])})
@@ -49,8 +49,8 @@ def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, A
     return rows
 
 
-def told(version: Version) -> dict[str, Any]:
-    """What changed in a version, by whom, when, why."""
+def change_row(version: Version) -> dict[str, Any]:
+    """The change of a version with author, date and reason."""
     change = version.change
     return {
         "version": version.number,
@@ -65,9 +65,9 @@ def told(version: Version) -> dict[str, Any]:
 
 
 def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
-    """Whether a change is confirmed by data that were not fitted, in words."""
+    """The verdict of unfitted data on a change, as text."""
     if progress is None:
-        return "taken away" if row["removed"] else "nothing added"
+        return "removed" if row["removed"] else "nothing added"
     fall = _fall(progress)
     if progress["judged_by"] == "fresh run":
         return _by_fresh(progress, fall)
@@ -76,14 +76,14 @@ def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
         return f"confirmed on stretches of time left out (log density +{gain:.1f}); {fall}"
     if progress.get("rises"):
         return f"not decided by dwells left out: {progress['rises']}; {fall}; a fresh run of the same units decides"
-    why = "they cannot judge it" if gain is None else f"log density {gain:+.1f}, more than 4 is needed"
+    why = "no judgement is possible" if gain is None else f"log density {gain:+.1f}, more than 4 is needed"
     return f"not decided by dwells left out: {why}; {fall}; a fresh run of the same units decides"
 
 
 def _by_fresh(progress: dict[str, Any], fall: str) -> str:
     part, error = progress["part"], progress["part_u"]
     if part is None:
-        return "not decided: the fresh run's dwells do not show it; measure the same poses and temperatures again"
+        return "not decided: the dwells of the fresh run do not show the effect; measure the same poses and temperatures again"
     came = f"{part:.2f} ± {2.0 * error:.2f} (k = 2) of the predicted change appears in the fresh run"
     if progress["confirmed"] is True:
         return f"confirmed: {came}; {fall}"
@@ -91,13 +91,13 @@ def _by_fresh(progress: dict[str, Any], fall: str) -> str:
         return f"refuted: {came}; {fall}"
     if progress.get("rises"):
         return f"not decided: {came}, but {progress['rises']}; {fall}"
-    return f"not decided: {came}; {fall}; one more run"
+    return f"not decided: {came}; {fall}; measure another run"
 
 
 def _fall(progress: dict[str, Any]) -> str:
-    """By how much the error falls, with its uncertainty."""
+    """The decrease of the error with its uncertainty."""
     fall, error = progress["fall_ug"], progress["fall_u_ug"]
     if fall is None:
-        return "no fold can judge the error"
+        return "the error cannot be judged on dwells left out"
     wide = "" if error is None else f" ± {2.0 * error:.2g} (k = 2)"
     return f"the error falls by {fall:.2g}{wide} µg" if fall >= 0.0 else f"the error rises by {-fall:.2g}{wide} µg"

@@ -1,4 +1,4 @@
-"""The next measurement as rows of a document: one per step, with what it decides, what it costs and what it brings."""
+"""The next measurement as rows of a document: one per step, with purpose, station time and expected separation."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from inertial.planning.sequences import SequenceStep
 
 BREAKER_POSE = (0.0, 0.0, 25.0)
-"""Pose in a row that says in words what is needed (``measurable`` is false there): the words count."""
+"""Pose of a row without steps (``measurable`` is false): its text states what is needed."""
 
 
 @dataclass(frozen=True)
 class Proposed:
-    """What to measure next, in order: for every class of more than one effect what parts it, then what shows the unseen.
+    """What to measure next, in order: steps that separate classes of several effects, then steps that show unseen effects.
 
-    parting : classes, each with None where no steps of the station part it for sure
-    twins : per class, the members that no measurement of the station parts from its best one, and that one
-    showing : None where nothing that was not seen matters, or the station cannot show it
+    parting : classes, each with None if no steps of the station are certain to separate it
+    twins : per class, the members that no measurement of the station separates from its best one, and that one
+    showing : None if no unseen effect matters, or the station cannot show any
     """
 
     parting: tuple[tuple[EffectClass, Proposal | None], ...] = ()
@@ -37,36 +37,36 @@ class Proposed:
 
     @property
     def found(self) -> tuple[Proposal, ...]:
-        """What parts classes."""
+        """The proposals that separate classes."""
         return tuple(p for _, p in self.parting if p is not None)
 
     def rows(self) -> list[dict[str, Any]]:
-        """All of it as rows, in the order in which it is to be measured."""
+        """All proposals as rows, in order of measurement."""
         rows: list[dict[str, Any]] = []
         twins = [*self.twins, *[()] * (len(self.parting) - len(self.twins))]
-        for (group, wanted), alike in zip(self.parting, twins, strict=True):
-            rows += rows_of(wanted) if wanted is not None else [] if alike else [_breaker(group)]
+        for (group, measurement), alike in zip(self.parting, twins, strict=True):
+            rows += rows_of(measurement) if measurement is not None else [] if alike else [_breaker(group)]
             rows += [_no_measurement(alike)] if alike else []
         return rows if self.showing is None else [*rows, *rows_of(self.showing)]
 
 
 def proposed(diagnosis: Diagnosis, around: Circumstances | None = None) -> Proposed:
-    """What to measure after a diagnosis, each part after those before it.
+    """The next measurements after a diagnosis, each one planned after the ones before.
 
     Parameters
     ----------
-    around : what the station can do; what the run itself shows of it where None
+    around : capabilities of the station; those that the run shows if None
     """
     parting: list[tuple[EffectClass, Proposal | None]] = []
     already: list[SequenceStep] = []
     twin: list[tuple[str, ...]] = []
     for named in (*diagnosis.handled, *diagnosis.named):
         if len(named.effects.members) > 1:
-            # what handling did is not parted from physics by more poses, but by what its own words say
+            # more poses do not separate handling errors from effects; the text of the handling error says what does
             handled = named.effects.of_data
-            wanted = None if handled else _parted(diagnosis, named.effects, around, already)
-            already += wanted.steps if wanted is not None else ()
-            parting.append((named.effects, wanted))
+            measurement = None if handled else _proposal_for(diagnosis, named.effects, around, already)
+            already += measurement.steps if measurement is not None else ()
+            parting.append((named.effects, measurement))
             twin.append(() if handled else _twins(diagnosis, named.effects, around))
     return Proposed(tuple(parting), sighting(diagnosis.final, diagnosis.unseen, around, already), tuple(twin))
 
@@ -78,7 +78,7 @@ def _twins(diagnosis: Diagnosis, group: EffectClass, around: Circumstances | Non
         return ()
 
 
-def _parted(
+def _proposal_for(
     diagnosis: Diagnosis, group: EffectClass, around: Circumstances | None, already: list[SequenceStep]
 ) -> Proposal | None:
     try:
@@ -88,25 +88,25 @@ def _parted(
 
 
 def _breaker(group: EffectClass) -> dict[str, Any]:
-    """What would part a class, in words, where no steps of the station do."""
+    """What separates a class, as text, if no steps of the station do."""
     ordered = sorted(group.members[:2], key=lambda m: m.term.effect.scope == "data")
     first, second = (m.term.effect for m in ordered)
     outer, inner, temperature = BREAKER_POSE
-    steps = "" if group.of_data else "no steps that the station is known to take part them for sure; needed: "
+    steps = "" if group.of_data else "no steps of the station are certain to separate them; needed:  "
     why = f"{first.id} | {second.id}: {steps}{second.breaker}"
     return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
 
 
 def _no_measurement(alike: Sequence[str]) -> dict[str, Any]:
-    """What would part effects that do the same under every step of the station, in words."""
+    """What separates effects that are identical under every step of the station, as text."""
     outer, inner, temperature = BREAKER_POSE
     cures = dict.fromkeys(catalogue.get(name).breaker for name in alike)
-    why = f"{' | '.join(alike)}: no measurement of this station parts them; needed: {'; '.join(cures)}"
+    why = f"{' | '.join(alike)}: no measurement of this station separates them; needed: {'; '.join(cures)}"
     return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
 
 
 def rows_of(found: Proposal) -> list[dict[str, Any]]:
-    """Rows of one proposal: equal steps in a row are one, with their number."""
+    """Rows of one proposal: consecutive equal steps are one row with their number."""
     rows: list[dict[str, Any]] = []
     before: dict[str, Any] | None = None
     about = " | ".join(found.pair) or f"not seen so far: {', '.join(found.ids)}"

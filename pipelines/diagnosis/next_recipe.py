@@ -1,7 +1,7 @@
 """The recipe of the next measurement: the recipe of the dwells, continued by the steps that a diagnosis proposes.
 
-The proposed steps alone have too few poses for a fit. Their expected χ² is that of the steps beside the dwells so far, so the
-recipe measures both.
+The proposed steps alone have too few poses for a fit, and their expected χ² includes the dwells so far; so the recipe measures
+both.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from schemas.recipe import Pose, Recipe, SoakPart, explain
+from schemas.recipe import Pose, Recipe, SoakPart
+from schemas.toml_files import explain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,7 @@ SAME_SOAK_K = 0.5
 
 
 def next_recipe(base: Recipe, rows: Sequence[dict[str, Any]], name: str) -> Recipe:
-    """The recipe that measures what ``base`` does, and then the proposed steps; its model is that of ``base``.
+    """The recipe ``base`` followed by the proposed steps; its model is that of ``base``.
 
     A recipe file holds no formulas: those of a model file are left out.
 
@@ -66,12 +67,12 @@ def next_recipe(base: Recipe, rows: Sequence[dict[str, Any]], name: str) -> Reci
 
 
 def reasons(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """What the proposed steps decide, once each; empty where no step is proposed."""
+    """The purposes of the proposed steps, once each; empty without steps."""
     return list(dict.fromkeys(row["why"] for row in rows if row.get("measurable", True)))
 
 
 def _explicit(base: Recipe, soak: int) -> dict[str, Any]:
-    """A soak of the recipe with the numbers of its poses: "all poses" would include those that are added."""
+    """A soak of the recipe with the numbers of its poses: "all poses" would include the added ones."""
     given = base.soaks[soak] if base.soaks else SoakPart(temperature_C=base.temperatures_C[soak])
     listed = given.poses if given.poses is not None else range(1, len(base.poses) + 1)
     return {
@@ -100,7 +101,7 @@ def _soak_for(soaks: list[dict[str, Any]], row: dict[str, Any]) -> dict[str, Any
 
 
 def _tidied(part: dict[str, Any], base: Recipe) -> dict[str, Any]:
-    """A soak without waits and times without power that are the recipe's own."""
+    """A soak without waits and times without power of its own."""
     kept = dict(part)
     if all(wait == base.settle_s for wait in part["waits_s"]):
         kept["waits_s"] = None

@@ -1,4 +1,4 @@
-"""What a diagnosis found, as rows of its document: classes, dwells that carry the verdict, dwells left out."""
+"""Results of a diagnosis as rows of its document: classes, dwells of largest influence, dwells left out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from inertial.criticism.model import Model
 
 BAD_DWELL = "bad_dwell"
-"""Id of a single dwell of one unit that is off."""
+"""Id of a fault of a single dwell of one unit."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,17 @@ class Names:
 
 
 def probability(log_p: float) -> float:
-    """A probability; one below the smallest number is given as that."""
+    """A probability; values below the smallest number are given as that."""
     return float(max(np.exp(min(log_p, 0.0)), 1e-300))
 
 
 def known(value: float) -> float | None:
-    """A number; None where it is not one."""
+    """A number; None if it is not finite."""
     return float(value) if np.isfinite(value) else None
 
 
 def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
-    """Rows of all classes: what handling did first, as nothing is to be read into a run before it is mended."""
+    """Rows of all classes: handling errors first, because they must be corrected before effects are judged."""
     rows = [_class(n, names) for n in diagnosis.handled]
     rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed if not d.tail]
     return [*rows, *(_class(n, names) for n in diagnosis.named)]
@@ -62,11 +62,11 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
         "plausible": _plausible(group.size, simplest.effect.typical_ug),
     }
     row |= _carried(named.carried, names)
-    if named.told:
+    if named.evidence:
         row |= {
             "units": [names.units[u] for u in named.units],
             "dwells": [names.dwells[d] for d in named.dwells],
-            "evidence": named.told,
+            "evidence": named.evidence,
         }
     return row
 
@@ -108,7 +108,7 @@ def in_part_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Sizes from which effects would have been named, those first that slow noise hides most."""
+    """Smallest detected sizes of effects, those that slow noise hides most first."""
     return [
         {"effect": s.effect, "size_ug": MICRO * s.size, "without_slow_noise_ug": MICRO * s.without_slow}
         for s in diagnosis.smallest
@@ -116,7 +116,7 @@ def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
-    """What the verdict rests on: degrees of freedom, condition, the bias without single dwells, the smallest cubic seen."""
+    """The basis of the verdict: degrees of freedom, condition, the bias without single dwells, the smallest cubic detected."""
     found = diagnosis.evidence
     if found is None:
         return None
@@ -142,7 +142,7 @@ def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
 
 
 def white_noise_of(model: Model) -> float | None:
-    """RMS of the white noise that the samples of each dwell leave in its mean, sd/√n, µg; None where it is not recorded."""
+    """RMS of the white noise of the dwell means by their samples, sd/√n, µg; None if not recorded."""
     error = model.problem.error
     finite = error[np.isfinite(error)]
     lot = model.problem.lot
@@ -152,7 +152,7 @@ def white_noise_of(model: Model) -> float | None:
 
 
 def leave_out_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
-    """The single dwells to leave out, and the verdict on the others; None where no dwell is off."""
+    """The single dwells to leave out, and the verdict on the others; None if there are none."""
     dwells = [d for d in diagnosis.removed if not d.tail]
     if not dwells:
         return None
@@ -163,7 +163,7 @@ def leave_out_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
 
 
 def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
-    """Dwells that carry the verdict, most first; those that were left out carry all of theirs."""
+    """Dwells by influence on the verdict, largest first; dwells left out have all of it."""
     single = [d for d in diagnosis.removed if not d.tail]
     rows = [{"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": 1.0} for d in single]
     if rows and not (diagnosis.named or diagnosis.handled):
@@ -179,7 +179,7 @@ def _dwells(carried: Carried, names: Names) -> list[dict[str, Any]]:
 
 
 def _carried(carried: Carried, names: Names) -> dict[str, Any]:
-    """The dwells that carry the verdict on a class, and the verdict without them."""
+    """The dwells of largest influence on a class, and the verdict without them."""
     return {"influence": _dwells(carried, names), "without_influence": _without(carried)}
 
 
@@ -190,12 +190,12 @@ def _without(carried: Carried) -> dict[str, Any] | None:
 
 
 def without_influence(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """The verdict without the dwells that carry it; None where nothing is named."""
+    """The verdict without the dwells of largest influence; None if nothing is named."""
     return _without(diagnosis.carried)
 
 
 def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
-    """Single dwells that were left out, and whether they are the tails of the noise; None where there are none."""
+    """Single dwells that were left out, and whether they are tails of the noise; None if there are none."""
     if not diagnosis.removed:
         return None
     return {
@@ -214,7 +214,7 @@ def removed_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
 
 
 def noise_of(model: Model) -> dict[str, Any]:
-    """The noise that was found: shares of 1/f and random walk over the white variance, and by how much units and axes differ."""
+    """The estimated noise: shares of 1/f and random walk over the white variance, and the ratio between units and axes."""
     noise = model.noise
     return {
         "wander_share": float(noise.shares.flicker),
@@ -224,6 +224,6 @@ def noise_of(model: Model) -> dict[str, Any]:
 
 
 def _plausible(size: float, typical: tuple[float, float]) -> bool:
-    """Whether a size in g is what the effect has been seen to reach, within a factor of ten below."""
-    # an effect within the noise has no size that could be implausible
+    """Whether a size in g is in the usual range of the effect, or down to a tenth of it."""
+    # the size of an effect within the noise is not judged
     return size <= 0.0 or 0.1 * typical[0] <= MICRO * size <= typical[1]

@@ -1,4 +1,4 @@
-"""What to add where a driver explains the excess and no effect of the catalogue does: a formula, ready for a model file."""
+"""The suggestion if a driver explains the excess and no effect of the catalogue does: a formula for a model file."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
-    """A formula that follows the driver: a line, or a cubic about the middle of its range; None for what is no one quantity.
+    """A formula that follows the driver: a line, or a cubic about the middle of its range; None if the driver is no single one.
 
     Parameters
     ----------
-    unexplained : as a diagnosis found it
-    state : the dwells it was found in
+    unexplained : of a diagnosis
+    state : its dwells
     """
     name = formula_name(unexplained.driver)
     values = _values(name, state)
@@ -34,7 +34,7 @@ def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
 
 
 def as_toml(formula: dict[str, Any]) -> str:
-    """The formula as it is pasted into a model file."""
+    """The formula as text of a model file."""
     columns = ", ".join(f'"{c}"' for c in formula["columns"])
     return f'[[formula]]\nid = "{formula["id"]}"\ncolumns = [{columns}]\nwhy = "{formula["why"]}"'
 
@@ -50,7 +50,7 @@ def _values(name: str, state: State) -> np.ndarray | None:
 
 
 def _cubic(name: str, values: np.ndarray) -> list[str]:
-    """Powers of the quantity scaled to about −1 … 1: unscaled ones would be nearly the same column."""
+    """Powers of the quantity scaled to about −1 … 1: unscaled powers would be nearly collinear."""
     low, high = float(np.min(values)), float(np.max(values))
     scaled = f"(({name} - {0.5 * (low + high):.4g}) / {max(0.5 * (high - low), 1e-12):.3g})"
     return [name, f"{scaled}**2", f"{scaled}**3"]

@@ -19,8 +19,8 @@ from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
 from pipelines.certificates.days import today
-from pipelines.flows.places import archive_of
-from pipelines.flows.spread import on_dask
+from pipelines.flows.archive_address import archive_of
+from pipelines.flows.dask_cluster import on_dask
 from pipelines.tables.json_values import json_value
 from schemas.counts import number_of
 
@@ -37,7 +37,7 @@ MOST_ROWS = 500  # rows of the table of findings; page and document have all fin
 def look(archive: Archive, rules: Path | None, since: str, until: str, dask: str | None, workers: int) -> Audit:
     """The flow: audit of an archive up to the end of a day."""
     scope = Scope(day_of(since or "0001-01-01"), day_of(until) + 1.0, tomorrow=day_of(today()) + 1.0)
-    return audit(archive, load_rules(rules), scope, spread=on_dask(dask or "", workers), workers=workers)
+    return audit(archive, load_rules(rules), scope, distribute=on_dask(dask or "", workers), workers=workers)
 
 
 @task(task_run_name="tell", cache_policy=NO_CACHE, persist_result=False)
@@ -66,10 +66,10 @@ def audit_archive(
 
     Parameters
     ----------
-    archive : without credentials, see :func:`pipelines.flows.places.archive_of`
+    archive : without credentials, see :func:`pipelines.flows.archive_address.archive_of`
     pages : folder for the page and the document of every audit
     since, until : dates; everything up to today where empty
-    dask, workers : where runs are read, see :func:`pipelines.flows.spread.on_dask`
+    dask, workers : where runs are read, see :func:`pipelines.flows.dask_cluster.on_dask`
     """
     store = archive_of(archive)
     audit_result = look(store, Path(rules) if rules else None, since, until or today(), dask, workers)

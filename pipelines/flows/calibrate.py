@@ -18,8 +18,8 @@ from prefect.runtime import flow_run
 from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
+from pipelines.flows.archive_address import archive_of
 from pipelines.flows.operator import Paused
-from pipelines.flows.places import archive_of
 from pipelines.jobs.job import Request
 from schemas.errors import LinkLost, NotReached, StationTimeout
 from schemas.progress import silent
@@ -95,7 +95,7 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
 
     Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With
     ``prompts`` the flow run pauses for the operator: to load, to correct a fault, to unload. ``archive`` has no
-    credentials, see :func:`pipelines.flows.places.archive_of`.
+    credentials, see :func:`pipelines.flows.archive_address.archive_of`.
     """
     progress, report_stage, operator = _listeners[-1] if _listeners else (silent, lambda _done: None, None)
     store = archive_of(archive)

@@ -17,7 +17,7 @@ from typing import Any
 import yaml
 
 from pipelines.flows.credentials import refuse_credentials
-from pipelines.flows.knock import knock
+from pipelines.flows.server_check import check_server
 from pipelines.flows.settings import CLIENT_KEY, use_key
 from schemas.errors import TumblelineError
 
@@ -35,7 +35,7 @@ def register(path: Path) -> list[str]:
         The key is missing or wrong, or a parameter has credentials.
     """
     use_key(CLIENT_KEY)
-    knock()
+    check_server()
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     for item in content["deployments"]:
         refuse_credentials(item["parameters"].get("archive"))

@@ -14,10 +14,10 @@ from prefect import flow
 
 from pipelines.chain.attendance import Prompt
 from pipelines.chain.chain import ORDER
+from pipelines.flows.archive_address import archive_of
 from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
-from pipelines.flows.places import archive_of
 from pipelines.inquiry.loop import Consent, Participants, Settings, always, run_inquiry
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive
     from pipelines.chain.runner import Done, Runner
-    from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
+    from pipelines.inquiry.inquiry import FollowUp, Inquiry
+    from pipelines.inquiry.joint_diagnosis import JointDiagnosis
     from pipelines.jobs.job import Request
 
 _participants: list[Participants] = []
@@ -97,9 +98,9 @@ def investigate_locally(
     job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
     with reached(archive):
+        from pipelines.flows.archive_address import named
         from pipelines.flows.calibrate import settle_history
         from pipelines.flows.dead_runs import close_dead_runs
-        from pipelines.flows.places import named
 
         close_dead_runs(name)
         with seated(participants), named(archive) as address:

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.chain.chain import ORDER
 from pipelines.flows.credentials import without_credentials
-from pipelines.flows.knock import knock
 from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
+from pipelines.flows.server_check import check_server
 from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
 from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
@@ -46,14 +46,14 @@ def run_locally(
     job: Job,
     archive: Archive,
     progress: Progress,
-    told: Callable[[Done], None],
+    report: Callable[[Done], None],
     operator: Operator | None = None,
 ) -> Run:
     """The run that the flow ``calibrate_lot`` made, on the server named by PREFECT_API_URL or on one of our own."""
     archive.prepare()
     progress(0, len(steps(job.recipe)), "starting the orchestrator")
     with reached(archive):
-        return _run(request, job, archive, progress, told, operator)
+        return _run(request, job, archive, progress, report, operator)
 
 
 @contextmanager
@@ -84,7 +84,7 @@ def reach_named() -> None:
     if os.environ.get(KEY_FILE) and not os.environ.get(CLIENT_KEY):
         use_key(CLIENT_KEY)
     if not os.environ.get("PREFECT_API_KEY"):
-        knock()
+        check_server()
 
 
 def _home(archive: Archive) -> Path:
@@ -102,16 +102,16 @@ def _run(
     job: Job,
     archive: Archive,
     progress: Progress,
-    told: Callable[[Done], None],
+    report: Callable[[Done], None],
     operator: Operator | None,
 ) -> Run:
+    from pipelines.flows.archive_address import named
     from pipelines.flows.calibrate import calibrate_lot, listening, settle_history
     from pipelines.flows.dead_runs import close_dead_runs
-    from pipelines.flows.places import named
 
     name = f"{job.recipe.name} {job.capture_id}"
     close_dead_runs(name)
-    with listening(progress, told, operator), named(archive) as address:
+    with listening(progress, report, operator), named(archive) as address:
         flow = calibrate_lot.with_options(flow_run_name=name)
         run_id = str(flow(**request.parameters(), archive=address))
     settle_history(name, len(ORDER))

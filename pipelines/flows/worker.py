@@ -19,8 +19,8 @@ import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from pipelines.flows.attended import attend
-from pipelines.flows.knock import POLL_S, knock
+from pipelines.flows.child_reaper import run_until_orphans_end
+from pipelines.flows.server_check import POLL_S, check_server
 from pipelines.flows.settings import CLIENT_KEY, STARTUP_S, use_key
 from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
 from stations.safety.folder import state_folder
@@ -45,12 +45,12 @@ def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False,
     from pipelines.flows.dead_runs import cancel_missed_runs, close_dead_runs_of_queue
 
     with _alone(station):
-        knock(STARTUP_S)
+        check_server(STARTUP_S)
         for queue in (station, *queues):
             for name in close_dead_runs_of_queue(pool, queue):
-                _tell(f"{queue}: run {name} is closed as crashed: its process has ended")
+                _log(f"{queue}: run {name} is closed as crashed: its process has ended")
             for name in cancel_missed_runs(pool, queue):
-                _tell(f"{queue}: run {name} is cancelled: it was missed")
+                _log(f"{queue}: run {name} is cancelled: it was missed")
         if _marker(station).exists():
             _pause(pool, station, paused=False)
             _marker(station).unlink(missing_ok=True)
@@ -71,7 +71,7 @@ def start(pool: str, station: str, queues: Sequence[str], *, once: bool = False,
             command += ["--work-queue", queue]
         command += ["--run-once"] if once else []
         command += ["--with-healthcheck"] if healthcheck else []
-        return attend(command)
+        return run_until_orphans_end(command)
 
 
 def stop(pool: str, station: str, wait_s: float) -> list[str]:
@@ -80,7 +80,7 @@ def stop(pool: str, station: str, wait_s: float) -> list[str]:
 
     from pipelines.flows.dead_runs import WORKING, runs_of_queue
 
-    knock()
+    check_server()
     if _pause(pool, station, paused=True):
         _marker(station).touch()
     end = time.monotonic() + wait_s
@@ -129,7 +129,7 @@ def _marker(station: str) -> Path:
     return state_folder() / f"worker-{station}.paused"
 
 
-def _tell(text: str) -> None:
+def _log(text: str) -> None:
     sys.stderr.write(f"tumbleline: {text}\n")
     sys.stderr.flush()
 
@@ -167,9 +167,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return start(given.pool, given.station, given.queue, once=given.once, healthcheck=healthcheck)
         going = stop(given.pool, given.station, given.wait)
     except TumblelineError as problem:
-        _tell(str(problem))
+        _log(str(problem))
         return problem.exit_status
-    _tell(
+    _log(
         f"{given.station}: {'no run in progress' if not going else 'still in progress: ' + ', '.join(going)}; its queue is paused"
     )
     return 1 if going else 0

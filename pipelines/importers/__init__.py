@@ -1,1 +1,1 @@
-"""Tables brought from elsewhere: raw records and dwells in the exchange format."""
+"""Imported tables: raw records and dwells in the exchange format."""

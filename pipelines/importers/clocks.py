@@ -1,7 +1,7 @@
 """Seconds from the time of a foreign file: stamps of date and time, Unix time, counters in s, ms, µs or ns.
 
-The unit of a counter is what the file states, else what its steps allow; where they allow several, it is asked for. A unit
-that was given and contradicts what the file states is refused, one that contradicts the steps is remarked upon.
+The unit of a counter is what the file states, else what its steps allow; if they allow several, it must be given. A given unit
+that contradicts the file is refused; one that contradicts the steps gives a remark.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Recognised:
-    """A unit of time (empty where several or none are possible), why, and which are possible."""
+    """A unit of time (empty if several or none are possible), the reason, and the possible units."""
 
     unit: str
     reason: str
@@ -57,7 +57,7 @@ class Recognised:
 
 
 def unit_stated(text: str) -> str:
-    """The unit of time that a text names, as one of s, ms, us, ns; empty where it names none."""
+    """The unit of time that a text names, as one of s, ms, us, ns; empty if it names none."""
     word = text.strip().lower().replace("µ", "u").replace("μ", "u")
     for unit, words in {
         "ns": ("ns", "nsec", "nano"),
@@ -94,14 +94,14 @@ def recognised(numbers: NDArray[np.float64], name: str, stated: str = "") -> Rec
 def _by_steps(numbers: NDArray[np.float64]) -> Recognised:
     step = typical_step(numbers)
     if not step > 0.0:
-        return Recognised("", "time does not go on", ())
+        return Recognised("", "time does not increase", ())
     possible = tuple(unit for unit, factor in TIME_UNITS.items() if USUAL_HZ[0] <= 1.0 / (step * factor) <= USUAL_HZ[1])
     fractions = bool(np.any(numbers != np.rint(numbers)))
     reason = f"steps of {step:.6g}"
     if "s" in possible and step < 1.0 and fractions:
         return Recognised(
             "s", reason, ("s",)
-        )  # counters of ms and below that count in fractions have it in their names
+        )  # counters of ms and shorter units in fractions state the unit in their names
     return Recognised(possible[0] if len(possible) == 1 else "", reason, possible)
 
 
@@ -127,7 +127,7 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
     Raises
     ------
     DataRejected
-        A row holds none, or day and month cannot be told apart and it matters.
+        A row has no time, or day and month are ambiguous and matter.
     """
     name = shown(str(column.name))
     text = column.astype(str).str.strip().str.replace(_FRACTION, r"\1.\2", regex=True)
@@ -147,7 +147,7 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
     found = [values.seconds(one, where) for one in first]
     if len(found) == 2 and not np.allclose(found[0], found[1]):
         raise DataRejected(
-            f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month cannot be told apart, and the date changes; "
+            f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month are ambiguous, and the date changes; "
             "write the dates as 2026-12-31"
         )
     if found:
@@ -179,7 +179,7 @@ def _first_bad(text: pd.Series) -> int:
 
 
 def is_stamps(column: pd.Series) -> bool:
-    """Whether a column holds text that is no number, as stamps are."""
+    """Whether a column holds text that is not a number, such as stamps."""
     if column.dtype.kind in "fiubmM" or isinstance(column.dtype, pd.DatetimeTZDtype):
         return False
     some = column.dropna().head(20)
@@ -193,7 +193,7 @@ def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, wh
     ----------
     numbers : (n,), finite.
     claimed : unit that was given; empty to recognise it.
-    stated : unit that the file states; empty where it states none.
+    stated : unit that the file states; empty if it states none.
 
     Raises
     ------
@@ -213,27 +213,27 @@ def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, wh
             f"{where}: {column}: {found.reason}, but --units time={claimed} was given; leave it out, or correct it"
         )
     unit = claimed or found.unit or "s"
-    seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # of Unix time in ns the difference keeps its digits
+    seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # the difference keeps the digits of Unix time in ns
     return Clock(
         seconds,
         unit,
-        _doubts(step, unit, found, column) if claimed else (_taken(column, unit, found, step, len(numbers)),),
+        _doubts(step, unit, found, column) if claimed else (_reading(column, unit, found, step, len(numbers)),),
     )
 
 
-def _taken(column: str, unit: str, found: Recognised, step: float, count: int) -> str:
-    """How time was read, for people."""
+def _reading(column: str, unit: str, found: Recognised, step: float, count: int) -> str:
+    """The interpretation of time, as text."""
     seconds = step * TIME_UNITS[unit]
     rate = f", {1.0 / seconds:.4g} Hz for {seconds * (count - 1):.5g} s" if seconds > 0.0 else ""
     return f"{column}: time in {unit} ({found.reason}){rate}"
 
 
 def _doubts(step: float, unit: str, found: Recognised, column: str) -> tuple[str, ...]:
-    """A remark where the unit given makes an unusual rate and another a usual one."""
+    """A remark if the given unit leads to an unusual rate and another unit to a usual one."""
     if not step > 0.0:
         return ()
     rate = 1.0 / (step * TIME_UNITS[unit])
     if USUAL_HZ[0] <= rate <= USUAL_HZ[1] or not found.possible:
         return ()
     others = " or ".join(f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in found.possible)
-    return (f"CHECK THE UNIT OF TIME: {column} in {unit} makes {rate:.4g} Hz; it would be {others}",)
+    return (f"CHECK THE UNIT OF TIME: {column} in {unit} gives {rate:.4g} Hz; other units give {others}",)

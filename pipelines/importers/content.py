@@ -1,4 +1,4 @@
-"""What a reader of files gives: a table of columns, and what the file itself says about them."""
+"""The result of a reader: a table of columns, and the statements of the file about them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Content:
     """A table of a file.
 
     table : columns, named as in the file
-    remarks : what the reader found that a person should know, such as a preamble
+    remarks : information for the user, such as a preamble
     units : column → unit, as the file states it
-    interval_s : sample interval that the file states, s; None where it states none
+    interval_s : sample interval that the file states, s; None if it states none
     """
 
     table: pd.DataFrame
@@ -35,18 +35,18 @@ class Content:
 
 
 def unit_in(name: str) -> str:
-    """The unit in brackets at the end of a column's name; empty where there is none."""
+    """The unit in brackets at the end of a column's name; empty if there is none."""
     found = _BRACKETS.search(name)
     return found[1] if found else ""
 
 
 def chosen(groups: Sequence[tuple[str, int]], group: str, where: str) -> str:
-    """The group of channels to read: the one named, or the only one.
+    """The group of channels to read: the one given, or the only one.
 
     Parameters
     ----------
     groups : name and count of samples of each group, whose channels share a clock.
-    group : the name wanted; empty where none was given.
+    group : its name; empty if not given.
 
     Raises
     ------

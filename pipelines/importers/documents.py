@@ -12,14 +12,14 @@ class ColumnDocument(TypedDict):
 
     name: str
     number: Annotated[int, "from 1"]
-    meaning: Annotated[str, "guessed; empty where none is seen"]
+    meaning: Annotated[str, "guessed; empty if unknown"]
     reason: str
     unit: Annotated[str, "as the file states it, or as guessed"]
     missing: Annotated[int, "rows without a number"]
     low: float | None
     high: float | None
-    resolution: Annotated[float | None, "step of the lattice of its values; null where they lie on none"]
-    clipped: Annotated[int, "samples at an extreme in runs, as at the end of a range"]
+    resolution: Annotated[float | None, "step of the lattice of its values; null if there is none"]
+    clipped: Annotated[int, "consecutive samples at an extreme, as at the end of a range"]
 
 
 class SampleFaultDocument(TypedDict):
@@ -41,11 +41,11 @@ class IntervalDocument(TypedDict):
     samples: int
     mean: list[float]
     sd: list[float]
-    positions: Annotated[int, "positions logged back to back that its levels show; 1 for one dwell"]
+    positions: Annotated[int, "number of positions logged back to back; 1 for one dwell"]
 
 
 class InspectDocument(TypedDict):
-    """``inspect FILE --json``: what a file holds and what it may mean; nothing is kept."""
+    """``inspect FILE --json``: the content of a file and its probable meaning; nothing is stored."""
 
     files: list[str]
     form: str
@@ -61,8 +61,8 @@ class InspectDocument(TypedDict):
     gaps: int
     faults: list[SampleFaultDocument]
     intervals: list[IntervalDocument]
-    open: Annotated[list[str], "what the file does not say and the command lacks"]
-    command: Annotated[str, "the import command that is proposed"]
+    open: Annotated[list[str], "values that the file does not state and the command lacks"]
+    command: Annotated[str, "the proposed import command"]
 
 
 class TransferParameter(TypedDict):
@@ -77,7 +77,7 @@ class TransferParameter(TypedDict):
 
 
 class TransferFailure(TypedDict):
-    """Where a model of a transfer function fails."""
+    """A frequency range in which a model of a transfer function fails."""
 
     low_hz: float
     high_hz: float
@@ -86,7 +86,7 @@ class TransferFailure(TypedDict):
 
 
 class TransferClass(TypedDict):
-    """Missing effects that the points do not tell apart."""
+    """Missing effects that the points do not separate."""
 
     effects: list[str]
     p_value: float
@@ -110,7 +110,7 @@ class TransferImport(TypedDict):
     recommended: list[str]
     unexplained: bool
     sensitivity: Annotated[float, "output per g"]
-    bandwidth_hz: Annotated[float | None, "−3 dB frequency of the model; null: it does not fall so far"]
+    bandwidth_hz: Annotated[float | None, "−3 dB frequency of the model; null: it does not fall by 3 dB"]
     parameters: dict[str, TransferParameter]
     next_hz: list[float]
     text: list[str]

@@ -1,4 +1,4 @@
-"""The dwells of an import one by one: when, where, how noisy, and with a fit by the norm their residual and influence."""
+"""List of the dwells of an import: times, means, noise, and with a fit by the norm residual and influence."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 def dwell_rows(data: Imported, judged: FitAnswer | None, mapping: Mapping) -> list[dict[str, Any]]:
     """A row per dwell: number, label, start, end, samples, mean and standard deviation by axis, residual and influence.
 
-    The residual is |f| − g in µg, the influence Cook's distance (R. D. Cook, Technometrics 19 (1977) 15): above 1 a dwell carries
-    the fit. Both are None without a fit by the norm of gravity.
+    The residual is |f| − g in µg, the influence Cook's distance (R. D. Cook, Technometrics 19 (1977) 15): above 1 a dwell
+    dominates the fit. Both are None without a fit by the norm of gravity.
     """
     if data.dwells is None:
         return []

@@ -11,7 +11,7 @@ import pandas as pd
 from pipelines.archive import Archive
 from pipelines.importers import files, values
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
-from schemas import tables
+from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import is_file as is_there
 from schemas.foreign import shown
@@ -41,9 +41,9 @@ def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.
     Raises
     ------
     DataRejected
-        A required column is missing, a value is not finite, a dwell is there twice, a reference is incomplete.
+        A required column is missing, a value is not finite, a dwell is duplicated, a reference is incomplete.
     WrongUse
-        There is neither such a file nor such a run.
+        There is no such file and no such run.
     """
     if is_file(source):
         frame, _ = files.read(Path(source))
@@ -70,7 +70,7 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
 
     Parameters
     ----------
-    foreign : whether they come from elsewhere; an archive keeps the serial numbers that older versions let in.
+    foreign : whether they come from elsewhere; an archive keeps the serial numbers that older versions accepted.
     """
     _require(frame, REQUIRED, where)
     frame = frame.copy()
@@ -85,12 +85,12 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
     _all_or_none(frame, ANGLES, where)
     _all_or_none(frame, DEVIATIONS, where)
     _plausible(frame, where)
-    frame = tables.check("dwells", frame, where=where)
+    frame = table_check.check("dwells", frame, where=where)
     return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)
 
 
 def is_file(source: str | Path) -> bool:
-    """Whether dwells or a history are meant as a file, not as a run of the archive."""
+    """Whether a source is a file, not a run of the archive."""
     path = Path(source)
     looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
     return is_there(path) or (looks_like_one and not _is_run_like(source))
@@ -165,7 +165,7 @@ def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> Non
 
 
 def _plausible(frame: pd.DataFrame, where: str) -> None:
-    _inside(frame.drop(columns="n", errors="ignore"), where)  # which has words of its own
+    _inside(frame.drop(columns="n", errors="ignore"), where)  # which has its own check
     if FORCE[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE)].to_numpy(dtype=np.float64), axis=1)))
         if not 0.0 < size < _LARGEST_FORCE or _METRES[0] < size < _METRES[1]:
@@ -177,14 +177,14 @@ def _plausible(frame: pd.DataFrame, where: str) -> None:
 
 
 def _inside(frame: pd.DataFrame, where: str) -> None:
-    """Refuse numbers where none can lie, in any column."""
+    """Refuse impossible numbers in any column."""
     for column in frame.columns:
         if pd.api.types.is_numeric_dtype(frame[column]):
             values.refuse_outside(np.asarray(frame[column], dtype=np.float64), str(column), where, first_row=0)
 
 
 def _countable(frame: pd.DataFrame, where: str) -> None:
-    """Refuse means of no samples, outputs in a unit that nobody knows, and dwells that were all measured at one instant."""
+    """Refuse means of no samples, outputs in an unknown unit, and dwells that all have the same time."""
     if "n" in frame.columns:
         count = np.asarray(frame["n"], dtype=np.float64)
         row = int(np.argmax((count < 1.0) | (count > values.BOUNDS["n"][1])))

@@ -1,4 +1,4 @@
-"""Six labelled faces: the published method beside least squares of all eighteen means."""
+"""Six labelled faces: the published method, and least squares of all eighteen means."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 MODEL = ("bias", "scale", "misalignment")
 GROSS = 0.05
-"""Part of gravity that no tilt of a face by hand leaves: cos 18° is 0.95."""
+"""Smallest part of gravity along a face placed by hand: cos 18° is 0.95."""
 UNLIKELY = 0.01
 """Probability of a lack of fit below which six faces are not adequate."""
 
@@ -77,7 +77,7 @@ def _covariance(rows: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def _verdict(found: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
-    """Whether six faces are described, and why that cannot be told or needs no probability; nan is no probability.
+    """Whether the fit describes six faces, and the reason if that cannot be judged or needs no probability.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def _verdict(found: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]
         worst = float(np.max(share)) if np.isfinite(share).all() else float("nan")
         return (
             False,
-            f"the faces disagree by {100.0 * worst:.3g} % of gravity, whatever the noise; check the labels of the faces",
+            f"the faces disagree by {100.0 * worst:.3g} % of gravity, far beyond noise; check the labels of the faces",
         )
     passed = passes(found.p_value, UNLIKELY)
     if passed is not None:

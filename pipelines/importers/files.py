@@ -1,4 +1,4 @@
-"""Files of others as tables of columns; what a file is, its first bytes say and not its name."""
+"""Files of other systems as tables of columns; the first bytes decide on the format, not the name."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST_COLUMNS = 10_000
 
 @dataclass(frozen=True)
 class SourceFile:
-    """Where a table came from, for the archive."""
+    """The source of a table, for the archive."""
 
     path: str
     sha256: str
@@ -39,22 +39,22 @@ class SourceFile:
 
 
 def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
-    """Columns of a file, named as there (a text file without a header: "1", "2", …), and where they came from."""
+    """Columns of a file, named as there (a text file without a header: "1", "2", …), and their source."""
     content, source = read_content(path)
     return content.table, source
 
 
 def read_content(path: Path, group: str = "") -> tuple[Content, SourceFile]:
-    """What a file holds, and where it came from.
+    """The content of a file, and its source.
 
     Parameters
     ----------
-    group : the group of channels wanted, where the file has several.
+    group : the group of channels, if the file has several.
 
     Raises
     ------
     DataRejected
-        The file is broken, empty, or of no format that is read.
+        The file is damaged, empty, or of an unknown format.
     WrongUse
         There is no such file, a library is missing, or a group must be chosen.
     """

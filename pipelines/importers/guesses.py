@@ -1,4 +1,4 @@
-"""What the columns of an unknown file may mean, each guess with its reason: proposals for a person, never taken by an import."""
+"""Guesses of the meaning of the columns of an unknown file, with reasons: proposals for the user, never used by an import."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _LIKELY_HZ = 100.0
 
 @dataclass(frozen=True)
 class Guess:
-    """A meaning (time, x, temperature, …; empty where none is seen), and why."""
+    """A meaning (time, x, temperature, …; empty if unknown), and the reason."""
 
     meaning: str
     reason: str
@@ -46,7 +46,7 @@ class Guess:
 class Guesses:
     """Guesses of a file.
 
-    columns : column → guess · time_unit, output : units with their reasons; empty where they are not seen
+    columns : column → guess · time_unit, output : units with their reasons; empty if unknown
     """
 
     columns: dict[str, Guess]
@@ -55,11 +55,11 @@ class Guesses:
 
     @property
     def dwells(self) -> bool:
-        """Whether rows look like dwells: standard deviations stand beside the means."""
+        """Whether rows look like dwells, with standard deviations beside the means."""
         return all(self.column(f"sd_{axis}") for axis in "xyz")
 
     def column(self, meaning: str) -> str:
-        """The column with a meaning; empty where there is none."""
+        """The column with a meaning; empty if there is none."""
         return next((name for name, guess in self.columns.items() if guess.meaning == meaning), "")
 
 
@@ -75,7 +75,7 @@ def guesses(content: Content) -> Guesses:
 
 
 def measurable(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Numbers without those that nothing measured can be: their squares would not be numbers any more."""
+    """Numbers without those too large to be measured: their squares would overflow."""
     return np.where(np.abs(numbers) <= LARGEST, numbers, np.nan)
 
 
@@ -99,11 +99,11 @@ def _time(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: d
     growing = [name for name, numbers in numeric.items() if _grows(numbers)]
     named = [name for name in growing if _TIME.search(name) and not _COUNT.search(name)]
     if named:
-        found[named[0]] = Guess("time", "its name, and it only grows")
+        found[named[0]] = Guess("time", "its name, and it only increases")
         return
     even = [name for name in growing if not _COUNT.search(name)]
     if even:
-        found[even[0]] = Guess("time", "the first column that only grows")
+        found[even[0]] = Guess("time", "the first column that only increases")
 
 
 def _reads_as_time(column: pd.Series) -> bool:
@@ -123,7 +123,7 @@ def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict
     for name in free:
         axis = _AXIS.search(name)
         if axis and not _OTHER.search(name):
-            # the same name but for the letter: acc_x, acc_y, acc_z
+            # the same name with another letter: acc_x, acc_y, acc_z
             stem = name[: axis.start(1)] + "?" + name[axis.end(1) :]
             named.setdefault(stem, {})[axis[1].lower()] = name
     triples = [axes for axes in named.values() if len(axes) == 3]
@@ -146,7 +146,7 @@ def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict
 
 
 def _steadiest(numeric: dict[str, NDArray[np.float64]], names: list[str]) -> tuple[str, ...]:
-    """The three neighbouring columns with the steadiest norm, each of which changes; empty where there are not three."""
+    """The three neighbouring columns with the steadiest norm, each of which changes; empty if there are not three."""
     live = [name for name in names if np.nanstd(numeric[name][:_SOME]) > 0.0]
     threes = [
         three for three in combinations(live, 3) if len(live) < 6 or live.index(three[2]) - live.index(three[0]) == 2

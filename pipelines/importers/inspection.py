@@ -1,4 +1,4 @@
-"""A first look at a file: what it holds, what it may mean, what is wrong with it, and the command that imports it."""
+"""Inspection of a file: its content, its probable meaning, its faults, and the command that imports it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _MOST_INTERVALS = 2000
 
 @dataclass(frozen=True)
 class Inspection:
-    """A first look: the document, and the record for a picture (time in s or samples, output (n, 3)); None without axes."""
+    """The result of an inspection: the document, and the record (time in s or samples, output (n, 3)); None without axes."""
 
     document: InspectDocument
     time: NDArray[np.float64] | None
@@ -39,12 +39,12 @@ class Inspection:
 
 
 def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspection:
-    """A first look at a recording of one file or of several.
+    """The inspection of a recording of one or several files.
 
     Parameters
     ----------
-    join : how several files are one recording, ``rows`` or ``columns``.
-    group : the group of channels, where a file has several.
+    join : how several files are joined, ``rows`` or ``columns``.
+    group : the group of channels, if a file has several.
     """
     first, _ = files.read_content(paths[0], group)
     time_name = guesses(first).column("time") if len(paths) > 1 else ""
@@ -94,7 +94,7 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
 
 
 def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | None, int, list[str]]:
-    """Seconds of every row, count of gaps, and what is open."""
+    """Seconds of every row, count of gaps, and missing options."""
     name = guessed.column("time")
     if not name and guessed.dwells:
         return None, 0, []
@@ -129,7 +129,7 @@ def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | Non
 
 
 def _clock_of(output: NDArray[np.float64], time: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """Seconds, or the numbers of the samples where there is no time."""
+    """Seconds, or the numbers of the samples if there is no time."""
     return np.arange(len(output), dtype=np.float64) if time is None else time
 
 
@@ -205,7 +205,7 @@ def _command(
     faulty: bool,
     positions: int,
 ) -> str:
-    """The import command that is proposed; what the file does not say stands in capitals."""
+    """The import command that is proposed; values that the file does not state are in capitals."""
     names = list(guessed.columns)
     pairs = [(meaning, guessed.column(meaning)) for meaning in _NAMED if guessed.column(meaning)]
     mapped = ",".join(f"{meaning}={_mapped(name, names)}" for meaning, name in pairs)
@@ -229,11 +229,11 @@ def _command(
 
 
 def _mapped(name: str, names: list[str]) -> str:
-    """A column as --map can name it: by its number where its name has a comma or an equals sign, or blanks at its ends."""
+    """A column as a name for --map: by its number where its name has a comma or an equals sign, or blanks at its ends."""
     return str(names.index(name) + 1) if re.search(r"[,=]|^\s|\s$", name) or not name else name
 
 
 def _serial(path: Path) -> str:
-    """A serial number made of the file's name."""
+    """A serial number from the name of the file."""
     stem = re.sub(r"[^A-Za-z0-9._+-]", "-", path.name.split(".")[0]).strip("._+-")
     return stem[:64] or "UNIT-1"

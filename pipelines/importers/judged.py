@@ -1,4 +1,4 @@
-"""What a fit at import answers, and what every such fit needs: dwells of one unit, and gravity where it was measured."""
+"""The result of a fit at import, and the inputs of every such fit: dwells of one unit, and local gravity."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FitAnswer:
-    """A fit's answer: a document for JSON, lines for people, and coefficients for the archive."""
+    """The result of a fit: a document for JSON, lines for people, and coefficients for the archive."""
 
     method: str
     adequate: bool | None
-    """None where these data cannot tell; the lines say why."""
+    """None if these data cannot decide; the lines state the reason."""
     document: dict[str, Any]
     lines: tuple[str, ...]
     coefficients: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     effects: tuple[str, ...] = ()
-    """The model, as ids of the catalogue; empty where the fit is none of its effects."""
+    """The model, as ids of the catalogue; empty if the fit uses none of its effects."""
     tables: dict[str, pd.DataFrame] = field(default_factory=dict[str, "pd.DataFrame"])
     """Further tables for the archive: covariance, residuals."""
 
@@ -35,7 +35,7 @@ def dwells_of(data: Imported) -> pd.DataFrame:
     """The dwells of an import of one unit."""
     if data.dwells is None:
         raise DataRejected(
-            "import: nothing stands still in this record, dwells are needed for a fit; record static positions"
+            "import: this record has no static interval, dwells are needed for a fit; record static positions"
         )
     units = len(set(data.dwells["unit"]))
     if units > 1:
@@ -47,7 +47,7 @@ def dwells_of(data: Imported) -> pd.DataFrame:
 
 
 def gravity_of(mapping: Mapping) -> float:
-    """Gravity where it was measured, g."""
+    """Local gravity at the place of the measurement, g."""
     if mapping.norm_g is None:
         raise WrongUse(
             "import: gravity at the place of measurement is needed for this fit and has no default; give --local-g M/S2"

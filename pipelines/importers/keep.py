@@ -1,4 +1,4 @@
-"""Imports in the archive: a run of its own, named for the unit and for what decides its content."""
+"""Imports in the archive: a new run, named after the unit and the hash of its inputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Libraries of other makers that only some formats need: imported when such a file is read, with the way to install them."""
+"""Optional libraries of single formats: imported when such a file is read, with a message how to install them."""
 
 from __future__ import annotations
 

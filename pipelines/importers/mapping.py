@@ -1,4 +1,4 @@
-"""What the columns of a foreign file mean: from the command line or a small TOML file, checked before anything is read."""
+"""The meaning of the columns of a foreign file: from the command line or a TOML file, checked before the file is read."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from inertial.quantities import FORCE_COLUMNS, LARGEST, OUTPUT_COLUMNS, RECORDED
 from schemas.bounds import FASTEST_HZ, LONGEST_WAIT_S
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
-from schemas.recipe import parse_toml, read_text
+from schemas.toml_files import parse_toml, read_text
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ RESERVED = frozenset({
     *("outer_command_deg", "inner_command_deg", *MEANINGS.values()),
     *(row.column for row in RECORDED if row.attribute),
 })  # fmt: skip
-"""Columns that the tables of an import have with a meaning of their own: no covariate may be called so."""
+"""Columns that the tables of an import have with a meaning of their own: no covariate may have these names."""
 SHORTEST_BLOCK_S = 1e-3
 MOST_POSITIONS = 2000
 LONGEST_NAME = 200
@@ -57,7 +57,7 @@ class Units(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
     output: str
     time: str = ""
-    """Empty: as the file states it, or as its steps tell."""
+    """Empty: as stated by the file, or recognised from its steps."""
     temperature: str = "degC"
 
     @field_validator("output")
@@ -81,10 +81,10 @@ class Mapping(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     columns: dict[str, str]
-    """What is wanted → column of the file; names beyond the known ones become covariates."""
+    """Meaning → column of the file; unknown names become covariates."""
     units: Units
     unit: str = ""
-    """Serial number, where the file has no column for it."""
+    """Serial number, if the file has no column for it."""
     rows: Literal["samples", "dwells"] = "samples"
     rate_hz: Annotated[float, Field(gt=0.0, le=FASTEST_HZ)] | None = None
     axes: tuple[Literal["x", "y", "z"], Literal["x", "y", "z"], Literal["x", "y", "z"]] = ("x", "y", "z")
@@ -96,23 +96,23 @@ class Mapping(BaseModel):
     face: Literal["", "+x", "+y", "+z", "-x", "-y", "-z"] = ""
     """The face that is up all the time, for a record in one pose."""
     block_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
-    """Dwells of this length instead of found ones, for a record in one pose."""
+    """Dwells of this length instead of detected ones, for a record in one pose."""
     positions: Annotated[int, Field(ge=2, le=MOST_POSITIONS)] | None = None
     """Count of positions logged back to back, without the moves between them."""
     window_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
-    """Length of the sliding window that finds dwells."""
+    """Length of the sliding window of the search for dwells."""
     threshold: Annotated[float, Field(gt=0.0, le=LARGEST)] | None = None
-    """Standard deviation of a window above which it moves, in the unit of the output."""
+    """Standard deviation of a window that means motion, in the unit of the output."""
     shortest_s: Annotated[float, Field(ge=SHORTEST_BLOCK_S, le=LONGEST_WAIT_S)] | None = None
     """Shortest dwell."""
     gaps: Literal["refuse", "split"] = "refuse"
-    """What is done with rows without a number and with gaps in time."""
+    """Treatment of rows without a number, and of gaps in time."""
     faulty: Literal["refuse", "leave-out", "keep"] = "refuse"
-    """What is done with samples of an axis that stands still, and with torn words."""
+    """Treatment of samples of a constant axis, and of torn words."""
     group: str = ""
-    """Group of channels of a file that has several with clocks of their own."""
+    """Group of channels, if a file has several with their own clocks."""
     join: Literal["", "rows", "columns"] = ""
-    """How several files are one recording: one after another, or side by side."""
+    """How several files are joined: one after another, or side by side."""
 
     @field_validator("columns")
     @classmethod
@@ -148,13 +148,13 @@ class Mapping(BaseModel):
 
     @property
     def likely_slips(self) -> dict[str, tuple[str, ...]]:
-        """Covariates whose names are close to known ones, with these: perhaps a slip, and allowed all the same."""
+        """Covariates whose names are close to known ones, with these: possibly misspelt, but allowed."""
         found = {name: close_matches(name, KNOWN) for name in self.columns if name not in KNOWN and len(name) > 1}
         return {name: close for name, close in found.items() if close}
 
     @property
     def norm_g(self) -> float | None:
-        """Local gravity in g; None where it was not given."""
+        """Local gravity in g; None if not given."""
         return None if self.local_gravity_m_s2 is None else self.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
 
 

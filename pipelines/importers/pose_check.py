@@ -1,4 +1,4 @@
-"""Whether dwells agree with the faces that were named for them: axes exchanged, turned round, or without an answer."""
+"""Check of dwells against their stated faces: exchanged axes, inverted axes, or axes without a response."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _SILENT = 0.05
 _TURNED = 0.8
 _CLEAR = 0.6
 _MISFIT = 0.1
-"""Part of gravity that a response may leave and still be one of exchanged axes."""
+"""Largest unexplained part of gravity for a response of exchanged axes."""
 OUT = ["out_x", "out_y", "out_z"]
 FORCE = ["force_x", "force_y", "force_z"]
 
 
 def silent_axis(dwells: pd.DataFrame) -> str:
-    """A sentence on an axis, its letter first, that stays the same where another turns through gravity; empty where none does."""
+    """A sentence on an axis, with its letter first, that stays constant while another turns through gravity; else empty."""
     means = dwells[OUT].to_numpy(dtype=np.float64)
     if len(means) < _LEAST:
         return ""
@@ -44,12 +44,12 @@ def silent_axis(dwells: pd.DataFrame) -> str:
 
 
 def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tuple[str, ...]:
-    """Remarks on dwells, such as an axis that does not answer to positions.
+    """Remarks on dwells, such as an axis that does not respond to positions.
 
     Raises
     ------
     DataRejected
-        The outputs belong to other faces than those named, or an axis does not answer to gravity.
+        The outputs belong to other faces than those named, or an axis does not respond to gravity.
     """
     if not mapping.poses or FORCE[0] not in dwells.columns:
         silent = silent_axis(dwells)
@@ -63,12 +63,12 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
     size = np.linalg.norm(response, axis=1)
     misfit = float(np.sqrt(np.mean((output - design @ fit) ** 2)))
     if misfit > _MISFIT * float(np.median(size)):
-        return ()  # some labels are wrong, not the axes: a matter of the fit's own verdict
+        return ()  # some labels are wrong, not the axes: the verdict of the fit shows it
     weak = np.flatnonzero(size < _DEAD * np.median(size))
     if weak.size:
         axis = AXES[int(weak[0])]
         raise DataRejected(
-            f"{where}: axis {axis} answers to gravity with {100.0 * size[weak[0]] / np.median(size):.3g} % of the other axes; "
+            f"{where}: axis {axis} responds to gravity with {100.0 * size[weak[0]] / np.median(size):.3g} % of the other axes; "
             f"its column must be an acceleration; correct --map {axis}=…, or repair the channel"
         )
     shares = response / size[:, None]
@@ -86,6 +86,6 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
     }
     order, turned = (",".join(inverse[k][part] for k in range(3)) for part in (0, 1))
     raise DataRejected(
-        f"{where}: by the faces named, {found}; each output must read its own axis; correct --poses, or add --axes {order} "
+        f"{where}: by the stated faces, {found}; each output must read its own axis; correct --poses, or add --axes {order} "
         f"--signs={turned}"
     )

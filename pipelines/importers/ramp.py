@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
-    """A cubic in temperature of a record in one pose; adequate only if what is left is sample noise."""
+    """A cubic in temperature of a record in one pose; adequate only if the residual is sample noise."""
     if data.samples is None or "unit_C" not in data.samples.columns:
         raise WrongUse(
             "import: --fit temperature works on samples with a temperature; map temperature=…, without --rows dwells"
@@ -43,11 +43,12 @@ def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
         "noise": fit.noise.tolist(),
     }
     lines = tuple(
-        f"{AXES[k]}: a cubic in temperature leaves {fit.rms[k]:.3g} {data.out_unit}, {ratio[k]:.1f} times the noise of a sample "
+        f"{AXES[k]}: the residual of a cubic in temperature is {fit.rms[k]:.3g} {data.out_unit}, {ratio[k]:.1f} times the "
+        "noise of a sample "
         f"({fit.noise[k]:.3g}, from first differences)"
         for k in range(3)
     )
     advice = "something other than temperature itself drives this output; look at its rate and lag with 'tumbleline diagnose'"
     if fit.adequate is None:
-        advice = "cannot be judged: the noise of a sample or the residual is no number; check the record for constant channels"
+        advice = "cannot be judged: the noise of a sample or the residual is undefined; check the record for constant channels"
     return FitAnswer("temperature", fit.adequate, document, lines if fit.adequate else (*lines, advice))

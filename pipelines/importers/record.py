@@ -1,4 +1,4 @@
-"""Foreign columns turned into a raw record and its dwells; what does not agree with what was claimed is refused."""
+"""Foreign columns turned into a raw record and its dwells; contradictions to the mapping are refused."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class Imported:
     """One recording's samples and dwells, in the tables of the archive."""
 
     samples: pd.DataFrame | None
-    """Raw record; None where the file's rows are dwells already."""
+    """Raw record; None if the rows of the file are dwells."""
     dwells: pd.DataFrame | None
-    """Exchange format; None where nothing stands still."""
+    """Exchange format; None if there is no static interval."""
     out_unit: str
     remarks: tuple[str, ...]
     faults: tuple[SampleFaultDocument, ...] = field(default=())
@@ -60,8 +60,8 @@ def imported(
     Raises
     ------
     DataRejected
-        A column is not there, a value is no finite number, time runs back, the norm contradicts the unit, samples are missing,
-        an axis stands still, words are torn, or a dwell holds several positions.
+        A column is not there, a value is not a finite number, time runs back, the norm contradicts the unit, samples are missing,
+        an axis is constant, words are torn, or a dwell holds several positions.
     """
     columns = _columns(table, mapping, where)
     remarks = () if content is None else content.remarks
@@ -113,11 +113,11 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
     names = [str(name) for name in table.columns]
     named = table.set_axis(names, axis=1)
     found: dict[str, pd.Series] = {}
-    for meaning, wanted in mapping.columns.items():
-        column = column_name(names, wanted)
+    for meaning, source_column in mapping.columns.items():
+        column = column_name(names, source_column)
         if not column:
             raise DataRejected(
-                f"{where}: column '{shown(wanted)}' (for {meaning}) is not there; {did_you_mean(wanted, names)}"
+                f"{where}: column '{shown(source_column)}' (for {meaning}) is not there; {did_you_mean(source_column, names)}"
             )
         found[meaning] = pd.Series(named[column], name=column)
     meanings = [meaning for meaning in ("time", *AXES) if meaning in found]
@@ -133,7 +133,7 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
 def _with_numbers(
     columns: dict[str, pd.Series], mapping: Mapping, where: str
 ) -> tuple[NDArray[np.int64], dict[str, pd.Series], tuple[str, ...]]:
-    """Rows that are kept (k,), the columns with these rows, and a remark on the others, which have no number somewhere."""
+    """Rows that are kept (k,), the columns with these rows, and a remark on the others, which lack a number."""
     count = len(columns["x"])
     if mapping.gaps == "refuse":
         return np.arange(count), columns, ()
@@ -185,7 +185,7 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
         )
         return serials
     if not mapping.unit:
-        raise WrongUse(f"{where}: whose record is it? no unit is mapped, a serial number is needed; give --unit SN")
+        raise WrongUse(f"{where}: no unit is mapped, a serial number is needed; give --unit SN")
     refuse_unusable_serials([mapping.unit], where)
     return [mapping.unit] * len(columns["x"])
 
@@ -246,7 +246,7 @@ def _as_dwells(
     where: str,
     remarks: tuple[str, ...],
 ) -> Imported:
-    """A file whose rows are dwells already."""
+    """A file whose rows are dwells."""
     count = pd.Series(serials).groupby(serials).cumcount().to_numpy()
     time = count.astype(np.float64)
     if "time" in columns:
@@ -265,12 +265,12 @@ def _as_dwells(
 
 
 def _finished(frame: pd.DataFrame, mapping: Mapping) -> pd.DataFrame:
-    """The columns that every dwell has, and the reference where poses are named."""
+    """The columns that every dwell has, and the reference if poses are stated."""
     frame = frame.assign(slot=0, kind="dwell", soak=0, out_unit=OUTPUT_UNITS[mapping.units.output][0])
     if not (mapping.poses or mapping.face):
         return frame
     if mapping.norm_g is None:
-        raise WrongUse("import: poses are named, but not how strong gravity is, which is needed; give --local-g M/S2")
+        raise WrongUse("import: poses are stated, local gravity is needed with them; give --local-g M/S2")
     up = [mapping.poses.get(label, mapping.face) for label in frame["pose"]]
     frame[["force_x", "force_y", "force_z"]] = np.array([FACES[face] for face in up]) * mapping.norm_g
     return frame

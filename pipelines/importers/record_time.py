@@ -1,4 +1,4 @@
-"""The time of a foreign record in seconds: any clock, no step back, no gap that is not known of."""
+"""The time of a foreign record in seconds: any clock, no step back, no unknown gap."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LONGEST_MOVE_S = 300.0
 """Between two positions, of a hand or a table."""
 SHORTEST_RECORD_S = 3.0
 GAP = 5.0
-"""Usual steps that a longer one leaves room for."""
+"""Multiple of the usual step above which a step is a gap."""
 
 
 def seconds(
@@ -50,9 +50,9 @@ def seconds(
     Raises
     ------
     DataRejected
-        Time runs back, or stands still.
+        Time runs back, or does not advance.
     WrongUse
-        There is neither time nor rate, or the unit of time cannot be recognised.
+        There is no time and no rate, or the unit of time cannot be recognised.
     """
     clock = _clock(columns, mapping, stated, where, dwells=dwells)
     values.refuse_outside(clock.seconds, "time_s", where)
@@ -101,7 +101,7 @@ def _clock(
 
 
 def finite(column: pd.Series, where: str) -> NDArray[np.float64]:
-    """The numbers of a column of time; one that is none is refused with its row."""
+    """The numbers of a column of time; an invalid one is refused with its row."""
     numbers = values.as_numbers(column, where)
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
@@ -141,7 +141,7 @@ def gaps_of(
     Raises
     ------
     DataRejected
-        There are gaps that are not known of, and the mapping does not say that what lies between is used.
+        There are unknown gaps, and the mapping does not allow them.
     """
     steps = np.diff(time)
     usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
@@ -164,7 +164,7 @@ def gaps_of(
 def time_doubts(
     time: NDArray[np.float64], heat: NDArray[np.float64] | None, found: Stretches, mapping: Mapping, *, searched: bool
 ) -> tuple[str, ...]:
-    """Remarks where a record in seconds shows what no hand, table or chamber does: its time may be in another unit.
+    """Remarks if a record in seconds is impossible for a hand, table or chamber: its time may be in another unit.
 
     Parameters
     ----------

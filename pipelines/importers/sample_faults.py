@@ -1,4 +1,4 @@
-"""Samples that an axis repeats, and torn words: refused, left out or kept, as the mapping says."""
+"""Samples that an axis repeats, and torn words: refused, left out or kept, by the mapping."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipelines.importers.documents import SampleFaultDocument
     from pipelines.importers.mapping import Mapping
 
-_MOST_TOLD = 5
+_MOST_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -33,25 +33,25 @@ class SampleFaults:
     bad: NDArray[np.bool_]
 
     def __bool__(self) -> bool:
-        """Whether there are any."""
+        """Whether there are faults."""
         return bool(self.frozen or self.torn)
 
     def sentences(self, time: NDArray[np.float64]) -> list[str]:
-        """What was found, for people."""
+        """The faults as text."""
         found = [
-            f"axis {AXES[one.axis]} stands still for {one.count} samples from row {one.start + 1} on ({time[one.start]:.6g} s)"
-            for one in sorted(self.frozen, key=lambda one: -one.count)[:_MOST_TOLD]
+            f"axis {AXES[one.axis]} is constant for {one.count} samples from row {one.start + 1} on ({time[one.start]:.6g} s)"
+            for one in sorted(self.frozen, key=lambda one: -one.count)[:_MOST_LISTED]
         ]
-        more = len(self.frozen) - _MOST_TOLD
+        more = len(self.frozen) - _MOST_LISTED
         found += [f"and {more} more such stretches"] if more > 0 else []
         return found + [
-            f"axis {AXES[one.axis]} has torn words: {100.0 * one.share:.3g} % of its resting samples are off by "
+            f"axis {AXES[one.axis]} has torn words: {100.0 * one.share:.3g} % of its resting samples deviate by "
             f"±{', ±'.join(map(str, one.offsets))} steps of its resolution, from row {int(one.rows.min()) + 1} on"
             for one in self.torn
         ]
 
     def rows(self, time: NDArray[np.float64]) -> list[SampleFaultDocument]:
-        """What was found, for JSON."""
+        """The faults for JSON."""
         still: list[SampleFaultDocument] = [
             {"fault": "stuck_output", "axis": AXES[one.axis], "first_row": one.start + 1, "samples": one.count,
              "start_s": float(time[one.start]), "offsets_lsb": []}
@@ -77,7 +77,7 @@ def look(output: NDArray[np.float64]) -> SampleFaults:
 
 
 def mended(output: NDArray[np.float64], found: SampleFaults, bad: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """The record (n, 3) in which dwells are looked for: torn words that are left out replaced by the running median."""
+    """The record (n, 3) for the search for dwells: torn words that are left out are replaced by the running median."""
     if not bad.any() or not found.torn:
         return output
     clean = output.copy()
@@ -87,7 +87,7 @@ def mended(output: NDArray[np.float64], found: SampleFaults, bad: NDArray[np.boo
 
 
 def without_short(found: Stretches, record: NDArray[np.int64]) -> tuple[Stretches, NDArray[np.int64], tuple[str, ...]]:
-    """The dwells that keep half of their samples at least, their samples numbered anew, and a remark on the others."""
+    """The dwells that keep at least half of their samples, renumbered, and a remark on the others."""
     left = [int(np.count_nonzero(record[a:b])) for a, b in zip(found.first, found.last, strict=True)]
     kept = [k for k, count in enumerate(left) if 2 * count > found.last[k] - found.first[k]]
     if len(kept) == len(found):
@@ -104,19 +104,19 @@ def without_short(found: Stretches, record: NDArray[np.int64]) -> tuple[Stretche
     return (
         fewer,
         numbers[record],
-        (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_TOLD])}",),
+        (f"dwells left out because most of their samples have faults: {', '.join(gone[:_MOST_LISTED])}",),
     )
 
 
 def sound_dwells(
     columns: dict[str, NDArray[np.float64]], labels: list[str], mapping: Mapping, where: str
 ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Which rows that are dwells already are used (n,), and a remark: those in which an axis has no scatter are not sound.
+    """Which rows that are dwells already are used (n,), and a remark: those with an axis without scatter are faulty.
 
     Raises
     ------
     DataRejected
-        There are such dwells and the mapping does not say what to do with them.
+        There are such dwells and the mapping does not state their treatment.
     """
     sound = np.ones(len(labels), dtype=bool)
     if not all(f"sd_{axis}" in columns for axis in AXES):
@@ -130,7 +130,7 @@ def sound_dwells(
     first = int(rows[0])
     axis = AXES[int(np.argmax(still[first]))]
     size = f"no scatter, usually {usual[AXES.index(axis)]:.3g}"
-    found = f"axis {axis} stands still in dwell '{labels[first]}' (row {first + 1}): {size}"
+    found = f"axis {axis} is constant in dwell '{labels[first]}' (row {first + 1}): {size}"
     if mapping.faulty == "refuse":
         raise DataRejected(
             f"{where}: {found} ({rows.size} such dwells); samples of the sensor are needed; measure them again, or add "
@@ -138,9 +138,7 @@ def sound_dwells(
         )
     if mapping.faulty == "leave-out":
         sound[rows] = False
-    return sound, (
-        f"{rows.size} dwells with an axis that stands still {'kept' if sound.all() else 'left out'}: {found}",
-    )
+    return sound, (f"{rows.size} dwells with a constant axis {'kept' if sound.all() else 'left out'}: {found}",)
 
 
 def refuse_or_remark(
@@ -151,7 +149,7 @@ def refuse_or_remark(
     Raises
     ------
     DataRejected
-        There are faults and the mapping does not say what to do with them; or an axis stands still all the time.
+        There are faults and the mapping does not state their treatment; or an axis is always constant.
     """
     if not found:
         return ()

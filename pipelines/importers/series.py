@@ -1,4 +1,4 @@
-"""A record of evenly spaced samples from a file or an import: what an Allan deviation or a spectrum is computed from."""
+"""A record of evenly spaced samples from a file or an import: input of an Allan deviation or a spectrum."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 UNEVEN = 0.5
-"""Part of a step by which a time may be off the even grid; beyond, a sample is missing or doubled."""
+"""Largest deviation of a time from the even grid, in steps; above it a sample is missing or duplicated."""
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
@@ -59,7 +59,7 @@ def series_of_file(
     ----------
     columns : names, or numbers from 1 for a text file without a header; all columns of numbers but the time where none is given
     time : column of the time, in ``time_unit``; rate_hz : Hz; one of the two is needed
-    unit : of the output, as it is to be printed
+    unit : of the output, for printed results
 
     Raises
     ------
@@ -89,7 +89,7 @@ def series_of_file(
 
 
 def series_of_run(run: Run, record: int | None = None) -> EvenSeries:
-    """The longest stretch at rest of an import's samples, or the one of a number.
+    """The longest stretch at rest of an import's samples, or the one with the given number.
 
     Raises
     ------
@@ -143,6 +143,6 @@ def _rate(time: Array, where: str) -> float:
         raise DataRejected(
             f"{where}: after row {off[0] + 1} the time steps by {time[off[0] + 1] - time[off[0]]:.6g} s, {step:.6g} s is the "
             f"step elsewhere ({off.size} such places), evenly spaced samples are needed; cut the record there, or give --rate "
-            "without --time if the times are only written late"
+            "without --time if only the time stamps are late"
         )
     return 1.0 / float(typical)

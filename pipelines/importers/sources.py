@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Source(files.SourceFile):
-    """Where a recording came from; the files where it has several."""
+    """The source of a recording; the files if it has several."""
 
     parts: tuple[files.SourceFile, ...] = ()
 
@@ -37,13 +37,13 @@ class Source(files.SourceFile):
 def read(
     paths: Sequence[Path], *, join: str = "", time: str = "", group: str = ""
 ) -> tuple[Content, files.SourceFile, tuple[int, ...]]:
-    """A recording, where it came from, and the rows before which another file begins.
+    """A recording, its source, and the rows before which another file begins.
 
     Parameters
     ----------
-    join : ``rows``: the files follow one another; ``columns``: they stand side by side.
-    time : the column of time, by name or number; empty where none is mapped.
-    group : the group of channels wanted of each file that has several.
+    join : ``rows``: the files follow one another; ``columns``: they are side by side.
+    time : the column of time, by name or number; empty if not mapped.
+    group : the group of channels of each file with several.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def read(
 
 
 def _after(contents: list[Content], names: list[str], time: str) -> tuple[Content, tuple[int, ...]]:
-    """Files one after another; a clock that begins anew is set behind the file before."""
+    """Files one after another; a clock that restarts is continued after the file before."""
     first = contents[0]
     columns = list(first.table.columns)
     tables, breaks, remarks = [first.table], [0], list(first.remarks)
@@ -81,13 +81,13 @@ def _after(contents: list[Content], names: list[str], time: str) -> tuple[Conten
         label = column_name(columns, time)
         table, shifted = _behind(tables[-1], content.table, label)
         if shifted:
-            remarks.append(f"{name}: its clock begins anew, set behind {names[len(tables) - 1]}")
+            remarks.append(f"{name}: its clock restarts; it is continued after {names[len(tables) - 1]}")
         tables.append(table)
     return replace(first, table=pd.concat(tables, ignore_index=True), remarks=tuple(remarks)), tuple(breaks[1:])
 
 
 def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, bool]:
-    """A table whose clock goes on behind the one before it, and whether it had to be moved."""
+    """A table whose clock continues that of the table before, and whether it was shifted."""
     if not time or before[time].dtype.kind not in "fiu" or table[time].dtype.kind not in "fiu":
         return table, False
     last, begin = float(before[time].iloc[-1]), float(table[time].iloc[0])
@@ -98,7 +98,7 @@ def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.Da
 
 
 def _beside(contents: list[Content], names: list[str], time: str) -> Content:
-    """Files side by side: by their clocks where both have the column of time, else row by row."""
+    """Files side by side: by their clocks if both have the column of time, else row by row."""
     first = contents[0]
     columns: dict[str, Any] = {str(name): column for name, column in first.table.items()}
     units, remarks = dict(first.units), list(first.remarks)
@@ -121,14 +121,14 @@ def _beside(contents: list[Content], names: list[str], time: str) -> Content:
     return replace(first, table=pd.DataFrame(columns), units=units, remarks=tuple(remarks))
 
 
-def _at(wanted: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArray[np.float64]:
-    """A column read at other times; not a number outside its own."""
-    at, given = _instants(wanted, where), _instants(own, where)
+def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArray[np.float64]:
+    """A column read at other times; NaN outside its own times."""
+    at, given = _instants(times, where), _instants(own, where)
     if np.any(np.diff(given) < 0.0):
         raise DataRejected(f"{where}: time runs back, it must not; sort the rows")
     numbers = values.as_numbers(data, where)
     inside = np.interp(at, given, numbers)
-    slack = 2.0 * clocks.typical_step(given)  # the last reading of a slow channel holds until the next would come
+    slack = 2.0 * clocks.typical_step(given)  # the last reading of a slow channel is valid until the next is due
     return np.where((at < given[0] - slack) | (at > given[-1] + slack), np.nan, inside)
 
 

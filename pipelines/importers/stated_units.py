@@ -1,4 +1,4 @@
-"""Units that files state, as the mapping calls them: taken where none is given, and never contradicted in silence."""
+"""Units stated by files, in the names of the mapping: used if none is given; contradictions are reported."""
 
 from __future__ import annotations
 
@@ -29,19 +29,23 @@ TEMPERATURE = {
 
 
 def output_unit(text: str) -> str:
-    """A unit of the output as the mapping calls it; empty for one that is not known. G is gravity, g the same."""
+    """A unit of the output in the name of the mapping; empty if unknown. G is gravity, g the same."""
     return OUTPUT.get(text.strip().lower(), "")
 
 
-def column_name(columns: list[str], wanted: str) -> str:
-    """A column by its name, or by its number from 1; empty where there is neither."""
-    if wanted in columns:
-        return wanted
-    return columns[int(wanted) - 1] if wanted.isdecimal() and 1 <= int(wanted[:9]) <= len(columns) else ""
+def column_name(columns: list[str], name_or_number: str) -> str:
+    """A column by its name, or by its number from 1; empty if there is neither."""
+    if name_or_number in columns:
+        return name_or_number
+    return (
+        columns[int(name_or_number) - 1]
+        if name_or_number.isdecimal() and 1 <= int(name_or_number[:9]) <= len(columns)
+        else ""
+    )
 
 
 def completed(given: dict[str, Any], content: Content) -> dict[str, Any]:
-    """The content of a mapping with the unit of the output that the file states, where none is given."""
+    """The content of a mapping with the unit of the output that the file states, if none is given."""
     units, columns = dict(given.get("units", {})), given.get("columns", {})
     if "output" in units or not all(axis in columns for axis in "xyz"):
         return given
@@ -50,7 +54,7 @@ def completed(given: dict[str, Any], content: Content) -> dict[str, Any]:
 
 
 def refuse_contradiction(mapping: Mapping, content: Content, where: str) -> None:
-    """Refuse units that are others than those that the file states for its columns."""
+    """Refuse units that contradict those stated by the file."""
     stated = _of_axes(mapping.columns, content) - {"", mapping.units.output}
     if stated:
         raise WrongUse(
@@ -61,8 +65,7 @@ def refuse_contradiction(mapping: Mapping, content: Content, where: str) -> None
     unit = TEMPERATURE.get(content.units.get(heat, "").strip().lower(), "")
     if unit and unit != mapping.units.temperature:
         raise WrongUse(
-            f"{where}: column '{shown(heat)}' states {unit}, {mapping.units.temperature} is taken; "
-            f"add --units temperature={unit}"
+            f"{where}: column '{shown(heat)}' states {unit}, {mapping.units.temperature} is used; add --units temperature={unit}"
         )
 
 

@@ -1,4 +1,4 @@
-"""The static stretches of a record: by labels, by blocks, by positions logged back to back, or found in the record itself."""
+"""The static stretches of a record: by labels, by blocks, by positions logged back to back, or detected in the record itself."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from pipelines.importers.mapping import Mapping
 
-_MOST_TOLD = 6
+_MOST_LISTED = 6
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Stretches:
     remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Their number."""
         return len(self.first)
 
 
@@ -47,14 +47,14 @@ def stretches(
 
     Parameters
     ----------
-    labels : of every sample, where a column has them.
+    labels : of every sample, if a column has them.
     output, time : (n, 3) and (n,), s.
-    breaks : samples before which rows or time are missing: no stretch goes over one.
+    breaks : samples before which rows or time are missing: no stretch crosses one.
 
     Raises
     ------
     DataRejected
-        A stretch holds several positions, or a pose names a label that is not there.
+        A stretch holds several positions, or a label of a pose does not exist.
     """
     edges = [0, *(k for k in breaks if 0 < k < len(time)), len(time)]
     if labels is not None:
@@ -118,7 +118,7 @@ def _found(output: NDArray[np.float64], time: NDArray[np.float64], edges: list[i
 
 
 def _refuse_several_positions(found: Stretches, output: NDArray[np.float64], where: str) -> None:
-    """Refuse stretches whose scatter no noise makes: positions logged one after another."""
+    """Refuse stretches with more scatter than noise: positions logged one after another."""
     counts = [change_of_level.several_levels(output[a:b]) for a, b in zip(found.first, found.last, strict=True)]
     several = [k for k, count in enumerate(counts) if count > 1]
     if not several:
@@ -138,7 +138,7 @@ def _refuse_several_positions(found: Stretches, output: NDArray[np.float64], whe
 
 
 def _named(found: Stretches, mapping: Mapping, where: str) -> Stretches:
-    """The stretches that the poses name; all where no pose is named."""
+    """The stretches with a label of a pose; all without poses."""
     if not mapping.poses:
         return found
     missing = [label for label in mapping.poses if label not in found.labels]

@@ -1,7 +1,8 @@
-"""How a text of numbers is laid out: divider, decimal sign, where the table begins, and which line names its columns.
+"""The layout of a text of numbers: divider, decimal sign, where the table begins, and which line names its columns.
 
-Nothing is assumed about the beginning of a file, where devices write their settings. The layout is read from the lines further
-down, which are all alike, and the table begins with the first line that is like them.
+Nothing is assumed about the beginning of a file, which often has settings of the device. The layout is read from the lines
+further
+down, which are uniform, and the table begins with the first line of the same form.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _CANDIDATES = (
     *(("|", "."), ("|", ",")),
 )
 _ALIKE = 0.9
-"""Share of sampled lines with the usual count of fields, from which on a divider divides them."""
+"""Share of sampled lines with the usual count of fields, needed for a divider."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,8 @@ class Layout:
 
     divider, decimal : a pattern for blanks; point or comma
     first : index of the first line of the table
-    names : of the columns; empty where no line names them
-    header : index of the line with the names; −1 where there is none, or where it is a comment
+    names : of the columns; empty if no line names them
+    header : index of the line with the names; −1 if there is none, or if it is a comment
     integers : whether the names are only the numbers 0, 1, 2, …
     units : of the columns by a line of their own below the names; empty otherwise
     width : count of fields, a last empty one not counted
@@ -74,12 +75,12 @@ def fields_of(line: str, divider: str) -> list[str]:
 
 def is_number(word: str, decimal: str = ".") -> bool:
     """Whether a word is a finite number, written with this decimal sign."""
-    # a pattern takes time that grows with the square of a word's length, and no number is that long
+    # a pattern takes time that grows with the square of a word's length, and no number has that length
     return len(word) <= _LONGEST and (_POINT if decimal == "." else _COMMA).fullmatch(word) is not None
 
 
 def layout(lines: Sequence[str]) -> Layout | None:
-    """The layout of a text's lines; None where no line holds anything but comments."""
+    """The layout of a text's lines; None if all lines are comments."""
     filled = [k for k in range(len(lines)) if not is_comment(lines[k])]
     if not filled:
         return None
@@ -158,7 +159,7 @@ def _is_row(row: list[str], decimal: str, numeric: list[bool]) -> bool:
     """Whether a line is like the rows of the table: numbers, or gaps, where they have numbers, and one number at least."""
     if len(row) != len(numeric):
         return False
-    words = [word for wanted, word in zip(numeric, row, strict=True) if wanted]
+    words = [word for numeric_here, word in zip(numeric, row, strict=True) if numeric_here]
     numbers = [is_number(word, decimal) for word in words]
     return any(numbers) and all(known or word.lower() in _GAPS for known, word in zip(numbers, words, strict=True))
 
@@ -189,7 +190,7 @@ def _only_numbered(rows: list[list[str]]) -> bool:
 
 
 def _counts(row: list[str]) -> bool:
-    """Whether a line only numbers the columns: 0, 1, 2, … or 1, 2, 3, …, perhaps behind an empty field."""
+    """Whether a line only numbers the columns: 0, 1, 2, … or 1, 2, 3, …, possibly after an empty field."""
     words = row[1:] if row and not row[0] else row
     if len(words) < 3 or not all(word.isdigit() and word.isascii() and len(word) < 6 for word in words):
         return False
@@ -198,7 +199,7 @@ def _counts(row: list[str]) -> bool:
 
 
 def _commented(lines: Sequence[str], first: int, divider: str, width: int) -> tuple[str, ...]:
-    """Names in the last comment above the table, where it has as many words as there are columns; empty otherwise."""
+    """Names in the last comment above the table, if it has as many words as there are columns; else empty."""
     for k in range(first - 1, -1, -1):
         text = lines[k].strip()
         if not text.startswith(COMMENTS):

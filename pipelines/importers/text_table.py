@@ -1,4 +1,4 @@
-"""Text of numbers as columns: decoded, its layout found and said, broken rows refused."""
+"""Text of numbers as columns: decoded, with its layout detected and stated; damaged rows are refused."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def decoded(data: bytes, where: str) -> tuple[str, str]:
     Raises
     ------
     DataRejected
-        It is none of these.
+        It has none of these encodings.
     """
     marked = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
@@ -47,7 +47,7 @@ def decoded(data: bytes, where: str) -> tuple[str, str]:
 
 
 def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
-    """The columns of a text, named as there ("1", "2", … without a header), and what was found about its layout."""
+    """The columns of a text, named as there ("1", "2", … without a header), and its detected layout."""
     lines = logical_lines(text)
     found = layout(lines)
     if found is None:
@@ -75,7 +75,7 @@ def logical_lines(text: str) -> list[str]:
         if together.count('"') % 2 == 0 or not _OPEN.search(together):
             rows.append(together)
             waiting = []
-        elif len(waiting) > _MOST_LINES:  # a quote that is no quotation
+        elif len(waiting) > _MOST_LINES:  # a quote that does not begin a quotation
             rows += waiting
             waiting = []
     return rows + waiting
@@ -153,5 +153,5 @@ def _remarks(found: Layout, lines: Sequence[str], encoding: str) -> tuple[str, .
 
 
 def divider_name(divider: str) -> str:
-    """A divider for people."""
+    """A divider as text."""
     return {"\t": "tab", BLANKS: "blanks", ",": "comma", ";": "semicolon", "|": "bar"}[divider]

@@ -1,4 +1,4 @@
-"""A transfer function that was measured elsewhere: points from a CSV, judged as those of a sweep are."""
+"""A transfer function of another system: points from a CSV, judged as those of a sweep."""
 
 from __future__ import annotations
 
@@ -73,12 +73,12 @@ def transfer_points(table: pd.DataFrame, name: str) -> Points:
 def import_transfer(
     path: Path, unit: str, effects: Sequence[str] = ("second_order", "delay"), archive: str | None = None
 ) -> TransferImport:
-    """The diagnosis of a transfer function in a file; points, findings and source are kept as a run of the archive.
+    """The diagnosis of a transfer function in a file; points, findings and source are stored as a run of the archive.
 
     Raises
     ------
     WrongUse
-        An effect is not known.
+        An effect is unknown.
     DataRejected
         The file, or its points, cannot be judged.
     """

@@ -1,4 +1,4 @@
-"""Whether the numbers of a record agree with the unit that was given for its output."""
+"""Check of the numbers of a record against the given unit of its output."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from schemas.errors import DataRejected
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 LIKELY = (0.5, 2.0)
-"""Median norm over gravity of a record in the unit given: bias and hand shaking stay well inside."""
+"""Median norm over gravity of a record in the unit given: bias and shaking by hand stay well below."""
 SURE = 0.05
 GRAVITY = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2, "mg": 1e3}
 """Size of gravity in the units that need no sensitivity."""
@@ -24,17 +24,17 @@ def size_of(output: NDArray[np.float64]) -> float:
 
 
 def looks_like(size: float) -> str:
-    """The unit without a sensitivity in which gravity has this size, within a factor of two; empty where none has."""
+    """The unit without a sensitivity in which gravity has this size, within a factor of two; empty if there is none."""
     return next((unit for unit, one in GRAVITY.items() if LIKELY[0] < size / one < LIKELY[1]), "")
 
 
 def refuse_other_unit(output: NDArray[np.float64], claimed: str, where: str) -> tuple[str, ...]:
-    """Refuse a record whose norm contradicts the unit; remarks where it is only unusual.
+    """Refuse a record whose norm contradicts the unit; remarks if it is only unusual.
 
     Parameters
     ----------
     output : (n, 3) in the file's own numbers.
-    claimed : the unit that was given.
+    claimed : the given unit.
     """
     size = size_of(output)
     other = looks_like(size)
@@ -42,7 +42,7 @@ def refuse_other_unit(output: NDArray[np.float64], claimed: str, where: str) -> 
         if LIKELY[0] < size / GRAVITY[claimed] < LIKELY[1]:
             return ()
         advice = (
-            f"the unit looks like {other}, say so with --units output={other}"
+            f"the unit looks like {other}, give --units output={other}"
             if other
             else "numbers of a converter are LSB, of a voltmeter V or mV: --units output=LSB|V|mV"
         )
@@ -69,11 +69,13 @@ def _counts(output: NDArray[np.float64], size: float, close: str, where: str) ->
     whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
     if close and not whole:
         raise DataRejected(
-            f"{where}: the norm of the output is {size:.5g} and its values are no whole numbers, counts are needed if its "
-            f"unit is LSB; the unit looks like {close}, say so with --units output={close}"
+            f"{where}: the norm of the output is {size:.5g} and its values are not whole numbers, counts are needed if its "
+            f"unit is LSB; the unit looks like {close}, give --units output={close}"
         )
     if close:
         return (f"CHECK THE UNIT: the norm of the output is {size:.5g}, as gravity in {close}; LSB was given",)
     if not whole and np.ptp(output[:1000]) < 8.0:
-        return ("CHECK THE UNIT: no whole numbers within a few units of one another, but LSB was given",)
+        return (
+            "CHECK THE UNIT: values within a few units of one another that are not whole numbers, but LSB was given",
+        )
     return ()

@@ -1,6 +1,6 @@
-"""How much a packed file may become: 3 MB can unpack to 10 GB, and nobody who brings them knows.
+"""Limits of unpacking: 3 MB can unpack to 10 GB without notice.
 
-The limit is on what is unpacked, in all and as a multiple of what was brought, and holds for gzip, for the compressed variables
+The limit applies to the unpacked size, in total and as a multiple of the packed size, for gzip, for the compressed variables
 of MATLAB, and for Parquet, whose dictionaries and runs of equal values unpack as well.
 """
 
@@ -22,16 +22,16 @@ MOST_BYTES = 2**30
 MOST_TIMES = 100
 """What is unpacked over what is brought; measured records reach 10, with columns that never change 30."""
 FREE_BYTES = 2**26
-"""Up to here no multiple is too large: tables of constants are small."""
+"""Size up to which any multiple is allowed: tables of constants are small."""
 PIECE = 2**20
 
 
 def refuse_larger(size: int, packed: int, where: str) -> None:
-    """Refuse what unpacks to too much.
+    """Refuse a file that unpacks to too much.
 
     Parameters
     ----------
-    size : bytes unpacked, so far or as the file itself says.
+    size : bytes unpacked, so far, or as stated by the file.
     packed : bytes of the file.
     """
     if size <= min(MOST_BYTES, max(FREE_BYTES, MOST_TIMES * packed)):
@@ -43,7 +43,7 @@ def refuse_larger(size: int, packed: int, where: str) -> None:
 
 
 def gunzipped(data: bytes, where: str) -> bytes:
-    """What a gzip file holds.
+    """The content of a gzip file.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def gunzipped(data: bytes, where: str) -> bytes:
 
 
 def inflated(data: bytes, room: int, packed: int, where: str) -> bytes:
-    """What a zlib stream holds.
+    """The content of a zlib stream.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Columns of foreign tables as numbers: what is none, is a flag or a date, or lies where nothing measured can lie is refused."""
+"""Columns of foreign tables as numbers: other values, flags, dates and impossible values are refused."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "n": (1.0, 2.0**53),
     **dict.fromkeys(("dwell", "soak", "record"), (0.0, 2.0**53)),
 }
-"""Where values of a column with a meaning can lie, in its unit; other columns lie within ± ``LARGEST``."""
+"""Possible values of a column with a meaning, in its unit; other columns lie within ± ``LARGEST``."""
 
 _UNITS = {"s": "s", "C": "°C", "g": "g", "deg": "°", "hz": "Hz", "V": "V"}
 
@@ -55,7 +55,7 @@ def seconds(values: pd.Series, where: str) -> NDArray[np.float64]:
 
 
 def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> NDArray[np.float64]:
-    """The values of a column, nan where one is no number.
+    """The values of a column, NaN for others.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def _has_flags(values: pd.Series) -> bool:
 
 
 def outside(values: NDArray[np.float64], column: str) -> tuple[int, str]:
-    """The first row whose value lies where none can, and what is needed there; −1 where all are inside. Gaps count as inside."""
+    """The first row with an impossible value, and the possible range; −1 if there is none. Gaps count as inside."""
     low, high = BOUNDS.get(column, (-LARGEST, LARGEST))
     bad = np.flatnonzero((values < low) | (values > high))
     if not bad.size:
@@ -99,12 +99,12 @@ def _range(low: float, high: float, unit: str) -> str:
 def refuse_outside(
     values: NDArray[np.float64], column: str, where: str, *, label: str = "", first_row: int = 1
 ) -> None:
-    """Refuse values where none can lie, with row, value and bounds.
+    """Refuse impossible values, with row, value and bounds.
 
     Parameters
     ----------
     column : whose bounds hold; those of any number for one without a meaning.
-    label : what the message calls it; the same by default.
+    label : its name in the message; the same by default.
     """
     row, needed = outside(values, column)
     if row >= 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
@@ -11,8 +11,10 @@ from pipelines.archive import code_hash, files, stage_key
 from pipelines.chain.runner import Runner
 from pipelines.diagnosis.diagnose import document, examined
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
+from pipelines.inquiry.endings import NO_FOLLOW_UP, Ending, ambiguous_classes, ending_of, no_follow_up
 from pipelines.inquiry.explanation import shows, why
 from pipelines.inquiry.followup import circumstances, follow_up
+from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from pipelines.inquiry.lineage import RunSequence
 from pipelines.jobs.job import Job
 from schemas.recipe import Recipe
@@ -23,50 +25,20 @@ if TYPE_CHECKING:
     from inertial.criticism.diagnosis import Diagnosis
     from inertial.criticism.proposals import Proposal
     from inertial.planning.sequences import SequenceStep
-    from inertial.state import State
     from pipelines.archive import Archive, Records, Run
     from pipelines.tables.dwells import Measured
     from schemas.progress import Progress
 
-End = Literal[
-    "adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"
-]
 
 EXTRA = 0.3
 """Default budget of follow-ups, as a share of the first run's station time."""
 
 MOST_ROUNDS = 6
 
-NO_FOLLOW_UP: frozenset[End] = frozenset({"blocked", "not_judged"})
-"""Endings after which nothing is measured for effects that are not visible: the data do not judge the model at all."""
 
 FOLLOW_UP = ("capture", "validate", "reduce")
 SOURCES = ("inertial", "pipelines.diagnosis.diagnose", "pipelines.tables.dwells")
 FILE = "inquiry.json"
-
-
-@dataclass(frozen=True)
-class JointDiagnosis:
-    """The diagnosis of all runs of a lineage together."""
-
-    lineage: RunSequence
-    effects: tuple[str, ...]
-    document: dict[str, Any]
-    measured: Measured
-    diagnosis: Diagnosis | None
-    following: Proposed
-
-    @property
-    def state(self) -> State:
-        """The dwells of the diagnosis."""
-        if self.diagnosis is None:
-            raise LookupError("an inquiry in which every unit has a data fault has no state")
-        return self.diagnosis.problem.lot.state
-
-    @property
-    def ambiguous(self) -> list[list[str]]:
-        """Classes of more than one effect."""
-        return [group["effects"] for group in self.document["classes"] if len(group["effects"]) > 1]
 
 
 @dataclass(frozen=True)
@@ -84,14 +56,6 @@ class FollowUp:
     why: tuple[str, ...]
     minutes: float
     begun: bool = False
-
-
-@dataclass(frozen=True)
-class Ending:
-    """Why the inquiry ends."""
-
-    end: End
-    text: str
 
 
 @dataclass
@@ -137,7 +101,7 @@ class Inquiry:
         begun = self._begun()
         if begun is not None:
             return begun
-        ended = _ended(joint)
+        ended = ending_of(joint)
         showing = joint.following.showing
         if ended is not None:
             if (
@@ -149,7 +113,9 @@ class Inquiry:
                 return self._follow_up((showing,), (shows(joint.state, self.effects, showing),))
             return ended
         if len(self.lineage.runs) > MOST_ROUNDS:
-            return Ending("nothing_parts", f"{MOST_ROUNDS} follow-ups have not discriminated between {_classes(joint)}")
+            return Ending(
+                "nothing_parts", f"{MOST_ROUNDS} follow-ups have not discriminated between {ambiguous_classes(joint)}"
+            )
         return self._proposed(joint)
 
     def _proposed(self, joint: JointDiagnosis) -> FollowUp | Ending:
@@ -161,10 +127,11 @@ class Inquiry:
         if not affordable:
             proposals = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
             if not proposals:
-                return Ending("nothing_parts", _not_parted(joint))
+                return Ending("nothing_parts", no_follow_up(joint))
             needed = sum(p.minutes for p in proposals)
             text = (
-                f"discriminating between {_classes(joint)} needs {needed:.0f} min more station time, {max(left, 0.0):.0f} of "
+                f"discriminating between {ambiguous_classes(joint)} needs {needed:.0f} min more station time, "
+                f"{max(left, 0.0):.0f} of "
                 f"{self.budget:.0f} min are left; give --budget {self.spent + needed:.0f}"
             )
             return Ending("budget", text)
@@ -285,45 +252,6 @@ def _continued(before: Records) -> Any:
             capture(station, job.recipe, job.lot, records, progress=progress, events=records.events)
 
     return measure
-
-
-def _ended(joint: JointDiagnosis) -> Ending | None:
-    document = joint.document
-    if joint.diagnosis is None:
-        return Ending("blocked", "every unit has a data fault; correct it, then diagnose again")
-    if document["adequate"]:
-        return Ending("adequate", "the model is adequate: the residuals are at the noise floor")
-    if document["adequate"] is None:
-        return Ending("not_judged", f"the model cannot be judged: {document['reason']}")
-    if joint.ambiguous:
-        return None
-    if not document["classes"]:
-        return Ending("unexplained", "the model is not adequate, and no effect of the catalogue explains the residuals")
-    return Ending("told_apart", _told_apart(document))
-
-
-def _told_apart(document: dict[str, Any]) -> str:
-    """That every class has one effect, and which of them is not recommended as no dwells left out judge it."""
-    groups = document["classes"]
-    text = f"every class contains one effect: {', '.join(g['effects'][0] for g in groups)}"
-    unjudged = [g["effects"][0] for g in groups if g.get("scope") != "data" and g.get("heldout_after_ug", 0.0) is None]
-    if not unjudged:
-        return text
-    return f"{text}; not recommended yet: {', '.join(unjudged)}, which no dwells left out can judge: confirm with a fresh run"
-
-
-def _not_parted(joint: JointDiagnosis) -> str:
-    """Why there is no follow-up: no measurement of the station parts a class, or none is sure enough to."""
-    if any(joint.following.twins):
-        return f"no measurement on this station discriminates between {_classes(joint)}"
-    return (
-        f"no follow-up was found that is expected to discriminate between {_classes(joint)}: they differ too little beside the "
-        "noise; measure the plan again with longer dwells, or more units"
-    )
-
-
-def _classes(joint: JointDiagnosis) -> str:
-    return ", and ".join(" | ".join(group) for group in joint.ambiguous)
 
 
 def _report_fields(measured: Measured, effects: Sequence[str], diagnosis: Diagnosis | None) -> dict[str, Any]:

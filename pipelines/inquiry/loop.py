@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.inquiry.inquiry import FOLLOW_UP, Ending, FollowUp, Inquiry, JointDiagnosis, begin
+from pipelines.inquiry.endings import Ending
+from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, Inquiry, begin
+from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from schemas.progress import silent
 
 if TYPE_CHECKING:

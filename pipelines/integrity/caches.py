@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.archive import Run, derived
-from pipelines.archive.listing import agrees, info_of, noted_lines, stamp_of
+from pipelines.archive.listing import agrees, info_of, stamp_of, stored_lines
 from pipelines.certificates.entries import FOLDER
-from pipelines.certificates.ledger_index import DIGITS, NOTED, all_read, noted_events, stamps_of
+from pipelines.certificates.ledger_index import DIGITS, INDEX_FOLDER, all_read, indexed_events, stamps_of
 from pipelines.integrity.findings import CHANGED
 from schemas.errors import ArchiveUnusable
 
@@ -21,7 +21,7 @@ REMEDY = "remove the file, it is made again automatically"
 def check_list(archive: Archive, checked: CheckedPart) -> None:
     """Lines of the list must agree with the runs, where these were not changed since."""
     place = archive.root / "index" / "list.json"
-    lines, state = noted_lines(place)
+    lines, state = stored_lines(place)
     if state == derived.EDITED:
         checked.wrong(CHANGED, place, f"was edited since it was made: {REMEDY}")
     for name, (stamp, line) in lines.items():
@@ -40,8 +40,8 @@ def check_ledger_index(archive: Archive, checked: CheckedPart) -> None:
     """Events of the index must agree with the files of the ledger, where these were not changed since."""
     stamps = stamps_of(archive.root / FOLDER)
     for digit in DIGITS:
-        place = archive.root / NOTED / f"{digit}.noted"
-        stored, state = noted_events(place)
+        place = archive.root / INDEX_FOLDER / f"{digit}.noted"
+        stored, state = indexed_events(place)
         if state == derived.EDITED:
             checked.wrong(CHANGED, place, f"was edited since it was made: {REMEDY}")
         own = stamps.get(digit, {})

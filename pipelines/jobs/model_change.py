@@ -51,7 +51,7 @@ class ModelChange:
 _added: set[str] = set()
 
 
-def wanted(
+def change_from_options(
     effects: str = "",
     model: Path | None = None,
     limits: str = "",

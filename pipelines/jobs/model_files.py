@@ -15,7 +15,8 @@ from pipelines.archive import files
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
 from schemas.model import load_model, parse_model
-from schemas.recipe import FormulaSpec, read_text
+from schemas.recipe import FormulaSpec
+from schemas.toml_files import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -19,8 +19,9 @@ from pipelines.jobs.model_files import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import is_file, shown
 from schemas.limits import Limits, parse_limits, unknown_limits
-from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, explain, parse_recipe, read_text
+from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, parse_recipe
 from schemas.serials import refuse_unusable_serials
+from schemas.toml_files import explain, read_text
 from schemas.units import AXES
 
 if TYPE_CHECKING:

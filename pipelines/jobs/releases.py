@@ -75,9 +75,9 @@ def model_digest(change: ModelChange) -> str:
     return digest({"effects": sorted(change.effects or ()), "formulas": formulas})
 
 
-def keep_evidence(archive: Archive, wanted: ModelChange, document: Mapping[str, Any], runs: list[str]) -> str:
+def keep_evidence(archive: Archive, change: ModelChange, document: Mapping[str, Any], runs: list[str]) -> str:
     """Store a what-if in the archive; return its name."""
-    model = model_digest(wanted)
+    model = model_digest(change)
     content = {"schema": SCHEMA, "model": model, "runs": sorted(runs), **document}
     name = f"{model[:10]}-{digest(content)[:10]}"
     archive.prepare()
@@ -87,9 +87,9 @@ def keep_evidence(archive: Archive, wanted: ModelChange, document: Mapping[str, 
     return name
 
 
-def evidence_for(archive: Archive, wanted: ModelChange, device: str, station: str) -> dict[str, Any] | None:
+def evidence_for(archive: Archive, change: ModelChange, device: str, station: str) -> dict[str, Any] | None:
     """The newest what-if of a model with lots of this device and station; None without one."""
-    model = model_digest(wanted)
+    model = model_digest(change)
     matches: list[dict[str, Any]] = []
     for place in (archive.root / EVIDENCE).glob(f"{model[:10]}-*.json"):
         content = files.read_json(place)
@@ -103,7 +103,7 @@ def evidence_for(archive: Archive, wanted: ModelChange, device: str, station: st
 
 def release(
     archive: Archive,
-    wanted: ModelChange,
+    change: ModelChange,
     since: datetime,
     *,
     device: str = "",
@@ -121,13 +121,13 @@ def release(
     """
     if not reason.strip():
         raise WrongUse("release: no reason is given, one is needed; give --reason TEXT")
-    evidence = evidence_for(archive, wanted, device, station)
+    evidence = evidence_for(archive, change, device, station)
     if not force:
-        _refuse_without(evidence, wanted, device, station)
+        _refuse_without(evidence, change, device, station)
     archive.prepare()
     content: dict[str, Any] = {
         "schema": SCHEMA,
-        "model": {**wanted.of_model(), "formulas": [one.model_dump(mode="json") for one in wanted.formulas]},
+        "model": {**change.of_model(), "formulas": [one.model_dump(mode="json") for one in change.formulas]},
         "from": since.isoformat(),
         "device": device,
         "station": station,
@@ -149,9 +149,9 @@ def _published(archive: Archive, content: dict[str, Any]) -> int:
     return number
 
 
-def _refuse_without(evidence: dict[str, Any] | None, wanted: ModelChange, device: str, station: str) -> None:
+def _refuse_without(evidence: dict[str, Any] | None, change: ModelChange, device: str, station: str) -> None:
     where = "".join([f" of {device}" if device else "", f" on {station}" if station else ""])
-    name = wanted.model_name or "the model"
+    name = change.model_name or "the model"
     if evidence is None:
         raise WrongUse(
             f"release: nothing in the archive shows the effect of {name} on lots{where}, a what-if is needed; run "

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from schemas.errors import WrongUse
 from schemas.foreign import foreign, shown
-from schemas.recipe import parse_toml, read_text
 from schemas.serials import refuse_unusable_serials, serial_fault
+from schemas.toml_files import parse_toml, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -92,11 +92,11 @@ def _of_file(archive: Archive, target: str) -> Lineage:
         gatherer.certificates_of(run)
     focus = [node.id for node in gatherer.graph.nodes.values() if place in {node.file, node.about.get("manifest")}]
     if not focus:
-        wanted = files.sha256(Path(target)) if Path(target).is_file() else files.sha256(archive.root / target)
+        digest = files.sha256(Path(target)) if Path(target).is_file() else files.sha256(archive.root / target)
         for name in archive.run_ids():
             gatherer.run(archive.run(name))
             gatherer.certificates_of(archive.run(name))
-        focus = [node.id for node in gatherer.graph.nodes.values() if node.sha256 == wanted]
+        focus = [node.id for node in gatherer.graph.nodes.values() if node.sha256 == digest]
     if not focus:
         raise ArchiveUnusable(
             f"lineage: the content of {target} is no table and no source of archive {archive.root}; name another file"
@@ -128,5 +128,5 @@ def _runs_of(archive: Archive, place: str) -> list[str]:
     return []
 
 
-def _runs_where(archive: Archive, wanted: Callable[[dict[str, Any]], bool]) -> list[str]:
-    return [name for name in archive.run_ids() if wanted(archive.run(name).about)]
+def _runs_where(archive: Archive, condition: Callable[[dict[str, Any]], bool]) -> list[str]:
+    return [name for name in archive.run_ids() if condition(archive.run(name).about)]

@@ -101,7 +101,9 @@ class ReachableUncertainty(TypedDict):
     frame: Annotated[str, "`intrinsic` or `fixture`"]
     validity_months: int
     grade_source: str
-    not_stated: Annotated[dict[str, str], "entries of `[uncertainty]` that are missing, with what each rules"]
+    not_stated: Annotated[
+        dict[str, str], "entries of `[uncertainty]` that are missing, with the quantities that each dominates"
+    ]
     quantities: list[ReachableQuantity]
     unreachable: Annotated[list[str], "limits that cannot be met, and why; empty: none"]
     remarks: list[str]

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from pipelines.procedures.base import FigureSpec, Part, Procedure, ProcedureStep
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.recipe import explain
+from schemas.toml_files import explain
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -42,7 +42,7 @@ SHARED = ("base", "columns", "recorded", "transfer_figures", "transfer_plots")
 
 
 class IncompleteProcedure(Exception):
-    """A module that defines no procedure, or one whose name or figure another has: its author repairs the module."""
+    """A module without a procedure, or with a name or figure that another has: its author must correct it."""
 
 
 def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
@@ -81,7 +81,7 @@ def parts_of(recipe: Recipe) -> list[Part]:
     Raises
     ------
     RecipeInvalid
-        A procedure is not known, or a key of its part is not usable.
+        A procedure is not known, or a key of its part is invalid.
     """
     parts: list[Part] = []
     for number, content in enumerate(recipe.procedures, start=1):

@@ -1,4 +1,4 @@
-"""What a test procedure is: its part of a recipe, its steps, its reduction to points, its model and figures, its picture."""
+"""A test procedure: its part of a recipe, its steps, its reduction to points, its model and figures, its picture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 REFERENCE = "@reference"
-"""The name under which the samples of the reference sensor stand beside those of the units; no serial begins like this."""
+"""The name of the reference sensor in the tables of samples; no serial begins with it."""
 StepKind = Literal["dwell", "verification", "allan", "procedure"]
 
 
@@ -95,7 +95,7 @@ class FigureValue:
     """A figure of one unit and axis.
 
     ``low`` and ``high`` are the ends of a 95 % interval. Where ``identified`` is False the value passes no limit, and ``note``
-    says why and what would determine it.
+    states why, and a measurement that determines it.
     """
 
     figure: str
@@ -145,7 +145,7 @@ class ProcedureRecord:
 
 @dataclass(frozen=True)
 class Device:
-    """What is known of the units before the procedure: nominal scale from the full scale, and their calibration if there is one.
+    """The units before the procedure: nominal scale from the full scale, and their calibration if there is one.
 
     scale : (3,) output per g of each axis, by unit; full_scale, out_unit : of the lot
     scale_error : (3,) standard uncertainty of the scale as a share
@@ -159,7 +159,7 @@ class Device:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a procedure has determined for the units of a lot."""
+    """The results of a procedure for the units of a lot."""
 
     figures: Mapping[str, list[FigureValue]]
     findings: Sequence[Finding] = ()
@@ -169,7 +169,7 @@ class Procedure(ABC):
     """A test procedure. Each module of this package defines one as PROCEDURE.
 
     name : of the module, and ``kind`` in recipes · title : heading in the report · order : place in the reference
-    roles : equipment that a station must have · source : standard, edition and part · states : one line on what it determines
+    roles : equipment that a station must have · source : standard, edition and part · states : its results in one line
     rows : of plots in its picture
     """
 
@@ -208,13 +208,13 @@ class Procedure(ABC):
 
 
 def worst(values: Sequence[FigureValue]) -> FigureValue:
-    """The axis that decides: one that is not identified, else the largest magnitude with twice its uncertainty."""
+    """The deciding axis: one that is not identified, else the largest magnitude with twice its uncertainty."""
     missing = [one for one in values if not one.identified]
     return missing[0] if missing else max(values, key=lambda one: abs(one.value) + 2.0 * one.uncertainty)
 
 
 def scale_of(part: NominalScale, device: Device, unit: str) -> Array:
-    """Scale of a unit's axes, (3,), output per g: its calibration's where there is one, else the nominal one of the part."""
+    """Scale of a unit's axes, (3,), output per g: that of its calibration, else the nominal one of the part."""
     if unit in device.scale:
         return device.scale[unit]
     return np.full(3, np.nan if part.scale is None else part.scale)

@@ -201,7 +201,7 @@ class CentrifugeTest(Procedure):
 
 
 def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
-    """All terms with the input reversed; without it the four that one direction tells apart."""
+    """All terms with the input reversed; without it the four that one direction separates."""
     force, value, error = (rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
 
@@ -247,14 +247,14 @@ def _texts(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, str]]:
     ]
     if not part.reversed:
         text = (
-            "arm stretch, Koq and the offset of the proof mass are not told from K2, K3 and bias; "
+            "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
             "measure with the units reversed"
         )
         return [*out, ("not determined", text)]
     for name, text in (
         (
             "arm_stretch_or_odd_quadratic",
-            "arm stretch or Koq, one class: tell them apart by the optical radius at speed",
+            "arm stretch or Koq, one class: separate them by the optical radius at speed",
         ),
         (
             "mass_offset_or_asymmetry",

@@ -32,6 +32,6 @@ def procedure_record(
 
 
 def nominal_device(readings: pd.DataFrame) -> Device:
-    """The units by what their slots say: a scale is known only where a calibration gives it."""
+    """The units by their slots: a scale is known only from a calibration."""
     first = readings.iloc[0]
     return Device({}, {}, float(first["full_scale"]), str(first["out_unit"]))

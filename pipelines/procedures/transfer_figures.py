@@ -58,9 +58,8 @@ def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: Trans
     if other is not None:
         ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
         note = (
-            f"two solutions fit alike, {value:.4g} and {other.of(name)[0]:.4g}: sprung mass and "
-            f"two-pole low-pass can change places; "
-            "state the low-pass, or excite the mass alone"
+            f"two solutions fit equally well, {value:.4g} and {other.of(name)[0]:.4g}: the sprung mass and the two-pole "
+            "low-pass can be exchanged; state the low-pass, or excite the mass alone"
         )
         return FigureValue(figure, axis, np.nan, np.nan, ends[0], ends[-1], identified=False, note=note)
     if not fit.identified(name):
@@ -151,7 +150,7 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
 
 
 def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
-    """Subject and text of what the diagnosis says of one unit."""
+    """Subject and text of the findings of the diagnosis on one unit."""
     fit = found.fit
     model = " + ".join(("sensitivity", *fit.effects))
     out: list[tuple[str, str]] = []
@@ -168,10 +167,10 @@ def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
             f"{w.part} from {w.low_hz:.4g} to {w.high_hz:.4g} Hz ({100.0 * w.share:.0f} % of χ²)"
             for w in found.where[:3]
         ]
-        out.append(("where the model fails", ", ".join(places)))
+        out.append(("range of misfit", ", ".join(places)))
     for one in found.classes:
         first, *others = one.effects
-        alike = f"; not told apart from {', '.join(others)}" if others else ""
+        alike = f"; not separated from {', '.join(others)}" if others else ""
         out.append(("missing effect", f"{first} (p = {one.p_value:.1g}){alike}"))
     if found.classes:
         before, after = found.left_out
@@ -182,7 +181,7 @@ def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
         )
         out.append(("after extension", text))
     if found.unexplained:
-        out.append(("unexplained", "a real departure remains that no effect of the catalogue describes"))
+        out.append(("unexplained", "a significant deviation remains that no effect of the catalogue describes"))
     for p in found.extended.parameters:
         value, _, low, high = found.extended.of(p.name)
         if p.log and not found.extended.identified(p.name):
@@ -195,12 +194,11 @@ def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
 
 
 def sampling_text(rate_hz: float, bandwidth_hz: float, order: int) -> str:
-    """Whether the rate is five times the bandwidth, and what the filter of this order leaves folded onto the band's edge."""
+    """Whether the rate is five times the bandwidth, and the part that a filter of this order aliases onto the band's edge."""
     times = rate_hz / bandwidth_hz
     share = 100.0 * folded_share(rate_hz, bandwidth_hz, order)
-    rule = "at least 5" if times >= 5.0 else "less than the 5 that the rule asks for"
+    rule = "at least 5" if times >= 5.0 else "less than the 5 of the rule"
     return (
         f"{rate_hz:.5g} Hz is {times:.3g} times the bandwidth, {rule}; a filter of order {order} "
-        f"leaves {share:.2g} % folded onto the "
-        "band's edge"
+        f"leaves {share:.2g} % aliased onto the band's edge"
     )

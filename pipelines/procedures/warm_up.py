@@ -106,7 +106,7 @@ class WarmUp(Procedure):
         return points(rows)
 
     def evaluate(self, part: WarmUpPart, points: pd.DataFrame, device: Device) -> Outcome:
-        """The time of the slowest axis; not determined where the record ends too soon, or noise alone leaves the band."""
+        """The time of the slowest axis; not determined where the record ends too soon, or noise alone exceeds the band."""
         del device
         figures: dict[str, list[FigureValue]] = {}
         for unit, rows in points.groupby("unit", sort=False):

@@ -26,7 +26,7 @@ MODULES = ("schemas.limits", "schemas.tables", "pipelines.report", "pipelines.pr
 
 
 def make_report(run: Run) -> bool:
-    """Whether the run's report was there already, made from its tables as they are; it is now."""
+    """Write the run's report if it is missing or older than its tables; return whether it was up to date."""
     if run.about.get("parents") and run.report.is_file():
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
@@ -38,14 +38,14 @@ def make_report(run: Run) -> bool:
     )
     key = stage_key("report", inputs, parameters, code)
     if run.has_report(key):
-        run.seal()  # a writer that was killed may have left it out
+        run.seal()  # a killed writer may not have written it
         return True
     run.save_report(key, render(run, certificates), {"inputs": inputs, "parameters": parameters, "code": code})
     return False
 
 
 def renew_report(run: Run) -> None:
-    """Make a report that is there again, now that the ledger says something else of its units."""
+    """Write an existing report again after a change of the ledger."""
     if (run.path / "report.json").is_file() and all(name in run.tables() for name in INPUTS):
         make_report(run)
 
@@ -57,4 +57,4 @@ def _refuse_unfinished(run: Run) -> None:
         message = f"report: run {run.id} has no {', '.join(missing)}; "
         if run.records is None:
             raise WrongUse(message + "it was imported, and a report needs a captured run")
-        raise WrongUse(message + "it is not finished: give its 'tumbleline run' again and it goes on")
+        raise WrongUse(message + "it is not finished: give its 'tumbleline run' again to continue")

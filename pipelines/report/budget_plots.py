@@ -20,7 +20,7 @@ REST = "#d9d9d9"
 
 
 def shares_plot(shares: Mapping[str, Mapping[str, float]]) -> str:
-    """One bar per quantity, divided by the shares of u²; contributions below 1 % everywhere stand together as others.
+    """One bar per quantity, divided by the shares of u²; contributions below 1 % everywhere are combined as others.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What panels of a run's report are computed from: the run, its tables, and the part of each unit."""
+"""Inputs of the panels of a run's report: the run, its tables, and the part of each unit."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ReportContext:
 
     Parameters
     ----------
-    certificates : of the run's units, as they are in the ledger now.
+    certificates : of the run's units, in their present state in the ledger.
     """
 
     def __init__(self, run: Run, certificates: Mapping[str, Stated]) -> None:

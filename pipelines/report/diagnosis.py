@@ -10,7 +10,7 @@ from inertial import effects
 from inertial.criticism.handling import named as handled
 from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
 from pipelines.report.numbers import plain
-from pipelines.report.residuals import drivers_shown, left_by
+from pipelines.report.residuals import drivers_shown, lot_residuals
 from pipelines.report.templates import template
 from schemas.units import MICRO
 
@@ -35,8 +35,8 @@ def render_diagnosis(
     Parameters
     ----------
     document : the diagnosis for programs, with its extras
-    found, diagnosis : the readings and what was found in them; None where every unit has a data fault
-    source : what the dwells were called
+    found, diagnosis : the readings and their diagnosis; None if every unit has a data fault
+    source : name of the dwells
     coefficients : rows of the fit's table, to be shown with it; none where None
     """
     faulty = {unit for fault in document["blocked_by"] for unit in fault["units"]}
@@ -68,7 +68,7 @@ def chance(p: float | None) -> str:
 
 
 def equal(p: float) -> str:
-    """A probability with its sign: equal, or below the smallest that is told."""
+    """A probability with its sign: equal, or below the smallest value that is printed."""
     text = chance(p)
     return text if text.startswith("<") else f"= {text}"
 
@@ -88,7 +88,7 @@ def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _member(name: str) -> dict[str, str]:
-    """An effect, or what handling did, with its symbol and equation."""
+    """An effect, or a handling error, with its symbol and equation."""
     known = handled(name) or (effects.get(name) if name in effects.catalogue() or ":" in name else None)
     if known is None:
         return {"id": name, "symbol": "", "equation": "one dwell of one unit"}
@@ -104,7 +104,7 @@ def _value(value: float | tuple[float, ...] | list[float] | None) -> str:
 
 def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
     lot = diagnosis.problem.lot
-    left = left_by(diagnosis, units)
+    left = lot_residuals(diagnosis, units)
     drivers = drivers_shown(diagnosis)
     return {
         "unit": left.unit,
@@ -122,7 +122,7 @@ def _poses(force: NDArray[np.float64]) -> int:
 
 
 def _ladder(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The candidates of the first step, best first, with how far each is behind; χ² over the variance that is left at last."""
+    """The candidates of the first step, best first, with the distance of each to the best; χ² over the final variance."""
     rivals, variance = diagnosis.ladder, diagnosis.final.space.variance
     if not rivals:
         return []

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.state import State
-    from pipelines.report.residuals import DriverValues, Left
+    from pipelines.report.residuals import DriverValues, LotResiduals
 
     Array = NDArray[np.float64]
 
@@ -30,8 +30,8 @@ MARKS = ((1, "^", "heating"), (-1, "v", "cooling"), (0, "o", "first soak"))
 MOST_POINTS = 600
 
 
-def model_plot(left: Left, state: State, output: Array, floor_ug: float) -> str:
-    """Output against force, measured against explained departure, and residuals against a normal distribution."""
+def model_plot(left: LotResiduals, state: State, output: Array, floor_ug: float) -> str:
+    """Output against force, measured against explained deviation, and residuals against a normal distribution."""
     explained = left.before - left.after
     something = bool(np.nanmax(np.abs(explained)) > 0.0)
     with mpl.rc_context(STYLE):
@@ -44,7 +44,7 @@ def model_plot(left: Left, state: State, output: Array, floor_ug: float) -> str:
         return svg(figure)
 
 
-def _response(place: Axes, left: Left, state: State, output: Array) -> None:
+def _response(place: Axes, left: LotResiduals, state: State, output: Array) -> None:
     for axis, name in enumerate(left.axes):
         if name == "norm":
             place.plot(1e6 * (np.linalg.norm(output[left.shown], axis=-1) - 1.0), ".", color=AFTER, markersize=4)
@@ -59,7 +59,7 @@ def _response(place: Axes, left: Left, state: State, output: Array) -> None:
     place.legend(frameon=False, handletextpad=0.1)
 
 
-def _departure(place: Axes, left: Left, explained: Array) -> None:
+def _departure(place: Axes, left: LotResiduals, explained: Array) -> None:
     largest = 1.05 * float(np.nanmax(np.abs(left.before)))
     place.plot([-largest, largest], [-largest, largest], color="#999999", linewidth=1.0, zorder=1)
     for axis, name in enumerate(left.axes):
@@ -67,15 +67,15 @@ def _departure(place: Axes, left: Left, explained: Array) -> None:
         step = max(1, x.size // MOST_POINTS)
         place.plot(x[::step], y[::step], ".", color=AXIS_COLOURS[name], markersize=3, alpha=0.6, label=name)
     place.set(
-        xlabel="what the added effects explain / µg",
-        ylabel="what the model judged leaves / µg",
+        xlabel="contribution of the added effects / µg",
+        ylabel="residual of the judged model / µg",
         title="all units: measured and explained",
     )
     place.legend(frameon=False, handletextpad=0.1, markerscale=2.0)
 
 
-def _quantiles(place: Axes, left: Left, floor_ug: float, *, something: bool) -> None:
-    """Residuals in order, over the floor, against the normal distribution: the line is pure noise."""
+def _quantiles(place: Axes, left: LotResiduals, floor_ug: float, *, something: bool) -> None:
+    """Ordered residuals over the noise floor against the normal distribution; the line is pure noise."""
     place.plot([-3.5, 3.5], [-3.5, 3.5], color="#999999", linewidth=1.0, zorder=1)
     shown = ((left.before, BEFORE, "before"), (left.after, AFTER, "after"))[: 2 if something else 1]
     for values, colour, label in shown:
@@ -88,7 +88,7 @@ def _quantiles(place: Axes, left: Left, floor_ug: float, *, something: bool) -> 
         place.legend(frameon=False, handletextpad=0.1, markerscale=2.5)
 
 
-def pose_maps(left: Left, state: State) -> str:
+def pose_maps(left: LotResiduals, state: State) -> str:
     """Mean residual of the shown unit at every pose on the whole sphere, before and after, on one scale."""
     rows = [(left.before, ", before"), (left.after, ", after")]
     rows = [(left.before, "")] if left.before is left.after else rows
@@ -149,7 +149,7 @@ def _map(place: Axes, poses: Array, means: Array, largest: float) -> None:
     place.set_yticks([])
 
 
-def driver_plots(left: Left, drivers: list[DriverValues], temperature: Array | None) -> str:
+def driver_plots(left: LotResiduals, drivers: list[DriverValues], temperature: Array | None) -> str:
     """Residuals of the shown unit against each driver, axis by axis, before and after, with smooth bands."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 2.45 * len(drivers) + 0.3), layout="constrained")
@@ -172,7 +172,7 @@ def driver_plots(left: Left, drivers: list[DriverValues], temperature: Array | N
         return svg(figure)
 
 
-def _against(place: Axes, x: Array, left: Left, column: int, temperature: Array | None) -> None:
+def _against(place: Axes, x: Array, left: LotResiduals, column: int, temperature: Array | None) -> None:
     place.axhline(0.0, color="#999999", linewidth=1.0)
     shown = [(left.before, BEFORE), (left.after, AFTER)][: 1 if left.before is left.after else 2]
     for values, colour in shown:

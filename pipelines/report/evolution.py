@@ -20,12 +20,12 @@ LINES = (
     ("heldout_ug", "dwells left out", "#0072b2", "s", "-"),
     ("fresh_ug", "fresh run, coefficients unchanged", "#d55e00", "D", "-"),
 )
-ASIDE = (-0.05, 0.0, 0.05)  # errors that are alike would hide each other
+ASIDE = (-0.05, 0.0, 0.05)  # equal errors would cover each other
 FLOOR = "#009e73"
 
 
 def draw_evolution(rows: list[dict[str, Any]], path: Path, name: str) -> None:
-    """Write the picture: errors of every version beside the floor of the last; what is not confirmed is marked."""
+    """Write the picture: errors of every version beside the floor of the last; unconfirmed effects are marked."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(max(6.4, 2.2 + 1.5 * len(rows)), 4.6), layout="constrained")
         place = figure.subplots()

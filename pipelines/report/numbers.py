@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 MINUS = "−"
 THIN = "\u202f"  # narrow no-break space between groups of three digits
@@ -16,6 +20,14 @@ def plain(value: float, digits: int = 3) -> str:
         return "0"
     places = digits - 1 - math.floor(math.log10(abs(value)))
     return _fixed(value, places) if places <= 8 else _signed(f"{value:.{digits - 1}e}")
+
+
+def scientific(value: float, number: Callable[[float], str] = plain) -> str:
+    """A number for people, from a million on as a power of ten; ``number`` formats smaller values."""
+    if abs(value) < 1e6:
+        return number(value)
+    exponent = math.floor(math.log10(abs(value)))
+    return f"{value / 10.0**exponent:.2f}·10{str(exponent).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
 def with_uncertainty(value: float, expanded: float) -> tuple[str, str]:

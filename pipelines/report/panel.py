@@ -19,12 +19,12 @@ class Panel(Protocol):
     TITLE: str
 
     def render(self, context: Any, /) -> str | None:
-        """The panel as HTML without its heading; None where this run, or unit, has nothing to show in it."""
+        """The panel as HTML without its heading; None if this run, or unit, has no content for it."""
         ...
 
 
 class IncompletePanel(Exception):
-    """A module that is a panel in part only, or stands in another's place: its author repairs the module."""
+    """An incomplete module of a panel, or one with the ORDER of another: its author must correct it."""
 
 
 @cache
@@ -52,6 +52,6 @@ def panels(package: str) -> tuple[Panel, ...]:
 
 
 def rendered(package: str, context: Any) -> list[tuple[str, str]]:
-    """Title and HTML of every panel that has something to show."""
+    """Title and HTML of every panel with content."""
     shown = ((panel.TITLE, panel.render(context)) for panel in panels(package))
     return [(title, html) for title, html in shown if html is not None]

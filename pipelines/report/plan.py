@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from pipelines.report.budget_plots import shares_plot
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import plain, scientific
 from pipelines.report.plan_plots import alias_plot, sight_plot, sphere_plot, temperature_plot
 from pipelines.report.templates import template
 
@@ -46,7 +45,7 @@ def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
 
 
 def _budget(found: dict[str, Any] | None) -> str:
-    """Shares of the contributions to what can be reached, of the worst axis of each quantity; empty where nothing is stated."""
+    """Shares of the contributions to the reachable uncertainty, of the worst axis of each quantity; empty if none is stated."""
     if found is None:
         return ""
     worst: dict[str, dict[str, Any]] = {}
@@ -57,14 +56,6 @@ def _budget(found: dict[str, Any] | None) -> str:
     return shares_plot(
         {f"{titles.get(q, q)}, {row['axis']}": row["shares"] for q, row in worst.items() if row["shares"]}
     )
-
-
-def scientific(value: float) -> str:
-    """A number for people, from a million on as a power of ten."""
-    if abs(value) < 1e6:
-        return plain(value)
-    exponent = math.floor(math.log10(abs(value)))
-    return f"{value / 10.0**exponent:.2f}·10{str(exponent).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
 def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

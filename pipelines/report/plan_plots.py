@@ -85,7 +85,7 @@ def _sphere(place: Axes, view: Array) -> None:
 
 
 def _dots(place: Axes, way: Array, fit: Array, check: Array, view: Array) -> None:
-    """The way from pose to pose, the poses on the near side full and those on the far side faint; repeats are larger."""
+    """The path from pose to pose, the poses on the near side full and those on the far side faint; repeats are larger."""
     path = way @ view.T
     place.plot(path[:, 0], path[:, 1], color=WAY, linewidth=0.8, alpha=0.55, zorder=2)
     for directions, colour, mark, size in ((fit, FIT, "o", 30.0), (check, CHECK, "s", 34.0)):
@@ -109,7 +109,7 @@ def _dots(place: Axes, way: Array, fit: Array, check: Array, view: Array) -> Non
 
 
 def temperature_plot(context: PlanContext) -> str:
-    """Chamber and slowest device over the station's time, with what is measured when."""
+    """Chamber and slowest device over the station's time, with the times of the measurements."""
     time, air, device = np.array(temperatures(context.activities, context.station)).T / np.array([[60.0], [1.0], [1.0]])
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 3.3), layout="constrained")

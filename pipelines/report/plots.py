@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-COLOURS = {"x": "#0072b2", "y": "#d55e00", "z": "#009e73"}  # told apart by the colour-blind too (Okabe and Ito)
+COLOURS = {"x": "#0072b2", "y": "#d55e00", "z": "#009e73"}  # for any colour vision (Okabe and Ito)
 WIDTH_IN = 11.5
 STYLE: dict[Any, Any] = {
     "font.size": 10.0,
@@ -30,11 +30,11 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "tumbleline",
     "font.family": "sans-serif",
-    "text.parse_math": False,  # names of columns and units are shown as they are, dollar signs too
+    "text.parse_math": False,  # names of columns and units are shown literally, with dollar signs
     "axes.titley": 1.0,  # a fixed place: looking for a free one costs as much as drawing the points
 }
 MOST_TICKS = (
-    5  # every tick is five drawn objects; with the library's own number of them ticks take half of a report's time
+    5  # every tick is five drawn objects; with the default number of ticks they take half of the time of a report
 )
 
 
@@ -124,7 +124,7 @@ def _scatter(place: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour
 
 
 def _soak_colours(dwells: pd.DataFrame) -> dict[int, tuple[float, ...]]:
-    """A colour per soak: blue where it was coldest, red where warmest."""
+    """A colour per soak, from blue (coldest) to red (warmest)."""
     means = dwells.groupby("soak")["unit_C"].mean()
     low, high = means.min(), means.max()
     share = (means - low) / (high - low) if high > low else means * 0.0 + 0.5
@@ -147,7 +147,7 @@ def _by_pose(place: Axes, residuals: pd.DataFrame) -> None:
 
 
 def _verification(place: Axes, rows: pd.DataFrame) -> None:
-    """Single dwells against what noise and wander let expect; limits are for the means of their poses."""
+    """Single dwells against the error expected of noise and wander; limits apply to the means of their poses."""
     numbers = np.arange(len(rows)) + 1
     expanded = 2.0 * rows["uncertainty_ug"].to_numpy()
     place.fill_between(numbers, -expanded, expanded, color="#d9d9d9", linewidth=0, label="expected, k = 2")
@@ -179,7 +179,7 @@ def _allan(place: Axes, allan: pd.DataFrame) -> None:
 
 
 def _slope_guides(place: Axes, allan: pd.DataFrame) -> None:
-    """Thin lines of slope −½ and +½ through the middle of the curve's minimum, for the eye."""
+    """Thin lines of slope −½ and +½ through the middle of the curve's minimum, as guides."""
     tau = np.array([allan["tau_s"].min(), allan["tau_s"].max()])
     low, high = allan["low_ug"].min() / 2.0, allan["high_ug"].max() * 2.2
     first = allan.loc[allan["tau_s"] == tau[0], "deviation_ug"].mean()

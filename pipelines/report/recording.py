@@ -1,4 +1,4 @@
-"""A first look at a recording as a picture and as a page: its axes, static intervals, and faults of samples."""
+"""The content of a recording as a picture and as a page: its axes, static intervals, and faults of samples."""
 
 from __future__ import annotations
 
@@ -59,14 +59,14 @@ def _title(document: InspectDocument) -> str:
     if any(one["positions"] > 1 for one in document["intervals"]):
         parts.append("yellow: several positions in one")
     if any(one["fault"] == "stuck_output" for one in document["faults"]):
-        parts.append("red: the axis stands still")
+        parts.append("red: the axis is constant")
     return "; ".join(parts)
 
 
 def _envelope(
     time: NDArray[np.float64], x: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest of as many pieces as there are pixels: what a line through all samples would cover."""
+    """Lowest and highest of as many pieces as there are pixels: the envelope of a line through all samples."""
     count = len(x)
     if count <= 2 * _PIXELS:
         return time, x, x
@@ -75,7 +75,7 @@ def _envelope(
 
 
 def save_picture(found: Inspection, path: Path) -> bool:
-    """Write the picture in the format of the file's ending (.svg, .png, .pdf); False where there is nothing to draw."""
+    """Write the picture in the format of the file's ending (.svg, .png, .pdf); False if there is nothing to draw."""
     figure = figure_of(found)
     if figure is None:
         return False
@@ -85,6 +85,6 @@ def save_picture(found: Inspection, path: Path) -> bool:
 
 
 def page(found: Inspection) -> str:
-    """The first look as one HTML text that needs no other file."""
+    """The content of a recording as one HTML text that needs no other file."""
     figure = figure_of(found)
     return template("recording.html").render(one=found.document, picture="" if figure is None else svg(figure))

@@ -1,4 +1,4 @@
-"""Residuals of a lot beside everything that was recorded with its dwells, as plain arrays for charts and other processes."""
+"""Residuals of a lot with all quantities recorded with its dwells, as plain arrays for charts and other processes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ResidualTable:
-    """Residuals of units × axes × dwells, µg, NaN where a dwell is missing, and what was recorded with each dwell.
+    """Residuals of units × axes × dwells, µg, NaN where a dwell is missing, and the quantities recorded with each dwell.
 
     force : (units, n, 3), g · turning : (units, n), 1 reached heating, −1 cooling, 0 neither
     drivers : label, and values (units, n) or (units, n, 3), by name
@@ -49,7 +49,7 @@ class ResidualTable:
     drivers: dict[str, tuple[str, Array]] = field(default_factory=dict[str, tuple[str, Array]])
 
     def pick(self, unit: int, dwell: int) -> str:
-        """What a click on a point chooses."""
+        """The selection by a click on a point."""
         return f"{self.units[unit]}:{int(self.dwells[dwell])}"
 
 

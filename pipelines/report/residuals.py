@@ -1,4 +1,4 @@
-"""What a model leaves before and after the missing effects are added, laid out for pictures."""
+"""Residuals of a model before and after the missing effects are added, arranged for pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 ALWAYS = ("unit_C", "time_s", "temperature_rate", "since_move_s")
 STILL = {"unit_C": 1.0, "temperature_rate": 0.1, "since_move_s": 0.5}
-"""Ranges below which a driver is not worth a picture, unless the model fails along it."""
+"""Ranges below which a driver gets no picture, unless the residual follows it."""
 
 _MOST = 7
 _ALIKE = 0.995
@@ -29,11 +29,11 @@ _KNOTS = 5
 
 
 @dataclass(frozen=True)
-class Left:
+class LotResiduals:
     """Residuals of a lot in µg, (units, axes, n); NaN where a dwell is missing.
 
     axes : "x", "y", "z", or "norm" alone
-    shown : place of the unit whose residuals fall most, or are largest where nothing was added
+    shown : place of the unit whose residuals fall most, or are largest if nothing was added
     """
 
     units: tuple[str, ...]
@@ -57,7 +57,7 @@ class DriverValues:
     values: Array
 
 
-def left_by(diagnosis: Diagnosis, units: tuple[str, ...]) -> Left:
+def lot_residuals(diagnosis: Diagnosis, units: tuple[str, ...]) -> LotResiduals:
     """Residuals before and after, by generalised least squares with each model's own noise."""
     problem = diagnosis.problem
     axes = ("norm",) if problem.lot.radial else ("x", "y", "z")
@@ -66,7 +66,7 @@ def left_by(diagnosis: Diagnosis, units: tuple[str, ...]) -> Left:
     after = before if not added(diagnosis) else MICRO * residuals_of(problem, estimate(diagnosis.final)).reshape(shape)
     sizes = np.nanmean(before**2, axis=(1, 2))
     fallen = sizes - np.nanmean(after**2, axis=(1, 2)) if added(diagnosis) else sizes
-    return Left(units, axes, before, after, int(np.argmax(fallen)))
+    return LotResiduals(units, axes, before, after, int(np.argmax(fallen)))
 
 
 def added(diagnosis: Diagnosis) -> list[str]:
@@ -79,25 +79,25 @@ LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
-    """Drivers worth a picture: those the model fails along, then temperature, time, rate and wait where they vary."""
+    """Drivers with a picture: those that the residual follows, then temperature, time, rate and wait if they vary."""
     state = diagnosis.problem.lot.state
     known = {d.name: d.values for d in drivers_of(diagnosis.problem)}
     if "approach" in known:
         known["approach"] = state.force_step
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
-    told = [*first, *(p.driver for p in diagnosis.where[:5])]
-    wanted = dict.fromkeys([*told, *ALWAYS])
+    names = [*first, *(p.driver for p in diagnosis.where[:5])]
+    candidates = dict.fromkeys([*names, *ALWAYS])
     found: list[DriverValues] = []
-    for name in wanted:
+    for name in candidates:
         values = known.get(name)
-        still = name not in told and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
+        still = name not in names and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
         if values is not None and not still and not any(_alike(values, other.values) for other in found):
             found.append(DriverValues(name, LABELS.get(name, name), values * shown_factor(name)))
     return found[:_MOST]
 
 
 def _alike(one: Array, other: Array) -> bool:
-    """Whether two drivers tell the same: elapsed time and time since power-on often do."""
+    """Whether two drivers are equivalent, as elapsed time and time since power-on often are."""
     if one.shape != other.shape:
         return False
     return bool(abs(np.corrcoef(one.ravel(), other.ravel())[0, 1]) > _ALIKE)
@@ -121,7 +121,7 @@ def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
 
 
 def _groups(values: Array) -> int:
-    """Number of groups that values fall into, parted by gaps of a twentieth of their range: soaks, mostly."""
+    """Number of groups that values fall into, separated by gaps of a twentieth of their range: usually soaks."""
     gaps = np.diff(np.sort(values))
     return 1 + int(np.count_nonzero(gaps > 0.05 * np.ptp(values)))
 
@@ -129,7 +129,7 @@ def _groups(values: Array) -> int:
 def _basis(values: Array, count: int, groups: int) -> Array:
     """Constant and smooth curve, knots from the first ``count`` values; a polynomial where values come in few groups.
 
-    Between groups nothing holds a spline.
+    Between groups a spline is not determined.
     """
     if groups > 2 * _KNOTS or groups == 1:
         return np.concatenate([np.ones((values.size, 1)), curve(values, _KNOTS)], axis=-1)

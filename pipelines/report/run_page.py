@@ -22,7 +22,7 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
 
     Parameters
     ----------
-    certificates : of the run's units, as they are in the ledger now.
+    certificates : of the run's units, in their present state in the ledger.
     """
     panels = rendered(PANELS, ReportContext(run, certificates or {}))
     return template("page.html").render(run=run.id, panels=panels)

@@ -1,4 +1,4 @@
-"""The pages' templates, which lie beside this module and share one style, and those inside the modules of panels."""
+"""The templates of pages, in this folder with one common style, and those in the modules of panels."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ def _environment() -> Environment:
 
 
 def template(name: str) -> Template:
-    """The template of this name, which may include others that lie beside it."""
+    """The template of this name, which may include others of this folder."""
     return _environment().get_template(name)
 
 
 def fill(text: str, **values: Any) -> str:
-    """A template's text with its values; what is not marked safe is escaped."""
+    """A template's text with its values; values that are not marked safe are escaped."""
     return _compiled(text).render(**values)
 
 

@@ -52,11 +52,11 @@ def _chosen(a: Run, b: Run) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     before, after = (_model(run) for run in (a, b))
     if before != after:
-        rows.append(_row("model", "", _said_model(before, after), _said_model(after, before)))
+        rows.append(_row("model", "", _model_text(before, after), _model_text(after, before)))
     first, second = (run.about.get("limits") for run in (a, b))
     if first != second:
-        said = _said_limits(first or {}, second or {})
-        rows.append(_row("limits", said, (first or {}).get("name", "none"), (second or {}).get("name", "none")))
+        changed = _limits_text(first or {}, second or {})
+        rows.append(_row("limits", changed, (first or {}).get("name", "none"), (second or {}).get("name", "none")))
     return rows
 
 
@@ -67,7 +67,7 @@ def _model(run: Run) -> dict[str, Any]:
     return {"effects": [], "formulas": []}
 
 
-def _said_model(own: dict[str, Any], other: dict[str, Any]) -> str:
+def _model_text(own: dict[str, Any], other: dict[str, Any]) -> str:
     """A short text for a model: its effects beyond the other model, or all its effects where neither contains the other."""
     more = [effect for effect in own["effects"] if effect not in other["effects"]]
     if more or len(own["effects"]) < len(other["effects"]):
@@ -76,7 +76,7 @@ def _said_model(own: dict[str, Any], other: dict[str, Any]) -> str:
     return ", ".join(own["effects"]) or "none"
 
 
-def _said_limits(before: dict[str, Any], after: dict[str, Any]) -> str:
+def _limits_text(before: dict[str, Any], after: dict[str, Any]) -> str:
     """The keys of the limits that differ."""
     a, b = before.get("figures", {}), after.get("figures", {})
     names = [name for name in {**a, **b} if a.get(name) != b.get(name)]

@@ -76,7 +76,7 @@ def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd
     u_a, u_b = both[f"{error}_a"], both[f"{error}_b"]
     other_unit = both["unit_text_a"].ne(both["unit_text_b"]) & both["value_a"].notna() & both["value_b"].notna()
     change = (both["value_b"] - both["value_a"]).mask(other_unit)
-    told = both[key].assign(
+    compared = both[key].assign(
         unit_text=both["unit_text_b"].fillna(both["unit_text_a"]),
         a=both["value_a"],
         b=both["value_b"],
@@ -88,10 +88,10 @@ def _changed(a: pd.DataFrame, b: pd.DataFrame, key: list[str], error: str) -> pd
         over_both=_over(change, (u_a**2 + u_b**2) ** 0.5),
     )
     same = (both["value_a"] == both["value_b"]) & (u_a == u_b)
-    told = told[~same]
-    alone = told["a"].isna() | told["b"].isna()
-    largest = told["over_both"].abs().fillna(0.0).mask(alone, np.inf)
-    return told.assign(largest=largest).sort_values(["largest", *key], ascending=[False, *[True] * len(key)])
+    compared = compared[~same]
+    alone = compared["a"].isna() | compared["b"].isna()
+    largest = compared["over_both"].abs().fillna(0.0).mask(alone, np.inf)
+    return compared.assign(largest=largest).sort_values(["largest", *key], ascending=[False, *[True] * len(key)])
 
 
 def _over(change: pd.Series, size: pd.Series) -> pd.Series:

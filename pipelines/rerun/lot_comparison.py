@@ -69,7 +69,7 @@ class FreshTask:
 
     archive: str
     run: str
-    wanted: ModelChange
+    change: ModelChange
     earlier: tuple[tuple[tuple[str, ...], Calibration | None, Calibration | None], ...]
 
 
@@ -85,24 +85,24 @@ class Fresh:
 def judged(part: Batch) -> list[LotComparison]:
     """Every run of a portion under both models; what cannot be judged says why."""
     archive = Archive(part.archive)
-    part.wanted.use()
+    part.change.use()
     with threadpool_limits(1):
-        return [_judged(Run(archive, run_id), part.wanted) for run_id in part.runs]
+        return [_judged(Run(archive, run_id), part.change) for run_id in part.runs]
 
 
-def _judged(run: Run, wanted: ModelChange) -> LotComparison:
+def _judged(run: Run, change: ModelChange) -> LotComparison:
     entry = entry_of(run.id, run.about)
     try:
-        old, new = _both(run, wanted)
+        old, new = _both(run, change)
     except (TumblelineError, InertialError) as problem:
         return LotComparison(entry, error=str(problem))
     return LotComparison(entry, old, new)
 
 
-def _both(run: Run, wanted: ModelChange) -> tuple[Side, Side]:
+def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     if "grades" not in run.tables() or not run.about.get("capture"):
         raise DataRejected(f"run {run.id}: it has no grades to compare with; run it again with limits first")
-    job = archived_job(run, wanted)
+    job = archived_job(run, change)
     names = ("verdicts", "grades", "coefficients", "covariance", "residuals", "verification", "noise")
     old = {name: run.table(name) for name in names}
     dwells, history = run.table("dwells"), run.table("history")
@@ -152,7 +152,7 @@ def fresh(tasks: Sequence[FreshTask]) -> list[Fresh]:
 
 
 def _fresh(task: FreshTask) -> Fresh:
-    task.wanted.use()
+    task.change.use()
     run = Run(Archive(task.archive), task.run)
     found = Fresh(task.run)
     dwells, history = run.table("dwells"), run.table("history")

@@ -25,17 +25,17 @@ class Batch:
 
     archive: str
     runs: tuple[str, ...]
-    wanted: ModelChange = field(default_factory=ModelChange)
+    change: ModelChange = field(default_factory=ModelChange)
     report: bool = False
 
 
 def parts(
-    archive: Archive, runs: Sequence[str], wanted: ModelChange, workers: int, *, report: bool = False
+    archive: Archive, runs: Sequence[str], change: ModelChange, workers: int, *, report: bool = False
 ) -> list[Batch]:
     """The runs in batches, several for each worker; the same runs give the same batches."""
     size = min(MOST, max(1, -(-len(runs) // (4 * max(workers, 1)))))
     batches = [tuple(runs[start : start + size]) for start in range(0, len(runs), size)]
-    return [Batch(archive.address, batch, wanted, report) for batch in batches]
+    return [Batch(archive.address, batch, change, report) for batch in batches]
 
 
 def run_again(part: Batch) -> list[Outcome]:
@@ -46,7 +46,7 @@ def run_again(part: Batch) -> list[Outcome]:
 
 def _one(archive: Archive, run_id: str, part: Batch) -> Outcome:
     try:
-        return again(archive, run_id, part.wanted, report=part.report)
+        return again(archive, run_id, part.change, report=part.report)
     except (TumblelineError, InertialError) as problem:
         return Outcome(run_id, error=str(problem))
 

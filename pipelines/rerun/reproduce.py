@@ -14,7 +14,7 @@ from pipelines.archive.keys import libraries
 from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.rerun import raw_samples
 from pipelines.rerun.steps import RAW, plan_of
-from schemas import tables
+from schemas import table_check, tables
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _static(run: Run) -> bool:
 
 def _compare(run: Run, step: StageCall, result: Reproduction) -> None:
     for name, frame in step.call(run).items():
-        made = parquet.table_bytes(name, tables.check(name, frame, where=f"{step.name} → {name}"), tables.VERSION)
+        made = parquet.table_bytes(name, table_check.check(name, frame, where=f"{step.name} → {name}"), tables.VERSION)
         stored = run.manifest(name)["sha256"]
         same = files.hash_of(made) == stored
         result.tables[name] = SAME if same else OTHER

@@ -41,7 +41,7 @@ class Outcome:
 
 
 def again(
-    archive: Archive, run_id: str, wanted: ModelChange, *, report: bool = False, left_out: Dwells = ()
+    archive: Archive, run_id: str, change: ModelChange, *, report: bool = False, left_out: Dwells = ()
 ) -> Outcome:
     """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
 
@@ -51,9 +51,9 @@ def again(
         The run cannot be run again: its capture is not finished, or samples are needed that are not in the archive.
     """
     start = time.perf_counter()
-    wanted.use()
+    change.use()
     old = Run(archive, run_id)
-    plan = plan_of(old, wanted, left_out)
+    plan = plan_of(old, change, left_out)
     raw = raw_samples(old)
     because = changes(old, plan, raw=raw)
     new = BufferedRun(archive, archive.run_name(plan.name, plan.decisive) if because else old.id)
@@ -67,7 +67,7 @@ def again(
                     new.flush()  # a run that was there goes on behind the last stage that was done
         else:
             archive.prepare()
-            new.begin(_told(old, plan, because))
+            new.begin(_about(old, plan, because))
             stages = _done(old, new, plan, raw=raw)
             with alone(new.path, wait=True):
                 files.sweep(new.path)
@@ -140,7 +140,12 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             found.append({"stage": step.name, "what": "code", "from": str(manifest.get("code", "")), "to": step.code})
         before = manifest.get("parameters", {})
         found += [
-            {"stage": step.name, "what": SAID.get(key, key), "from": _said(before[key]), "to": _said(value)}
+            {
+                "stage": step.name,
+                "what": PARAMETER_TITLES.get(key, key),
+                "from": _short_text(before[key]),
+                "to": _short_text(value),
+            }
             for key, value in step.parameters.items()
             if key in before and before[key] != value
         ]
@@ -150,10 +155,10 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     return found
 
 
-SAID = {"effects": "model", "formulas": "model", "lot": "lot", "limits": "limits"}
+PARAMETER_TITLES = {"effects": "model", "formulas": "model", "lot": "lot", "limits": "limits"}
 
 
-def _said(value: Any) -> str:
+def _short_text(value: Any) -> str:
     """A parameter in short."""
     if isinstance(value, dict):
         return str(value.get("name", "")) or "…"
@@ -164,11 +169,11 @@ def _said(value: Any) -> str:
     )
 
 
-def _told(old: Run, plan: Plan, because: list[dict[str, str]]) -> dict[str, Any]:
+def _about(old: Run, plan: Plan, because: list[dict[str, str]]) -> dict[str, Any]:
     """What a re-run is begun with."""
     about = old.about
-    told = {"rerun_of": old.id, "because": because, "measured": about.get("measured", about["when"])}
-    return {**provenance(), **plan.about, **told}
+    origin = {"rerun_of": old.id, "because": because, "measured": about.get("measured", about["when"])}
+    return {**provenance(), **plan.about, **origin}
 
 
 class StageRunner:

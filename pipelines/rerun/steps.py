@@ -25,8 +25,9 @@ from pipelines.tables.frames import empty_table
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
-from schemas.recipe import FormulaSpec, Lot, Recipe, explain
+from schemas.recipe import FormulaSpec, Lot, Recipe
 from schemas.station import StationConfig
+from schemas.toml_files import explain
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -70,19 +71,19 @@ class Plan:
 class ArchivedJob(Job):
     """The job of an archived run, which opens no station: what the run tells of its capture and station stays as it is.
 
-    told : what ``run.json`` holds, without who made it, where and when
+    run_document : what ``run.json`` holds, without who made it, where and when
     """
 
-    told: dict[str, Any] = field(default_factory=dict[str, Any])
+    run_document: dict[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def about(self) -> dict[str, Any]:
         """What is kept beside the run for readers."""
         decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
-        return {**self.told, **decided, "lot": self.lot.model_dump(mode="json")}
+        return {**self.run_document, **decided, "lot": self.lot.model_dump(mode="json")}
 
 
-def plan_of(run: Run, wanted: ModelChange, left_out: Dwells = ()) -> Plan:
+def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
     """What is to be done to a run, with another model or other limits where they are wanted.
 
     Parameters
@@ -92,37 +93,39 @@ def plan_of(run: Run, wanted: ModelChange, left_out: Dwells = ()) -> Plan:
     if run.about.get("capture"):
         if left_out:
             raise WrongUse(f"run {run.id}: --leave-out is for imports, this run was captured; measure the dwell again")
-        return _captured(run, wanted)
-    return _imported(run, wanted, left_out)
+        return _captured(run, change)
+    return _imported(run, change, left_out)
 
 
-def archived_job(run: Run, wanted: ModelChange) -> ArchivedJob:
+def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     """The job of a captured run, with another model or other limits where they are wanted."""
     about = run.about
     try:
-        recipe = Recipe.model_validate({**about["recipe"], **_dumped(wanted)})
-        limits = wanted.limits or limits_of(about["limits"], UNITS)
+        recipe = Recipe.model_validate({**about["recipe"], **_dumped(change)})
+        limits = change.limits or limits_of(about["limits"], UNITS)
         lot = Lot.model_validate(about["lot"])
     except ValidationError as problem:
         raise explain(problem, f"run {run.id}", Recipe) from None
-    if wanted.limits is not None:
-        recipe = recipe.model_copy(update={"limits": wanted.limits_name})
-    told = {key: value for key, value in about.items() if key not in PROVENANCE}
+    if change.limits is not None:
+        recipe = recipe.model_copy(update={"limits": change.limits_name})
+    run_document = {key: value for key, value in about.items() if key not in PROVENANCE}
     station = StationConfig.model_construct(**about.get("station", {}))
     capture = about["capture"]
-    job = ArchivedJob(recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, told=told)
+    job = ArchivedJob(
+        recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, run_document=run_document
+    )
     refuse_unknown_effects(recipe.effects, f"run {run.id}")
     refuse_limits_without_figures(limits, recipe)
     return job
 
 
-def _dumped(wanted: ModelChange) -> dict[str, Any]:
-    keys = wanted.of_model()
-    return {**keys, "formulas": [f.model_dump(mode="json") for f in wanted.formulas]} if keys else {}
+def _dumped(change: ModelChange) -> dict[str, Any]:
+    keys = change.of_model()
+    return {**keys, "formulas": [f.model_dump(mode="json") for f in change.formulas]} if keys else {}
 
 
-def _captured(run: Run, wanted: ModelChange) -> Plan:
-    job = archived_job(run, wanted)
+def _captured(run: Run, change: ModelChange) -> Plan:
+    job = archived_job(run, change)
     steps = [_capture_step(run, job)]
     for stage in STAGES:
         call = _called(stage.call, job)
@@ -150,22 +153,22 @@ def _capture_step(run: Run, job: ArchivedJob) -> StageCall:
     return StageCall("capture", (RECORDS,), (*CAPTURED, *more), {"capture": job.capture_id}, "", gathered)
 
 
-def _imported(run: Run, wanted: ModelChange, left_out: Dwells) -> Plan:
+def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     """Fit, verification and, where limits are known, grades of dwells that were imported."""
     about = run.about
     dwells = leave_out(_fit_for_a_fit(run), left_out)
     known = has_poses(dwells)
-    model = _model_of(run, dwells, wanted)
+    model = _model_of(run, dwells, change)
     use_formulas([FormulaSpec.model_validate(f) for f in model["formulas"]], f"run {run.id}")
     refuse_unknown_effects(model["effects"], f"run {run.id}")
-    limits = wanted.limits or (limits_of(about["limits"], UNITS) if about.get("limits") else None)
+    limits = change.limits or (limits_of(about["limits"], UNITS) if about.get("limits") else None)
     history = "history" in run.tables()
     gravity = gravity_of_import(about)
     steps = [_import_step(history, left_out, run), _fit_step(model, history, None if known else gravity)]
     steps += [_verify_step(history)] if known else [_no_verification()]
     steps += [_grade_step(limits)] if limits else []
     recipe = {**about.get("recipe", {}), "name": "import", **model}
-    recipe |= {"limits": wanted.limits_name} if wanted.limits else {}
+    recipe |= {"limits": change.limits_name} if change.limits else {}
     kept = {key: value for key, value in about.items() if key not in PROVENANCE}
     new = {**kept, "recipe": recipe, "limits": limits.model_dump(mode="json") if limits else None}
     data = {name: run.manifest(name)["sha256"] for name in ("dwells", "history") if name != "history" or history}
@@ -195,10 +198,10 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
             f"run {run.id}: imported without dwells, a fit needs them; import it with poses, a face or --blocks"
         )
     dwells = run.table("dwells")
-    wanted = ("kind", "pose", "out_unit")
+    needed = ("kind", "pose", "out_unit")
     if has_poses(dwells):
-        wanted = (*FORCE_COLUMNS, "sd_x", "sd_y", "sd_z", "n", *wanted)
-    missing = [name for name in wanted if name not in dwells.columns]
+        needed = (*FORCE_COLUMNS, "sd_x", "sd_y", "sd_z", "n", *needed)
+    missing = [name for name in needed if name not in dwells.columns]
     if missing:
         raise DataRejected(
             f"run {run.id}: its dwells have no {', '.join(missing)}, a fit of known poses needs them; import it again with these "
@@ -207,10 +210,10 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
     return dwells
 
 
-def _model_of(run: Run, dwells: pd.DataFrame, wanted: ModelChange) -> dict[str, Any]:
+def _model_of(run: Run, dwells: pd.DataFrame, change: ModelChange) -> dict[str, Any]:
     known = run.about.get("recipe", {})
-    if wanted.effects is not None:
-        return _dumped(wanted)
+    if change.effects is not None:
+        return _dumped(change)
     if known.get("effects"):
         return {key: known[key] for key in ("effects", "formulas", "model_name", "model_version")}
     return {"effects": default_model(dwells), "formulas": [], "model_name": "", "model_version": 0}

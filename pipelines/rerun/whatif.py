@@ -5,20 +5,71 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from pipelines.jobs.releases import keep_evidence
+from pipelines.parallel import map_partitions
+from pipelines.rerun import lot_comparison
 from pipelines.rerun.lot_comparison import FreshTask, LotComparison
+from pipelines.rerun.partition import parts
+from schemas.counts import number_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
+    from numpy.typing import NDArray
+
+    from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
+    from pipelines.parallel import Distributor
     from pipelines.rerun.lot_comparison import Fresh, Side, Sums
 
 FALLS = 0.005
 """Smallest relative change of an error that counts."""
+LEVEL = 0.05
+"""Two-sided level of the verdict: units scatter as much, or more, in one of twenty archives where the models are equally good."""
+FEWEST = 3
+"""Calibrations that can show a difference: two have one degree of freedom."""
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
 
 
-def fresh_tasks(lots: Sequence[LotComparison], archive: str, wanted: ModelChange) -> list[FreshTask]:
+def evaluated(
+    archive: Archive,
+    runs: Sequence[str],
+    change: ModelChange,
+    distribute: Distributor | None = None,
+    workers: int = 1,
+    report_progress: Callable[[str], None] = lambda _: None,
+) -> dict[str, Any]:
+    """The what-if of a model over lots, stored in the archive as evidence; nothing of the lots themselves is changed.
+
+    Parameters
+    ----------
+    runs : of the archive, with the present and with the new model
+    distribute, workers : where parts are computed, see :func:`pipelines.parallel.map_partitions`
+    report_progress : gets what is computed next
+    """
+    report_progress("lots with both models")
+    batches = parts(archive, list(runs), change, workers)
+    portions = map_partitions(lot_comparison.judged, batches, distribute, workers=workers, name="what if")
+    lots = [one for portion in portions for one in portion]
+    report_progress("later runs of the same units")
+    tasks = fresh_tasks(lots, archive.address, change)
+    size = max(1, -(-len(tasks) // (4 * workers)))
+    chunks = [tasks[start : start + size] for start in range(0, len(tasks), size)]
+    done = map_partitions(lot_comparison.fresh, chunks, distribute, workers=workers, name="what if, fresh runs")
+    document: dict[str, Any] = {
+        "name": change.model_name,
+        "version": change.model_version,
+        "effects": list(change.effects or ()),
+        "limits": change.limits_name or "as each lot had them",
+        **summary(lots, [one for chunk in done for one in chunk]),
+    }
+    document["evidence"] = keep_evidence(archive, change, document, list(runs))
+    return document
+
+
+def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange) -> list[FreshTask]:
     """For every run, the calibrations from the previous run of each of its units."""
     last: dict[str, LotComparison] = {}
     tasks: list[FreshTask] = []
@@ -33,7 +84,7 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, wanted: ModelChange
             last[unit] = judged
         pairs = tuple((tuple(units), *_calibrations(runs[run])) for run, units in earlier.items())
         if pairs:
-            tasks.append(FreshTask(archive, judged.entry.id, wanted, pairs))
+            tasks.append(FreshTask(archive, judged.entry.id, change, pairs))
     return tasks
 
 
@@ -41,9 +92,9 @@ def _calibrations(judged: LotComparison) -> tuple[Any, Any]:
     return (judged.old.calibration if judged.old else None, judged.new.calibration if judged.new else None)
 
 
-def summary(lots: Sequence[LotComparison], fresh: Sequence[Fresh]) -> dict[str, Any]:
+def summary(lots: Sequence[LotComparison], later: Sequence[Fresh]) -> dict[str, Any]:
     """The what-if as a document: total, by station and device, changed outcomes, failed lots, and a verdict."""
-    by_run = {one.run: one for one in fresh}
+    by_run = {one.run: one for one in later}
     whole = [judged for judged in lots if judged.old is not None and judged.new is not None]
     groups: dict[tuple[str, str], list[LotComparison]] = defaultdict(list)
     for judged in whole:
@@ -53,7 +104,7 @@ def summary(lots: Sequence[LotComparison], fresh: Sequence[Fresh]) -> dict[str, 
         for (station, device), own in sorted(groups.items())
     ]
     total = _figures(whole, by_run)
-    verdict, explanation = _verdict(total, rows)
+    verdict, explanation = _verdict(total, rows, whole, by_run)
     return {
         "lots": len(whole),
         "total": total,
@@ -109,25 +160,77 @@ def _flips(lots: Sequence[LotComparison]) -> dict[str, list[dict[str, str]]]:
     return flips
 
 
-def _verdict(total: dict[str, Any], rows: Sequence[dict[str, Any]]) -> tuple[str, str]:
-    """Whether the new model is better, by the errors on data that were not fitted."""
+def _verdict(
+    total: dict[str, Any], rows: Sequence[dict[str, Any]], lots: Sequence[LotComparison], fresh: dict[str, Fresh]
+) -> tuple[str, str]:
+    """Whether the new model is better, by the errors on data that were not fitted and their scatter over units."""
     figure, where = _telling(total)
     if not figure:
         return NOTHING, "no lot has dwells that were not fitted; the models cannot be compared"
-    share = _share(total[figure])
-    hurt = [
-        f"{row['device']} on {row['station']}" for row in rows if figure in _known(row) and _share(row[figure]) > FALLS
-    ]
     before, after = total["yield"]
     old, new = total[figure]
     sentence = f"the error {where} changes from {old:.3g} to {new:.3g} µg, the yield from {before:.1%} to {after:.1%}"
-    if share > FALLS:
+    ratio = _log_ratios(figure, lots, fresh)
+    count = number_of(int(ratio.size), "calibration")
+    if ratio.size < FEWEST:
+        return EQUAL, f"{sentence}; {count} cannot show that this is more than scatter, {FEWEST} are needed"
+    if not _differs(ratio, LEVEL):
+        return EQUAL, f"{sentence}: no more than {count} scatter"
+    hurt = [
+        f"{row['device']} on {row['station']}"
+        for row in rows
+        if figure in _known(row)
+        and _share(row[figure]) > FALLS
+        and _rises(_log_ratios(figure, _of(lots, row), fresh), LEVEL / len(rows))
+    ]
+    return _decided(_share(total[figure]), float(ratio.mean()), hurt, sentence)
+
+
+def _decided(share: float, mean: float, hurt: Sequence[str], sentence: str) -> tuple[str, str]:
+    """The verdict on a difference that is more than scatter; the root mean square and the typical unit must agree."""
+    if share > FALLS and mean > 0.0:
         return WORSE, f"{sentence}: the error increases"
     if hurt:
         return WORSE, f"{sentence}; the error increases for {', '.join(hurt)}"
-    if share < -FALLS:
+    if share < -FALLS and mean < 0.0:
         return BETTER, f"{sentence}: the error decreases"
     return EQUAL, f"{sentence}: the error does not decrease"
+
+
+def _of(lots: Sequence[LotComparison], row: dict[str, Any]) -> list[LotComparison]:
+    """The lots of a group."""
+    return [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]
+
+
+def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> NDArray[np.float64]:
+    """Natural logarithm of new over old error, one value per calibration of a unit that both models judge."""
+    out: list[float] = []
+    for one in lots:
+        if figure == "fresh_rms_ug":
+            later = fresh.get(one.entry.id)
+            pair = (later.old, later.new) if later else ({}, {})
+        else:
+            pair = (one.old.verified if one.old else {}, one.new.verified if one.new else {})
+        for unit in pair[0].keys() & pair[1].keys():
+            (before, _), (after, _) = pair[0][unit], pair[1][unit]
+            if before > 0.0 and after > 0.0:
+                out.append(0.5 * np.log(after / before))
+    return np.array(out)
+
+
+def _differs(ratios: NDArray[np.float64], level: float) -> bool:
+    """Whether the mean of the ratios differs from zero by more than they scatter (Student's t, two-sided)."""
+    from scipy import stats
+
+    spread = float(ratios.std(ddof=1)) if ratios.size > 1 else np.inf
+    if spread == 0.0:
+        return bool(ratios.mean() != 0.0)
+    size = abs(float(ratios.mean())) * ratios.size**0.5 / spread
+    return bool(2.0 * stats.t.sf(size, ratios.size - 1) < level)
+
+
+def _rises(ratios: NDArray[np.float64], level: float) -> bool:
+    return bool(ratios.size >= FEWEST and ratios.mean() > 0.0 and _differs(ratios, level))
 
 
 def _telling(total: dict[str, Any]) -> tuple[str, str]:

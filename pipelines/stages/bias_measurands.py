@@ -37,7 +37,7 @@ def bias_measurands(
     between dwells
     walk : (units, 3), µg, standard deviation of the random walk at the end of the record
     time : (n,), s, of the dwells of the fit
-    widened : factor of the wander's share, as it is known from few degrees of freedom
+    widened : factor on the share of the wander, for its few degrees of freedom
     switch_on : standard deviation of the bias from one switch-on to the next, µg
     """
     found, long = instability(wander, time), of_a_day(record, wander, time, walk=walk, widened=widened)

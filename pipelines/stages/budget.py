@@ -30,7 +30,7 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     """Tables ``budget``, ``uncertainties`` and ``budget_covariance``; without rows where no uncertainty is stated.
 
     ``budget`` has one row per unit, quantity and contribution, ``uncertainties`` one per unit and quantity: value, u of type A
-    and B, effective degrees of freedom, k and U, and for verification what the station's own verification shows of it.
+    and B, effective degrees of freedom, k and U, and for verification the part that the station's own verification shows.
     """
     angles = {"outer_deg", "inner_deg"} <= set(tables.dwells.columns)
     if terms.stated is None or tables.coefficients.empty or not angles:
@@ -47,7 +47,7 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
 
 
 def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> Conditions:
-    """The dwells of a lot as the influences see them."""
+    """The dwells of a lot on which the influences act."""
     first = dwells[dwells["unit"] == lot.units[0]].set_index("dwell").reindex(lot.dwells)
     soak = first["soak"].to_numpy(dtype=np.int64) if "soak" in first else np.zeros(lot.dwells.size, dtype=np.int64)
     read = lot.state.temperature if lot.state.temperature is not None else np.full(lot.dwells.size, terms.room_C)
@@ -78,7 +78,7 @@ def propagate(
 
 
 def with_device_temperature(model: Model, response: Array, stability: Stability | None) -> Model:
-    """The model with the temperature coefficients that its device is stated to have, where it has no terms for them itself."""
+    """The model with the stated temperature coefficients of the device, for those that the model lacks."""
     if stability is None:
         return model
     effects, coefficients = list(model.effects), model.coefficients

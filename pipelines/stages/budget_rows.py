@@ -54,7 +54,7 @@ LABELS = {
     "vibration": "vibration",
     **BEYOND,
 }
-"""Contributions in the words of tables and pictures."""
+"""Titles of the contributions in tables and pictures."""
 TEXTS = "unit quantity axis contribution unit_text type distribution scope input_unit source"
 NUMBERS = "u share divisor stated dof sensitivity visible"
 SUM_TEXTS = "unit quantity axis unit_text largest frame"
@@ -111,7 +111,7 @@ def _about(
     name: str, u: float, one: Quantity, unit: int, found: Split, places: Mapping[str, NDArray[np.intp]],
     known: Mapping[str, Source], terms: BudgetTerms,
 ) -> dict[str, Any]:  # fmt: skip
-    """What a contribution rests on."""
+    """The source of a contribution."""
     plain = {"contribution": name, "u": u, "visible": float("nan"), "sensitivity": float("nan")}
     if name == NOISE or name in BEYOND:
         dof = float(one.dof_noise[unit]) if name in {NOISE, "run"} else float("inf")

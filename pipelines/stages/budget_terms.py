@@ -1,4 +1,4 @@
-"""What a budget is computed from: the tables of a run, and what station, device and certificate state."""
+"""Inputs of a budget: the tables of a run, and the statements of station, device and certificate."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class BudgetTables:
 
 @dataclass(frozen=True)
 class BudgetTerms:
-    """What is stated of station, device and certificate; JSON-able, part of the stage's key.
+    """The statements of station, device and certificate; JSON-able, part of the stage's key.
 
     stated : ``[uncertainty]`` of station and recipe together; None: noise only
     """
@@ -65,7 +65,7 @@ class BudgetTerms:
 def terms_of(
     recipe: Recipe, station: Uncertainty | None, references: Sequence[Reference], room_c: float, months: int
 ) -> BudgetTerms:
-    """What a recipe on a station states.
+    """The statements of a recipe on a station.
 
     Parameters
     ----------

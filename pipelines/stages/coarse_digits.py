@@ -1,4 +1,4 @@
-"""Coarse digits of an output: what they do to the white noise of its record, and what is said of it."""
+"""Coarse digits of an output: their effect on the white noise of its record, and the remark about it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from pipelines.stages.static_record import Digits
 
 SHOWN = 0.02
-"""Share of the variance that rounding must make to be told and taken out."""
+"""Smallest share of rounding in the variance that is stated and subtracted."""
 
 
 @dataclass(frozen=True)
 class Coarse:
     """Digits of one channel, in µg.
 
-    step : between two digits, zero where none is seen; variance : of a sample, as it came out, by the differences of neighbours
+    step : between two digits, zero if none is detected; variance : of a sample, as it came out, by the differences of neighbours
     most : largest standard deviation of a sample before rounding that such digits allow, 95 %
     """
 
@@ -40,7 +40,7 @@ class Coarse:
 
     @property
     def matters(self) -> bool:
-        """Whether rounding makes a share of the noise that is worth telling."""
+        """Whether the share of rounding in the noise is large enough to state."""
         return self.step > 0.0 and self.step**2 / 12.0 > SHOWN * self.variance
 
     @property
@@ -50,27 +50,28 @@ class Coarse:
 
     @property
     def correctable(self) -> bool:
-        """Whether rounding adds q²/12 and next to nothing else."""
+        """Whether rounding adds q²/12 and almost nothing else."""
         return self.spread >= FINE * self.step
 
 
-def told(digits: Coarse) -> str:
-    """What is said of N where the digits are coarse; empty elsewhere."""
+def remark(digits: Coarse) -> str:
+    """The remark about N if the digits are coarse; else empty."""
     if not digits.matters:
         return ""
     step = f"the last digit is {digits.step:.3g} µg"
     if digits.correctable:
-        return f"{step}, {digits.step / digits.spread:.2g} of a sample's noise: its q²/12 is taken out of N (Sheppard)"
-    return f"{step}, more than twice a sample's noise: N cannot be told from it, only limited; use a finer resolution"
+        return (
+            f"{step}, {digits.step / digits.spread:.2g} of a sample's noise: its q²/12 is subtracted from N (Sheppard)"
+        )
+    return f"{step}, more than twice a sample's noise: N has only an upper limit; use a finer resolution"
 
 
 def without_digits(terms: NoiseTerms, digits: Sequence[Coarse], rate_hz: float) -> NoiseTerms:
-    """The terms (channels, 5) without what coarse digits put into N.
+    """The terms (channels, 5) without the part of N that coarse digits make.
 
-    Rounding adds q²/12 of white variance to a sample of noise above half a digit; its intervals are widened by what depends
-    on the
-    place of the mean between two digits. Below that the output shows how often the noise crossed to the next digit, and no
-    more: N then has a limit.
+    Rounding adds q²/12 of white variance to a sample of noise above half a digit; its intervals are widened for the unknown place
+    of the mean between two digits. Below that the output only shows how often the noise crossed to the next digit: N then has an
+    upper limit.
 
     Parameters
     ----------

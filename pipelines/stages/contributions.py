@@ -41,7 +41,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a contribution comes from: its entry, and the standard uncertainty as it is stated there."""
+    """The source of a contribution: its entry, and the standard uncertainty stated there."""
 
     entry: Entry
     stated: StandardUncertainty
@@ -82,7 +82,7 @@ _PARTS: dict[str, dict[str, str]] = {
 def influences(
     stated: Uncertainty, at: Conditions, stability: Stability | None = None
 ) -> tuple[list[Influence], list[Scattered]]:
-    """The influences of a statement on some dwells; those whose effect cancels for the user are left out.
+    """The influences of a statement on some dwells; those whose effect cancels for the user are omitted.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def _temperature(
 
 
 def remainder(at: Conditions, tau_s: float) -> Array:
-    """What remains of the step to each dwell's soak when its dwells begin, (n,), K: reading minus element."""
+    """The remainder of the step to the soak of each dwell at its first dwell, (n,), K: reading minus element."""
     out = np.zeros(at.soak.size)
     before = at.room_C
     for soak in np.unique(at.soak):

@@ -27,21 +27,22 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which nothing can be said of the kind of its noise
+FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which the kind of its noise cannot be estimated
 
 _PER_G = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
 """Output per g by the name of the output's unit, for models without a scale."""
 
-LONG_S = 3600.0  # record from which on its walk is carried over a day: it then grows three times at most
+LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most
 
 
 @dataclass(frozen=True)
 class _Noisy:
-    """A fit, and what its residuals say of the noise; arrays in the output's unit.
+    """A fit, and the noise by its residuals; arrays in the output's unit.
 
     noise, expected : (units, n, 3), standard deviations of one dwell's noise, and of its residual
-    predicted : (units, 3, m, m), covariance of what is left of the m dwells for verification
-    flicker, walk, white : (units, 3), standard deviations; walk at the end of the record; walk_shown : that it is no flicker
+    predicted : (units, 3, m, m), covariance of the residuals of the m dwells for verification
+    flicker, walk, white : (units, 3), standard deviations; walk at the end of the record; walk_shown : whether the walk is
+    distinguished from flicker
     lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
     per_g : (units, 3), output per g
     """
@@ -63,13 +64,13 @@ class _Noisy:
 def fit(dwells: pd.DataFrame, history: pd.DataFrame, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
     """Coefficients, covariance, residuals and noise of the recipe's effects for every unit of a lot.
 
-    The white-noise error sd/√n of a dwell is a lower bound. What wanders between dwells is estimated with the coefficients
+    The white-noise error sd/√n of a dwell is a lower bound. Wander between dwells is estimated with the coefficients
     (method ``wander``); where there are too few dwells for that, the covariance is scaled by χ²/ν (method ``birge``: Birge
     ratio squared). The table ``wander`` says which. Tables without rows come back where no unit was accepted.
 
     Parameters
     ----------
-    dwells : of every kind; those for verification are not fitted, and only pass on the conditions that came before
+    dwells : of every kind; those for verification are not fitted; they only state earlier conditions
     history : temperatures between the dwells
     """
     if not np.any(dwells["kind"] == "dwell"):
@@ -160,7 +161,7 @@ def _per_g(lot: LotArrays, found: LotFit) -> Array:
     Raises
     ------
     DataRejected
-        The model has no scale, and the output is in a unit of its own: nothing says what it is in g.
+        The model has no scale, and the output is in a unit of its own: its size in g is unknown.
     """
     scale = np.abs(np.diagonal(found.response(), axis1=-2, axis2=-1))
     if "scale" in found.effects:
@@ -200,7 +201,7 @@ def _residual_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
 
 
 def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
-    """Covariance of what should be left at the dwells for verification, as a long table of lower triangles."""
+    """Covariance of the expected residuals of the dwells for verification, as a long table of lower triangles."""
     scale = found.per_g
     dwells = lot.dwells[~lot.of_kind("dwell")]
     row, column = np.tril_indices(dwells.size)
@@ -220,7 +221,7 @@ def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
 
 
 def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
-    """How the noise of the dwells was found, and its parts, by unit and axis."""
+    """The method that estimates the noise of the dwells, and the parts of the noise, by unit and axis."""
     scale = found.per_g
     u, a = (index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(3), indexing="ij"))
     parts = {"white_ug": found.white, "flicker_ug": found.flicker, "walk_ug": found.walk}
@@ -240,9 +241,9 @@ def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
 def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
     """Uncertainties of the bias by measurand, (units, 3), µg; none for a model without a bias.
 
-    Scatter that the dwells' own samples do not show counts as flicker here: few dwells do not tell the kind of it, and white
-    noise would not reach beyond the record. So does the walk of a short record that flicker explains as well: one of two minutes,
-    carried on over a day, would grow fifteen times.
+    Scatter that the dwells' own samples do not show counts as flicker here: few dwells do not show its kind, and white noise
+    would not last beyond the record. The walk of a short record that flicker explains equally well also counts as flicker: a walk
+    of two minutes, extrapolated over a day, would grow by a factor of fifteen.
     """
     places = [[name for name, _ in names].index("bias") if ("bias", "K0") in names else -1 for names in found.fit.names]
     if min(places) < 0:

@@ -1,8 +1,7 @@
-"""Thermometers that froze: one that keeps saying the same to the last digit while, by all that is known of it, it should not.
+"""Frozen thermometers: readings that stay equal to the last digit although they should change.
 
-While the chamber stands at one temperature nothing else gives it away. How often the mean of a sound thermometer changes from one
-record to the next, by its resolution, is told by its own records before and by the others of the lot at the same time; the
-smaller share is believed.
+While the chamber holds one temperature this is the only sign. How often the mean of a sound thermometer changes from one record
+to the next is known from its own earlier records and from the other units at the same time; the smaller share is used.
 """
 
 from __future__ import annotations
@@ -17,12 +16,12 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-SAME_K = 1e-9  # means of equal looks differ by their rounding
-BY_CHANCE = 1e-6  # a sound thermometer is refused so seldom
+SAME_K = 1e-9  # means of equal readings differ by rounding
+BY_CHANCE = 1e-6  # probability that a sound thermometer is refused
 
 
 def frozen(readings: pd.DataFrame) -> Iterator[tuple[str, int, float]]:
-    """Units whose thermometer froze before the end, with the number of records that say the same and the temperature, °C.
+    """Units whose thermometer froze before the end, with the number of equal records and the temperature, °C.
 
     Parameters
     ----------
@@ -49,7 +48,7 @@ def _unchanged_at_the_end(changed: NDArray[np.bool_]) -> int:
 
 
 def _by_chance(changed: NDArray[np.bool_], counted: NDArray[np.bool_], column: int, still: int) -> float:
-    """Probability that a sound thermometer says the same for so long; 1 where nothing is known of it.
+    """Probability that the reading of a sound thermometer stays equal for so long; 1 if unknown.
 
     Parameters
     ----------

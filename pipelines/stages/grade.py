@@ -35,7 +35,7 @@ BEST_OF_NOISE = "consumer"
 
 @dataclass(frozen=True)
 class Evidence:
-    """The tables that a decision rests on.
+    """The tables that a decision is based on.
 
     uncertainties, budget_covariance : of the uncertainty budget; None, or without rows, where nothing is stated
     full_scale : largest excursion of the output from 0 g by unit, output unit
@@ -55,7 +55,7 @@ class Evidence:
 
     @property
     def basis(self) -> str:
-        """What the uncertainties rest on."""
+        """The basis of the uncertainties."""
         return NOISE_ONLY if self.uncertainties is None or self.uncertainties.empty else BUDGET
 
 
@@ -79,7 +79,7 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
 def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0, *, tumbles: bool = True) -> dict[str, pd.DataFrame]:
     """Tables ``figures`` (one row per unit and figure), ``grades`` (one row per unit) and ``lot_risks`` (one per limited figure).
 
-    With an uncertainty budget the grade rests on the error expected over the period of validity, where that is known; without one
+    With an uncertainty budget the grade is based on the error expected over the period of validity, if that is known; without one
     no unit has a grade above consumer.
 
     Parameters
@@ -211,7 +211,7 @@ def _decided(
 
 
 def _why(figure: Figure, best: str, basis: str, limits: Limits) -> str:
-    """Why a grade is no better, in brackets."""
+    """The reason that limits a grade, in brackets."""
     if figure.name == PERIOD_FIGURE:
         expanded = limits.coverage_factor * figure.uncertainty
         return f" (error expected over the period of validity {figure.value:.3g} ± {expanded:.2g} µg)"
@@ -219,7 +219,7 @@ def _why(figure: Figure, best: str, basis: str, limits: Limits) -> str:
         return ""
     if basis == NOISE_ONLY:
         return " (noise only: no [uncertainty] is stated, no grade above consumer)"
-    return " (the error over the period of validity is not known: state [stability] of the device)"
+    return " (the error over the period of validity is unknown: state [stability] of the device)"
 
 
 def _good_enough(grade: str, required: str) -> bool:

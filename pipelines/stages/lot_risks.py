@@ -1,4 +1,4 @@
-"""Risk of the decisions on a lot: false acceptance and false rejection over the production that it stands for (JCGM 106, 9)."""
+"""Risk of the decisions on a lot: false acceptance and false rejection over the production that it represents (JCGM 106, 9)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ FEWEST = 3
 def lot_risks(figures: pd.DataFrame, limits: Limits, uncertainties: pd.DataFrame | None) -> pd.DataFrame:
     """One row per figure with a limit: mean, process standard deviation, uncertainty, PFA and PFR.
 
-    σ_p² = s² − u² of what differs between units; what is common to the lot is not in s. nan where fewer than three units were
+    σ_p² = s² − u², with the part of u that differs between units; the part common to the lot is not in s. nan where fewer than
+    three units were
     judged. ``largest_pfa`` is the largest specific probability of a unit that was accepted.
     """
     rows: list[dict[str, Any]] = []
@@ -49,7 +50,7 @@ def lot_risks(figures: pd.DataFrame, limits: Limits, uncertainties: pd.DataFrame
 
 
 def _independent(figure: str, u: float, uncertainties: pd.DataFrame | None) -> float:
-    """The part of u that differs between units: that of noise, where the budget tells the two apart."""
+    """The part of u that differs between units: that of noise, if the budget separates the two."""
     quantity = {"bias_error_ug": "bias_error", "verification_norm_ug": "verification_norm"}.get(figure)
     if uncertainties is None or quantity is None:
         return u
@@ -60,7 +61,7 @@ def _independent(figure: str, u: float, uncertainties: pd.DataFrame | None) -> f
 def _risks(mean: float, process: float, u: float, limit: float, accept: float, units: int) -> dict[str, float]:
     if units < FEWEST or not np.isfinite(process) or not accept > 0.0:
         return {"pfa": float("nan"), "pfr": float("nan"), "accepted": float("nan")}
-    if not process > 0.0:  # the units differ by no more than their measurement: all are taken to be as their mean
+    if not process > 0.0:  # the units differ by no more than their measurement: all are taken as equal to their mean
         process = 1e-6 * limit
     found = global_risk(mean, process, u, (-limit, limit), (-accept, accept))
     return {"pfa": found.pfa, "pfr": found.pfr, "accepted": found.accepted}

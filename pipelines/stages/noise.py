@@ -1,4 +1,4 @@
-"""Noise of the static record: Allan deviation with honest intervals, and the terms that it needs."""
+"""Noise of the static record: Allan deviation with its intervals, and the noise terms that explain it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pandas as pd
 from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.terms import FLICKER_FLOOR, NoiseTerms, fit_terms, model_deviation
 from pipelines.stages.bias_stability import TERM, bias_stability
-from pipelines.stages.coarse_digits import Coarse, told, without_digits
+from pipelines.stages.coarse_digits import Coarse, remark, without_digits
 from pipelines.stages.static_record import Series, Warmed, warmed
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import empty_table
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 MOST_SAMPLES = (
     2**18
 )  # of a channel that lie in memory: 24 h at 100 Hz are means of 33 samples, and tau begins at 0.33 s
-UNEXPLAINED_P = 1e-6  # the covariance of the curve is itself estimated, so only a plain misfit counts
+UNEXPLAINED_P = 1e-6  # the covariance of the curve is itself estimated, so only a clear misfit counts
 FEWEST = 192  # samples of a channel: six averaging times, as many as five terms need
-MOVED_K = 0.01  # by which the temperature of a record must have moved to be told
+MOVED_K = 0.01  # change of the temperature of a record from which it is stated
 N_ONE_SIDED = "n_d"
 B_BOUND = "B_bound"
 TERM_COLUMNS = ["unit", "axis", "term", "value", "low", "high", "identified", "unit_text", "note"]
@@ -44,16 +44,15 @@ def noise(
     """Allan curves (table ``allan``) and noise terms (table ``noise``) of every calibrated unit, in µg.
 
     Terms: Q, N, B, K, R as in IEEE Std 952 (N is two-sided: σ(τ) = N/√τ); ``n_d`` = N·√2 is the one-sided density of
-    data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B. Records longer than 2¹⁸ samples are read table by
-    table and averaged down to that many, so that their curves begin at a longer averaging time.
-
-    What the temperature of the record did to the output, by the model's tempco, is taken out first. The rounding of coarse digits
-    is taken out of N where that can be done. A channel that is silent, too short or not finite has rows without a value. The
-    column ``note`` says each of these.
+    data sheets; ``B_bound`` = min σ/0.664 is only an upper bound of B. Records longer than 2¹⁸ samples are read table by table
+    and averaged to that length, so that their curves begin at a longer averaging time. The response of the output to the
+    temperature of the record, by the model's tempco, is subtracted first. The rounding of coarse digits is subtracted from N if
+    possible. A channel that is silent, too short or not finite has rows without a value. The column ``note`` states each of
+    these.
 
     Parameters
     ----------
-    history : temperatures between the dwells; nothing is taken out where None
+    history : temperatures between the dwells; nothing is subtracted if None
     """
     static = readings[(readings["kind"] == "allan") & (readings["status"] == "ok")]
     if static.empty or coefficients.empty:
@@ -91,7 +90,7 @@ def noise(
 
 @dataclass(frozen=True)
 class _Channel:
-    """One axis of one unit: its record (n,) in µg, without what its temperature did; why there is none, if so."""
+    """One axis of one unit: its record (n,) in µg without the response to its temperature, or the reason why there is none."""
 
     unit: str
     axis: str
@@ -131,17 +130,17 @@ def _channels(
 
 
 def _warmth(warm: Warmed, change_ug: float) -> str:
-    """What is said of the temperature during a record."""
+    """The remark about the temperature during a record."""
     if not warm.span_K > MOVED_K:
         return ""
     moved = f"the temperature moved by {warm.span_K:.2g} K during the record"
     if warm.known:
-        return f"{moved}; the known tempco's share, {change_ug:.2g} µg, is taken out"
-    return f"{moved}; the model has no tempco to take it out with, so B, K and R may be the temperature's"
+        return f"{moved}; the share of the known tempco, {change_ug:.2g} µg, is subtracted"
+    return f"{moved}; the model has no tempco to correct it, so that B, K and R may include the effect of temperature"
 
 
 def _why_silent(values: np.ndarray) -> str:
-    """Why a channel says nothing of its noise; empty where it does."""
+    """The reason why a channel has no noise figures; empty if it has."""
     if len(values) < FEWEST:
         return f"{len(values)} samples in the static record, {FEWEST} are needed; record longer"
     if not np.all(np.isfinite(values)):
@@ -152,7 +151,7 @@ def _why_silent(values: np.ndarray) -> str:
 
 
 def _alike(channels: list[_Channel]) -> list[list[_Channel]]:
-    """The channels that say something, those with records of one length together."""
+    """The usable channels, grouped by length of record."""
     lengths = dict.fromkeys(len(one.record) for one in channels if not one.silent)
     return [[one for one in channels if not one.silent and len(one.record) == length] for length in lengths]
 
@@ -210,7 +209,7 @@ def _term_rows(channel: _Channel, terms: NoiseTerms, place: int) -> list[tuple[o
     rows = list[tuple[object, ...]]()
     for symbol, term in terms.one(place).items():
         value = np.nan if term.value is None else term.value
-        note = "; ".join(filter(None, [channel.warmth, told(channel.digits) if symbol in {"Q", "N"} else ""]))
+        note = "; ".join(filter(None, [channel.warmth, remark(channel.digits) if symbol in {"Q", "N"} else ""]))
         text = term.unit.format("µg")
         where = (channel.unit, channel.axis)
         rows.append((*where, symbol, value, term.low, term.high, term.identified, text, note))
@@ -229,7 +228,7 @@ def _stability_row(channel: _Channel, rate: float) -> list[tuple[object, ...]]:
 
 
 def _silent_rows(channel: _Channel) -> list[tuple[object, ...]]:
-    """Rows of a channel that says nothing: no value and no limit, and why."""
+    """Rows of an unusable channel: no value, no limit, and the reason."""
     units = {"Q": "µg·s", "N": "µg/√Hz", N_ONE_SIDED: "µg/√Hz", "B": "µg", "K": "µg/√s", "R": "µg/s", B_BOUND: "µg"}
     return [
         (channel.unit, channel.axis, term, np.nan, 0.0, np.nan, False, text, channel.silent)

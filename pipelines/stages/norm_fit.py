@@ -39,7 +39,7 @@ NORM = "norm"
 
 @dataclass(frozen=True)
 class FittedNorms:
-    """A fit of norms with what it was made from.
+    """A fit of norms with its inputs.
 
     whitener : as :func:`inertial.norm_fit.fit_norms` has it; scale : (units, 3), output unit per g
     white, flicker, walk : (units,), standard deviations of one dwell's noise, g; walk at the end of the record
@@ -64,7 +64,7 @@ class FittedNorms:
 def norms_fitted(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float = 1.0
 ) -> FittedNorms:
-    """A model fitted to dwells of unknown orientation, with the noise that a diagnosis finds in them.
+    """A model fitted to dwells of unknown orientation, with the noise that a diagnosis estimates.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
     """Standard uncertainties of the bias by measurand, (units, 3) each, µg; names of :mod:`pipelines.stages.bias_measurands`.
 
     The flicker of a diagnosis has time constants to four times the record. Scatter that the samples of the dwells do not show
-    counts as flicker: few dwells do not tell the kind of it.
+    counts as flicker: few dwells do not show its kind.
     """
     place = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
     errors = np.sqrt(np.diagonal(done.fit.fit.covariance, axis1=-2, axis2=-1))

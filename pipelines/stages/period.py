@@ -1,4 +1,4 @@
-"""What a device does beyond its run: flicker to the due date, switching on, ageing, for one unit and axis."""
+"""Errors of a device after its run: flicker until the due date, switching on, ageing, for one unit and axis."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ RECTANGULAR = float(np.sqrt(3.0))
 
 @dataclass(frozen=True)
 class Period:
-    """Standard deviations of what is added to the error of the run over the period, µg, by contribution."""
+    """Standard deviations of the contributions over the period to the error of the run, µg."""
 
     parts: dict[str, float]
 

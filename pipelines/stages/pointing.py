@@ -1,7 +1,7 @@
-"""Whether the table stood where its encoders said, judged by the lot itself: every unit is an inclinometer.
+"""Check of the table's pointing against its encoders by the lot itself: every unit is an inclinometer.
 
-An encoder that has lost its zero, or a worn gear behind it, turns the true force away from the one that is believed, for all
-units alike. What the units lack each in its own way is theirs, and no matter of the table.
+An encoder that has lost its zero, or a worn gear, turns the true force away from the assumed one, equally for all units. Errors
+that differ between units are errors of the units, not of the table.
 """
 
 from __future__ import annotations

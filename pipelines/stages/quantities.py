@@ -40,7 +40,7 @@ UNSEEN = 0.1
 
 @dataclass(frozen=True)
 class Split:
-    """Influences through a fit, with what a verification on the same station sees.
+    """Influences through a fit, with the part that a verification on the same station shows.
 
     verification : (..., m, 3, q), J·u at the dwells for verification; visible : (q,), visible share of every influence
     """
@@ -56,7 +56,8 @@ class Quantity:
 
     value, noise : (units,), in ``unit``; noise is the standard uncertainty of type A
     parts : (units, q), errors per standard uncertainty; for RMS figures their RMS
-    shown, unseen : (units,), what the station's own verification shows of the budget, and what it cannot; None where there is
+    shown, unseen : (units,), the part of the budget that the station's own verification shows, and the part that it cannot; None
+    where there is
         none
     extra : contributions beyond the run by name, (units,) each; dof_noise : (units,)
     """
@@ -108,7 +109,7 @@ def _across(axis: int, place: int) -> str:
 
 
 def _angles(calibration: Calibration, found: Split, scale: Array, dof: Array) -> Iterator[Quantity]:
-    """Deviation from 90° of the angle between two axes, (m_ij + m_ji): free of the seat."""
+    """Deviation from 90° of the angle between two axes, (m_ij + m_ji): independent of the seat."""
     if "misalignment" not in calibration.effects:
         return
     noise = calibration.covariance
@@ -191,7 +192,7 @@ def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
 def _verification(
     lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, found: Split, dof: Array
 ) -> Iterator[Quantity]:
-    """RMS error of each axis as a user meets it, and the magnitude at its worst pose."""
+    """RMS error of each axis for the user, and the magnitude at its worst pose."""
     unseen = lot.of_kind("verification")
     columns = design.local_columns(design.split(calibration.effects)[0], lot.state, calibration.nonlinear)
     columns = columns[..., unseen, :]
@@ -245,7 +246,7 @@ def _all(values: Array, lot: LotArrays) -> Array:
 def _period(
     errors: list[Quantity], lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, dof: Array
 ) -> Iterator[Quantity]:
-    """RMS error over the period of validity of each axis; none where nothing is stated of the time beyond the run."""
+    """RMS error over the period of validity of each axis; none if nothing is stated for the time after the run."""
     used = lot.of_kind("dwell")
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[:, used]
     span = float(np.ptp(time[0])) + terms.dwell_s

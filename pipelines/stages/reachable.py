@@ -1,4 +1,4 @@
-"""Uncertainty that a recipe can reach on its station, before it is measured, and the contributions that rule it."""
+"""Uncertainty that a recipe can reach on its station, before it is measured, and its largest contributions."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class PlannedDwells:
 
 @dataclass(frozen=True)
 class Reach:
-    """A quantity and what can be reached of it.
+    """A quantity and its reachable uncertainty.
 
     u : standard uncertainty, or the expected RMS of an error; parts : by contribution, in ``unit``
     """
@@ -72,7 +72,7 @@ class Reach:
 
 
 def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]) -> list[Reach]:
-    """What a recipe can reach; nothing where no uncertainty is stated.
+    """The reachable uncertainty of a recipe; empty if no uncertainty is stated.
 
     The device is nominal: response 1, with the temperature coefficients that its stability states.
     """
@@ -113,7 +113,7 @@ def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, nam
 
 
 def _errors(planned: PlannedDwells, terms: BudgetTerms, model: Model, found: Propagated, names: Array) -> list[Reach]:
-    """RMS error as a user meets it, by the references alone, and over the period."""
+    """RMS error for the user, by the references alone, and over the period."""
     state = planned.verification
     if state is None:
         return []
@@ -155,7 +155,7 @@ def _later(planned: PlannedDwells, terms: BudgetTerms) -> dict[str, float] | Non
 
 
 def unreachable(found: Sequence[Reach], limits: Limits, months: int) -> list[str]:
-    """Why limits cannot be met, a sentence each: U of the references, or the error expected over the period, is beyond them."""
+    """Why limits cannot be met, a sentence each: U of the references, or the error expected over the period, exceeds them."""
     from pipelines.stages.budget_rows import LABELS
 
     out: list[str] = []

@@ -32,7 +32,7 @@ WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)
 def reduce(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, verdicts: pd.DataFrame, local_gravity_m_s2: float
 ) -> pd.DataFrame:
-    """Dwells of samples that nobody has looked at yet, see :func:`dwells_of`.
+    """Dwells of samples without summaries, see :func:`dwells_of`.
 
     Parameters
     ----------
@@ -49,16 +49,16 @@ def dwells_of(
     Parameters
     ----------
     summaries : of the samples, :func:`pipelines.tables.summaries.summarised`
-    readings : of the whole run; the reference force comes from the encoders as they were read.
+    readings : of the whole run; the reference force comes from the encoder readings.
     verdicts : of the validate stage.
     local_gravity_m_s2 : at the station; the force is stated in standard g.
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
     means = summaries.loc[summaries["unit"].isin(accepted), ["unit", "record", *MEANS, *SPREADS, "n"]]
     static = readings[readings["unit"].isin(accepted) & ~readings["kind"].isin([STATIC, PROCEDURE])]
-    # a covariate that a sensor has failed to tell once is of no use to any model, and stays in the readings
-    told = [column for column in covariates(readings) if static[column].notna().all()]
-    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *told]
+    # a covariate with a missing reading cannot be used by a model; it stays in the readings
+    recorded = [column for column in covariates(readings) if static[column].notna().all()]
+    kept = [*KEPT, *(c for c in WHERE_THERE if c in static.columns), *recorded]
     columns = static[[*kept, "start_s"]].assign(time_s=static["start_s"] + 0.5 * static["duration_s"])
     dwells = columns.drop(columns="start_s").merge(means, on=["unit", "record"], validate="one_to_one")
     dwells = dwells.assign(

@@ -1,4 +1,4 @@
-"""Standard uncertainty of the RMS error over dwells whose errors hang together."""
+"""Standard uncertainty of the RMS error over dwells with correlated errors."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def rms_uncertainty(error: Array, covariance: Array) -> Array:
     """Standard uncertainty of the RMS r = √(eᵀe/m) of errors e = μ + noise of the covariance Σ.
 
     Var(eᵀe) = 4·μᵀΣμ + 2·tr Σ² for normal noise. μ is not known, and E(eᵀΣe) = μᵀΣμ + tr Σ²: so 4·eᵀΣe − 2·tr Σ² estimates it,
-    taken as 2·tr Σ² where it is less. Where r is of the size of the noise, linearisation of the root ends: u is never more than
-    √(tr Σ/m), which r then is. rms/√(2m) holds for white errors alone: wander over a run makes m dwells worth one or two.
+    taken as 2·tr Σ² where it is less. If r is of the size of the noise, the root cannot be linearised: u is at most √(tr Σ/m),
+    the value of r in this case. rms/√(2m) is valid for white errors only: with wander over a run, m dwells are worth one or two.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The static record of a lot, gathered table by table: its samples, their last digit, and the temperature's known share."""
+"""The static record of a lot, collected table by table: its samples, their last digit, and the known share of the temperature."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 COUNTED = 1000
-"""Different values of a channel that are counted: an output that takes more has no coarse digits."""
+"""Different values of a channel that are counted: an output with more values has no coarse digits."""
 SMOOTHED_S = 120.0
-"""Time over which the thermometer's readings are averaged: its own noise shall not go through the tempco into the output."""
+"""Time over which the thermometer's readings are averaged: so that its own noise does not enter the output through the tempco."""
 FEWEST_READINGS = 5
 
 
 @dataclass
 class Digits:
-    """How often one channel gave each of its values, and the variance of its samples by the differences of neighbours."""
+    """The number of occurrences of each value of a channel, and the variance of its samples by the differences of neighbours."""
 
     counts: dict[float, int] = field(default_factory=dict)
     many: bool = False
@@ -41,7 +41,7 @@ class Digits:
     last: float = float("nan")
 
     def add(self, values: Array) -> None:
-        """Takes note of samples (n,) that follow those before."""
+        """Adds samples (n,) that follow the earlier ones."""
         if not values.size:
             return
         steps = np.diff(np.concatenate([[self.last], values]) if self.n else values)
@@ -55,7 +55,7 @@ class Digits:
 
     @property
     def step(self) -> float:
-        """Step between two digits, unit of the output; zero where none is seen."""
+        """Step between two digits, unit of the output; zero if none is detected."""
         return 0.0 if self.many else step_of(np.array(list(self.counts)))
 
     @property
@@ -65,12 +65,12 @@ class Digits:
 
     @property
     def outside(self) -> float:
-        """Share of the samples that are not at the commonest value."""
+        """Share of the samples that differ from the most frequent value."""
         return 1.0 - max(self.counts.values(), default=0) / max(self.n, 1)
 
 
 class Series:
-    """Outputs of the static record, gathered table by table; of a long one the means of ``size`` samples each.
+    """Outputs of the static record, collected table by table; of a long record the means of ``size`` samples each.
 
     The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.
     """
@@ -82,7 +82,7 @@ class Series:
         self.digits = {unit: tuple(Digits() for _ in AXES) for unit in units}
 
     def add(self, samples: pd.DataFrame) -> None:
-        """Takes the samples that follow those before."""
+        """Adds the samples that follow the earlier ones."""
         output = samples[list(AXES)].to_numpy(dtype=float)
         for unit, rows in samples.groupby("unit", sort=False).indices.items():
             if unit in self._rest:
@@ -106,9 +106,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Warmed:
-    """What the temperature of the static record did to an output, by the tempco of the model.
+    """The response of an output to the temperature of the static record, by the tempco of the model.
 
-    change : (n, 3), of the output, its mean taken out; zero where nothing is known
+    change : (n, 3), of the output, its mean taken out; zero if unknown
     span_K : by which the smoothed temperature moved, NaN where it was not read often enough
     known : whether the model has a tempco
     """
@@ -121,7 +121,7 @@ class Warmed:
 def warmed(
     calibration: Calibration, unit: str, time: Array, reading: pd.Series, history: pd.DataFrame | None
 ) -> Warmed:
-    """The known part of a record that its temperature made.
+    """The known response of a record to its temperature.
 
     The thermometer's readings between the dwells (table ``history``) are averaged over two minutes, put through the model's
     temperature effects in the pose of the record, and interpolated.
@@ -153,7 +153,7 @@ def warmed(
 
 
 def _smoothed(history: pd.DataFrame, unit: str, start: float, stop: float) -> tuple[Array, Array] | None:
-    """Times (m,) and averaged temperatures (m,) of a unit during its record; None where it was read too seldom."""
+    """Times (m,) and averaged temperatures (m,) of a unit during its record; None if it was read too rarely."""
     rows = history[(history["unit"] == unit) & history["time_s"].between(start - SMOOTHED_S, stop + SMOOTHED_S)]
     rows = rows[np.isfinite(rows["unit_C"].to_numpy(dtype=float))].sort_values("time_s")
     time, value = rows["time_s"].to_numpy(dtype=float), rows["unit_C"].to_numpy(dtype=float)

@@ -1,7 +1,6 @@
-"""Data faults, looked for before any physics: a verdict for every unit of the lot.
+"""Search for data faults before the fit: a verdict for every unit of the lot.
 
-A unit with a fault is refused whole. It gets its verdict, and never a coefficient, a grade or a certificate; the other
-units go on.
+A unit with a fault is refused completely: it gets a verdict, but no coefficient, grade or certificate; the other units continue.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ if TYPE_CHECKING:
 
 FEWEST_TO_JUDGE = 10  # samples: fewer equal values in a row happen by chance where the step is coarse
 CHAMBER_MOVED_K = 5.0
-FOLLOWED_SHARE = 0.2  # a sensor that shows less than a fifth of the chamber's change does not read its temperature
+FOLLOWED_SHARE = 0.2  # a sensor that follows less than a fifth of the chamber's change does not measure its temperature
 FORCE_EXPLAINS = 0.5  # of an axis' variance over the poses; a live channel has more than 0.99
-TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly turn has nothing to show
+TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly turn shows no response
 SAMPLES_KEPT = 0.99
 
 
 class DataFault(NamedTuple):
-    """One thing wrong with one unit's data."""
+    """One fault of the data of one unit."""
 
     unit: str
     fault: str
@@ -45,7 +44,7 @@ class DataFault(NamedTuple):
 def validate(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, units: Sequence[Unit], zero_output: float = 0.0
 ) -> pd.DataFrame:
-    """Verdicts on samples that nobody has looked at yet, see :func:`verdicts`.
+    """Verdicts on samples without summaries, see :func:`verdicts`.
 
     Parameters
     ----------
@@ -56,7 +55,7 @@ def validate(
 
 
 def verdicts(summaries: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit]) -> pd.DataFrame:
-    """Verdicts: one row per unit of the lot with ``refused``, the fault found first, and all reasons.
+    """Verdicts: one row per unit of the lot with ``refused``, the first fault, and all reasons.
 
     Parameters
     ----------
@@ -98,11 +97,11 @@ def _verdicts(faults: list[DataFault], units: Sequence[Unit]) -> pd.DataFrame:
 def _first_of(reasons: list[str]) -> str:
     """The first of several reasons of one kind, with the number of the others."""
     others = len(set(reasons)) - 1
-    return reasons[0] + (f" (and {others} more like it)" if others else "")
+    return reasons[0] + (f" (and {others} more of this kind)" if others else "")
 
 
 def _silent(readings: pd.DataFrame, units: Sequence[Unit]) -> list[DataFault]:
-    """Units without a reading for every record that was made."""
+    """Units that lack a reading of a record."""
     made = set(readings["record"])
     faults = []
     for unit in units:
@@ -127,7 +126,7 @@ def _reading_faults(readings: pd.DataFrame) -> list[DataFault]:
 
 
 def _sample_faults(answered: pd.DataFrame, summaries: pd.DataFrame) -> list[DataFault]:
-    """Faults of the samples of every record that has any, record by record."""
+    """Faults of the samples, record by record."""
     known = {(row["record"], row["unit"]): row for row in summaries.to_dict("records")}
     faults: list[DataFault] = []
     for record in summaries["record"].unique():
@@ -141,7 +140,7 @@ def _sample_faults(answered: pd.DataFrame, summaries: pd.DataFrame) -> list[Data
 
 
 def _fault_of(own: Mapping[Any, Any] | None, unit: str, n: int, full: float) -> tuple[str, str, str] | None:
-    """Fault, finding and remedy of one unit's samples in one record; None where there is none."""
+    """Fault, finding and remedy of one unit's samples in one record; None if there is none."""
     there = 0 if own is None else own["n"]
     if own is None or there < SAMPLES_KEPT * n or there == 0:
         return "dropped_samples", f"{there} samples of {n}", "measure again"
@@ -161,7 +160,7 @@ def _fault_of(own: Mapping[Any, Any] | None, unit: str, n: int, full: float) -> 
 def _stale_temperatures(readings: pd.DataFrame) -> list[DataFault]:
     soaks = readings.groupby(["unit", "soak"])[["chamber_C", "unit_C"]].mean().groupby("unit")
     spans = soaks.max() - soaks.min()
-    # where records are taken on a ramp, the means of soaks say little: a device behind the chamber crosses them alike
+    # with records on a ramp the means of soaks are not conclusive: a device that lags the chamber has similar means
     records = readings.groupby("unit")[["chamber_C", "unit_C"]]
     crossed = records.quantile(0.95) - records.quantile(0.05)
     stale = spans[
@@ -185,15 +184,15 @@ def _frozen_temperatures(readings: pd.DataFrame) -> list[DataFault]:
         DataFault(
             unit,
             "frozen_temperature",
-            f"the unit's temperature is {value:.6g} °C to the last digit in the last {count} records, one that moves as before "
-            "and as the other units' is needed; check the temperature sensor",
+            f"the unit's temperature is {value:.6g} °C to the last digit in the last {count} records, a reading that changes "
+            "as before and as in the other units is needed; check the temperature sensor",
         )
         for unit, count, value in frozen(readings)
     ]
 
 
 def _table(output: pd.DataFrame, readings: pd.DataFrame, units: Sequence[Unit], unsound: set[str]) -> list[DataFault]:
-    """Every unit, where the sound ones say that the table did not stand where its encoders said."""
+    """Every unit, if the sound units show a pointing error of the table against its encoders."""
     reason = contradicts(pointing_of(output[~output["unit"].isin(unsound)], readings))
     return [DataFault(unit.serial, "table_angles", reason) for unit in units] if reason else []
 
@@ -219,7 +218,7 @@ def _dead_channels(means: pd.DataFrame, readings: pd.DataFrame) -> list[DataFaul
 
 
 def _turned(rows: pd.DataFrame) -> NDArray[np.bool_]:
-    """Which axes the poses turn far enough to expect an answer of, (3,)."""
+    """Axes that the poses turn far enough to expect a response, (3,)."""
     angles = np.radians(rows[["outer_deg", "inner_deg"]].to_numpy())
     return np.asarray(np.ptp(force_from_angles(angles[:, 0], angles[:, 1]), axis=0) >= TURNED_G)
 

@@ -27,20 +27,20 @@ def verify(
     covariance: pd.DataFrame,
     predictions: pd.DataFrame,
 ) -> dict[str, pd.DataFrame]:
-    """The error that is left in every verification dwell, and in every verification pose over its dwells, in µg.
+    """The remaining error of every verification dwell, and of every verification pose over its dwells, in µg.
 
     ``error_ug`` is |a_corr| − g, which needs no angle; ``error_x_ug`` … compare with the table's angles too.
-    ``uncertainty_ug`` (k = 1) is what may be expected there of a model that is right: white noise, wander since the fit's
-    own dwells, and what both have done to the coefficients. ``reading_ug`` (k = 1) is the white noise of the dwell alone.
+    ``uncertainty_ug`` (k = 1) is the error expected of a correct model: white noise, wander since the dwells of the fit, and the
+    effect of both on the coefficients. ``reading_ug`` (k = 1) is the white noise of the dwell alone.
     ``rms_uncertainty_x_ug`` … (k = 1), the same in all rows of a unit, belong to the RMS of ``error_x_ug`` … over its dwells.
 
-    In ``verification_poses`` the error is the mean over the dwells of one pose: what the calibration leaves, while wander, which
-    no calibration removes, averages out as far as it does. Its uncertainty is that of this mean, with the correlation of
-    its dwells.
+    In ``verification_poses`` the error is the mean over the dwells of one pose: the error that the calibration leaves; wander,
+    which no calibration removes, is partly averaged out. Its uncertainty is that of this mean, with the correlation of its
+    dwells.
     """
     if not np.any(dwells["kind"] == "verification") or coefficients.empty:
         return nothing_verified()
-    # all dwells, so that what an effect remembers of the pose before is there
+    # all dwells, because an effect with memory depends on the pose before
     lot, calibration = lot_arrays(dwells, history), read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
@@ -66,7 +66,7 @@ def verify(
 
 
 def _expected(predictions: pd.DataFrame, units: tuple[str, ...]) -> Array:
-    """Covariance of the errors of the dwells that a right model leaves, (units, 3, m, m), µg²."""
+    """Covariance of the errors of the dwells under a correct model, (units, 3, m, m), µg²."""
     unit, axis = (predictions[name].factorize(sort=True)[0] for name in ("unit", "axis"))
     dwell, other = (predictions[name].to_numpy() for name in ("dwell", "other"))
     m = np.unique(dwell).size

@@ -1,1 +1,1 @@
-"""The workbench: the archive, the model and what is missing, on pages of a local web application."""
+"""The workbench: archive, models and missing effects, on pages of a local web application."""

@@ -1,4 +1,4 @@
-"""The application: pages that are found, errors as sentences, static files, and the guard around everything."""
+"""The application: discovered pages, errors as sentences, static files, and access control."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROUTES = "pipelines.workbench.routes"
 
 
 def create_app(settings: Settings) -> ASGIApp:
-    """The application, with the guard around it."""
+    """The application, with access control."""
     settings.refuse_unsafe()
     bench = Workbench(settings, Jobs(settings.folder / "jobs.json", settings.workers))
 
@@ -58,7 +58,7 @@ def create_app(settings: Settings) -> ASGIApp:
 
 
 def _problem(request: Request, problem: Exception) -> Response:
-    """What a person can do something about, as a sentence."""
+    """An error that the user can correct, as a sentence."""
     return _answer(request, str(problem), 409 if isinstance(problem, Stale) else 422)
 
 

@@ -1,4 +1,4 @@
-"""What every page has: the workbench behind it, its template, its figures in three forms, and errors as sentences."""
+"""Common parts of pages: the workbench, templates, figures in three formats, and errors as sentences."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from pipelines.archive import Archive
 from pipelines.report.charts import csv_text, plotly_figure, png_bytes
 from pipelines.report.numbers import plain
+from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
 from schemas.units import MICRO
@@ -32,37 +33,42 @@ if TYPE_CHECKING:
     from pipelines.workbench.state import PageState
 
 State = TypeVar("State", bound="PageState")
-Wanted = Annotated[dict[str, Any], Body()]
-"""What a change asks for, as JSON."""
+RequestBody = Annotated[dict[str, Any], Body()]
+"""Body of a change request, JSON."""
 PARAMETER = {"json": "application/json", "csv": "text/csv; charset=utf-8", "png": "image/png"}
 
 
 @dataclass
 class Workbench:
-    """What handlers share.
+    """State shared by the handlers.
 
-    boot : of this life of the server · navigation : heading and address of the pages, in order
+    boot : id of this process of the server · navigation : heading and address of the pages, in order
     """
 
     settings: Settings
     jobs: Jobs
     boot: str = field(default_factory=lambda: secrets.token_hex(8))
     navigation: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
+    index: RecentIndex = field(init=False)
+
+    def __post_init__(self) -> None:
+        """The index is shared by all handlers."""
+        self.index = RecentIndex(self.settings.archive)
 
     @property
     def archive(self) -> Archive:
-        """The archive beside which it runs."""
+        """The archive of the workbench."""
         return Archive(self.settings.archive)
 
 
 def workbench_of(request: Request) -> Workbench:
-    """The workbench that answers a request."""
+    """The workbench of a request."""
     found: Workbench = request.app.state.workbench
     return found
 
 
 def state_of(request: Request, kind: type[State]) -> tuple[State, list[str]]:
-    """The state that an address says, and what of it cannot be."""
+    """The state of an address, and messages on invalid parts."""
     return kind.parse(request.query_params.multi_items())
 
 
@@ -84,10 +90,20 @@ def page(
     return HTMLResponse(text, status)
 
 
+def part_of(request: Request) -> str:
+    """The part of a page that the browser replaces; empty where it needs the whole page."""
+    return request.headers.get("x-part", "")
+
+
+def page_part(request: Request, template: str, state: PageState, **values: Any) -> HTMLResponse:
+    """A part of a page, with the command line of its state: what a click changes, without the work of the whole page."""
+    return page(request, "part.html", state, inner=template, **values)
+
+
 def figure(chart: Chart | None, ending: str, name: str) -> Response:
     """A chart as a figure for the page, as its numbers, or as a picture."""
     if chart is None:
-        raise WrongUse(f"figure {name}: there is nothing to draw yet; wait until the work is done")
+        raise WrongUse(f"figure {name}: it is not computed yet; wait until the work is done")
     if ending == "json":
         return JSONResponse(plotly_figure(chart))
     if ending == "csv":
@@ -98,7 +114,7 @@ def figure(chart: Chart | None, ending: str, name: str) -> Response:
 
 
 def saved_as(name: str) -> dict[str, str]:
-    """Headers of an answer that a browser saves under a name."""
+    """Headers of a download with a file name."""
     safe = "".join(letter if letter.isascii() and (letter.isalnum() or letter in "._-") else "_" for letter in name)
     return {"content-disposition": f'attachment; filename="{safe}"'}
 
@@ -117,12 +133,12 @@ def table_csv(rows: Sequence[Mapping[str, Any]], name: str) -> Response:
 
 
 def _cell(value: Any) -> Any:
-    """A value that no spreadsheet takes for a formula."""
+    """A value that spreadsheets do not evaluate as a formula."""
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
-    """A table of a run, kept while its manifest is the same."""
+    """A table of a run, cached while its manifest is the same."""
     found = bench.archive.run(run)
     place = found.path / f"{name}.json"
     when = place.stat().st_mtime_ns if isinstance(place, Path) and place.is_file() else 0
@@ -137,7 +153,7 @@ def _table(archive: str, run: str, name: str, when: int) -> pd.DataFrame:
 
 @cache
 def static_version() -> str:
-    """Part of the addresses of scripts and styles that changes with their content, so that browsers may keep them for ever."""
+    """Part of the addresses of scripts and styles that changes with their content, so that browsers can cache them."""
     digest = hashlib.sha256()
     for place in sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda one: one.name):
         if place.is_file():
@@ -163,6 +179,6 @@ def _tuple_of(values: Any) -> tuple[Any, ...]:
 
 
 def short(text: object, most: int = 28) -> str:
-    """A long name with its middle left out; the whole stands in the title beside it."""
+    """A long name shortened in the middle; the full name is in the title attribute."""
     found = str(text)
     return found if len(found) <= most else f"{found[: most - 9]}…{found[-8:]}"

@@ -1,4 +1,4 @@
-"""Questions to the archive in SQL: the same text is asked by the page and printed as its command."""
+"""Questions to the archive in SQL: the page and its printed command use the same text."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ORDERS = {
 
 
 class Search(Protocol):
-    """What is searched for; empty where it does not matter.
+    """Criteria of the search; empty for any.
 
     since, until : days, ISO · order : a key of :data:`ORDERS`
     """
@@ -43,13 +43,13 @@ def quoted(text: str) -> str:
 
 
 def like(text: str) -> str:
-    """A pattern that finds a text anywhere, its own signs taken as they are."""
+    """A pattern that finds a text anywhere, with its special characters escaped."""
     plain = text.replace("!", "!!").replace("%", "!%").replace("_", "!_")
     return f"{quoted(f'%{plain}%')} ESCAPE '!'"
 
 
 def conditions(page: Search) -> str:
-    """What the page's fields choose."""
+    """The conditions of the fields of the page."""
     parts: list[str] = []
     if page.search:
         found = like(page.search)
@@ -74,10 +74,15 @@ def units_question(page: Search) -> str:
 
 
 def yield_question(page: Search) -> str:
-    """How many units came to what."""
+    """Number of units by outcome."""
     return (
         f"SELECT outcome, count(*) AS units FROM units JOIN runs USING (run) WHERE {conditions(page)} GROUP BY outcome"  # noqa: S608 - texts are quoted
     )
+
+
+def newest_question(count: int) -> str:
+    """The newest runs, and how many there are."""
+    return f"SELECT run, count(*) OVER () AS runs FROM runs ORDER BY started DESC, run DESC LIMIT {count}"  # noqa: S608 - a number
 
 
 def history_question(unit: str) -> str:

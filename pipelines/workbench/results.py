@@ -1,4 +1,4 @@
-"""What jobs come to, as pages and their charts read it."""
+"""Results of jobs, as used by pages and charts."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 class Diagnosed:
     """A diagnosis for its page.
 
-    before : residuals of the model before the last step, µg, as in ``table``; None where there was none
-    names : what formulas may speak of, with what it is
+    before : residuals of the model before the last step, µg, as in ``table``; None if there is none
+    names : quantities for formulas, with their meaning
     """
 
     document: dict[str, Any]

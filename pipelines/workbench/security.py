@@ -1,7 +1,7 @@
-"""Who may ask, and who may change something: a pure ASGI application around everything, event streams too.
+"""Access control for reading and changes: an ASGI application around all requests, including event streams.
 
-Reading needs a host name of ours, so that no foreign page reaches the service by a name of its own that leads here; from
-another machine it also needs the token. A change needs, besides, the same origin and the token.
+Reading needs a known host name, so that no foreign page reaches the service by its own name (DNS rebinding); from
+another machine it also needs the token. A change also needs the same origin and the token.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ POLICY = (
     "connect-src 'self'; worker-src 'self' blob:; font-src 'self'; form-action 'self'; base-uri 'none'; "
     "frame-ancestors 'none'; manifest-src 'self'"
 )
-"""No script but our files. Plotly writes styles of its own, and makes PNG from data and blob addresses."""
+"""Only scripts of the product. Plotly writes inline styles, and makes PNG from data and blob addresses."""
 HEADERS = {
     "content-security-policy": POLICY,
     "x-content-type-options": "nosniff",
@@ -39,18 +39,18 @@ HEADERS = {
 
 
 class Guard:
-    """Lets through what may be asked; everything it lets through carries the headers above."""
+    """Passes permitted requests; every response has the headers above."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app, self._settings = app, settings
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, refuse, or hand on."""
+        """Answer, refuse, or pass on a request."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
         refusal = _refused(scope, self._settings)
-        if scope["type"] != "http":  # nothing here speaks over a socket
+        if scope["type"] != "http":  # no WebSockets
             await send({"type": "websocket.close", "code": 1008})
             return
         if refusal is None and (entered := _entering(scope, self._settings)) is not None:
@@ -64,22 +64,22 @@ class Guard:
 
 
 def _refused(scope: Scope, settings: Settings) -> str | None:
-    """Why a request is refused; None where it is not."""
+    """The reason for a refusal; None if the request is permitted."""
     headers = Headers(scope=scope)
     name = _host(headers)
     if name not in settings.hosts:
-        return f"workbench: host '{name[:80]}' is not one of this service; open {settings.address}"
+        return f"workbench: host '{name[:80]}' is not a name of this service; open {settings.address}"
     if scope["type"] != "http":
-        return "workbench: no sockets here"
+        return "workbench: WebSockets are not supported"
     if scope["method"] in READING:
         return _refused_to_read(scope, headers, settings)
     if scope["method"] in CHANGING:
         return _refused_to_change(scope, headers, settings)
-    return f"workbench: method {scope['method'][:20]} is not known here"
+    return f"workbench: method {scope['method'][:20]} is not supported"
 
 
 def _host(headers: Headers) -> str:
-    """The name by which the service was called, without its port; an IPv6 address keeps its brackets."""
+    """The host name of a request, without its port; an IPv6 address keeps its brackets."""
     text = headers.get("host", "").lower()
     before, bracket, _ = text.rpartition("]")
     return before + bracket if bracket else text.partition(":")[0]
@@ -87,7 +87,7 @@ def _host(headers: Headers) -> str:
 
 def _refused_to_read(scope: Scope, headers: Headers, settings: Settings) -> str | None:
     if headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-mode") not in {None, "navigate"}:
-        return "workbench: parts of other sites are not served"
+        return "workbench: requests from other sites are refused"
     if not settings.local and not _token_given(scope, settings) and not _asks_to_enter(scope):
         return "workbench: from another machine the token is needed; open the address that the command printed"
     return None
@@ -98,14 +98,14 @@ def _refused_to_change(scope: Scope, headers: Headers, settings: Settings) -> st
     if origin is None and not _bearer(headers):
         return "workbench: a change without an origin is refused; send the token as 'Authorization: Bearer …'"
     if origin is not None and origin not in _origins(headers, settings):
-        return f"workbench: origin '{origin[:80]}' may not change anything here"
+        return f"workbench: origin '{origin[:80]}' must not change data"
     if not _token_given(scope, settings):
-        return "workbench: this browser may look, not change; open the address with the token that the command printed"
+        return "workbench: this browser has read access only; open the address with the token that the command printed"
     return None
 
 
 def _origins(headers: Headers, settings: Settings) -> set[str]:
-    """Origins of this service as it was called."""
+    """Origins of this service for a host name."""
     host = headers.get("host", "").lower()
     schemes = ("https",) if settings.tls else ("https", "http") if settings.proxied else ("http",)
     return {f"{scheme}://{host}" for scheme in schemes}
@@ -130,13 +130,15 @@ def _asks_to_enter(scope: Scope) -> bool:
 
 
 def _entering(scope: Scope, settings: Settings) -> RedirectResponse | PlainTextResponse | None:
-    """The token of the address exchanged for a cookie, so that it stands in no address that is sent on."""
+    """The token of the address exchanged for a cookie, so that it does not remain in the address."""
     if scope["method"] not in READING or not _asks_to_enter(scope):
         return None
     query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
     token = next(value for name, value in query if name == "token")
     if not secrets.compare_digest(token.encode(), settings.token.encode()):
-        return PlainTextResponse("workbench: this token is not the one of this service; look at what it printed", 403)
+        return PlainTextResponse(
+            "workbench: this is not the token of this service; use the address that it printed", 403
+        )
     rest = urlencode([one for one in query if one[0] != "token"])
     answer = RedirectResponse(f"{scope['path']}{'?' + rest if rest else ''}", 303)
     answer.set_cookie(

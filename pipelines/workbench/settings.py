@@ -1,4 +1,4 @@
-"""What a workbench is started with."""
+"""Settings of a workbench."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ PORT = 8321
 
 @dataclass(frozen=True)
 class Settings:
-    """A workbench beside an archive.
+    """A workbench of an archive.
 
     archive : its address · folder : of files of dwells, models, uploads and the state of jobs and lots
-    host, port : where it listens · names : further host names by which it may be called
-    token : lets a browser change something · tls : whether it answers by HTTPS · proxied : whether a proxy does that for it
+    host, port : interface to listen on · names : further host names
+    token : allows a browser to change data · tls : whether it uses HTTPS · proxied : whether a proxy encrypts
     """
 
     archive: str
@@ -42,25 +42,26 @@ class Settings:
 
     @property
     def hosts(self) -> frozenset[str]:
-        """Host names, without a port, by which it may be called."""
+        """Permitted host names, without a port."""
         return frozenset({*LOOPBACK, "[::1]", *self.names, *([] if self.host in {"0.0.0.0", "::"} else [self.host])})  # noqa: S104
 
     @property
     def cookie(self) -> str:
-        """Name of the cookie; cookies know no ports, and two workbenches may run side by side."""
+        """Name of the cookie; cookies know no ports, and several workbenches can run on one host."""
         return f"tumbleline-workbench-{self.port}"
 
     @property
     def address(self) -> str:
-        """Where a browser begins, without the token."""
+        """The start address without the token."""
         scheme = "https" if self.tls else "http"
         host = "127.0.0.1" if self.host in {"0.0.0.0", "::"} else self.host  # noqa: S104
         return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self.port}"
 
     def refuse_unsafe(self) -> None:
-        """Refuse to be reached from elsewhere without encryption."""
+        """Refuse access from other machines without encryption."""
         if not self.local and not self.tls and not self.proxied:
             raise WrongUse(
-                f"workbench: host {self.host} is reached by other machines, encryption is needed; give --certificate and --key, "
-                "or --behind-proxy where a proxy does it, or leave --host out"
+                f"workbench: host {self.host} is reachable from other machines, encryption is needed; give --certificate and "
+                "--key, "
+                "or --behind-proxy if a proxy encrypts, or leave --host out"
             )

@@ -1,6 +1,6 @@
-"""The state of a page: what its address says, and the command line that gives the same numbers.
+"""The state of a page: its address, and the command line that gives the same numbers.
 
-``parse`` after ``address`` is the identity. What an address says that cannot be is left out, with a sentence for the page.
+``parse`` after ``address`` is the identity. Invalid parts of an address are ignored, with a message on the page.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class PageState(BaseModel):
 
     @classmethod
     def parse(cls, query: Iterable[tuple[str, str]]) -> tuple[Self, list[str]]:
-        """The state of an address, and a sentence for every part of it that cannot be."""
+        """The state of an address, and a message for every invalid part."""
         values: dict[str, Any] = {}
         for name, value in query:
             if name in cls.model_fields:
@@ -47,12 +47,12 @@ class PageState(BaseModel):
                     if name in values:
                         found = shown(str(error["input"]), 60)
                         problems.append(
-                            f"address: {name} = {found} cannot be used ({error['msg'].lower()}); it is left out"
+                            f"address: {name} = {found} cannot be used ({error['msg'].lower()}); it is ignored"
                         )
                         del values[name]
 
     def query(self, **changes: Any) -> str:
-        """The address' part behind the question mark, with some values changed; nothing that is as it is by itself."""
+        """The address' part behind the question mark, with some values changed; default values are omitted."""
         new = self.model_copy(update=changes) if changes else self
         pairs: list[tuple[str, str]] = []
         for name, about in type(self).model_fields.items():
@@ -82,7 +82,7 @@ class PageState(BaseModel):
 
 
 class UnitsPage(PageState):
-    """Runs and units, searched."""
+    """A search of runs and units."""
 
     PATH: ClassVar[str] = "/units"
     search: Text = ""
@@ -131,7 +131,7 @@ class UnitPage(PageState):
 
 
 class MissingPage(PageState):
-    """A model against dwells: is it adequate, where does it fail, what is missing.
+    """A model against dwells: adequacy, drivers of the residual, missing effects.
 
     source, fresh : runs of the archive, or files of the workbench's folder
     effects : the model to begin with; empty for the run's own, or the default one · added : effects that were added to it
@@ -152,7 +152,7 @@ class MissingPage(PageState):
 
     @property
     def judged(self) -> tuple[str, ...]:
-        """The effects of the model that is judged; empty for the one that the source comes with."""
+        """The effects of the model that is judged; empty for that of the source."""
         return (*self.effects, *self.added)
 
     def words(self) -> list[str]:
@@ -166,7 +166,7 @@ class MissingPage(PageState):
         return words + (["--leave-out", ",".join(self.without)] if self.without else [])
 
     def ladder_command(self, archive: str) -> str:
-        """The command line for the errors of the model as it is now."""
+        """The command line for the errors of the model in its present state."""
         words = self.words()
         if not words:
             return ""
@@ -176,7 +176,7 @@ class MissingPage(PageState):
 
 
 class UploadPage(PageState):
-    """A file, and what its columns are taken for."""
+    """A file, and the interpretation of its columns."""
 
     PATH: ClassVar[str] = "/upload"
     file: Text = ""
@@ -209,8 +209,23 @@ class UploadPage(PageState):
         return words + (["--fit", self.fit] if self.fit else [])
 
 
+class ModelsPage(PageState):
+    """Model files: their versions, their effect on the lots of the archive, and releases to the line.
+
+    model : a name among the model files · evaluate : whether the lots are computed with it
+    """
+
+    PATH: ClassVar[str] = "/models"
+    model: Text = ""
+    evaluate: Literal["", "yes"] = ""
+
+    def words(self) -> list[str]:
+        """The what-if, or the list of releases."""
+        return ["whatif", f"{self.model}.toml"] if self.model else ["release", "--list"]
+
+
 class PlanPage(PageState):
-    """A recipe: what it sees and what it costs."""
+    """A recipe: visible effects and station time."""
 
     PATH: ClassVar[str] = "/plan"
     recipe: Text = "production"
@@ -222,7 +237,7 @@ class PlanPage(PageState):
 
 
 class StationPage(PageState):
-    """The station of a run: what happened, temperatures over time."""
+    """The station of a run: events, temperatures over time."""
 
     PATH: ClassVar[str] = "/station"
     run: Text = "latest"
@@ -233,7 +248,7 @@ class StationPage(PageState):
 
 
 class AuditPage(PageState):
-    """What drifts and what is due."""
+    """Drift and calibrations due."""
 
     PATH: ClassVar[str] = "/audit"
     since: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = ""
@@ -259,5 +274,5 @@ class OperatorPage(PageState):
 
 
 PAGES: tuple[type[PageState], ...] = (
-    UnitsPage, RunPage, UnitPage, MissingPage, UploadPage, PlanPage, StationPage, AuditPage, OperatorPage,
+    UnitsPage, RunPage, UnitPage, MissingPage, ModelsPage, UploadPage, PlanPage, StationPage, AuditPage, OperatorPage,
 )  # fmt: skip

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, FiniteFloat, ValidationError
 
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.recipe import explain
 from schemas.strict import Strict
+from schemas.toml_files import explain
 from schemas.validity import Stability
 
 if TYPE_CHECKING:

@@ -101,7 +101,7 @@ def test_diagnose_names_what_is_missing_and_the_next_command(command, cubic):
     assert "NOT ADEQUATE" in out
     assert "third_order (K3)" in out
     assert "tumbleline extend model.toml third_order --effects bias,scale,misalignment" in out
-    assert "This plan could not have seen" in out
+    assert "Effects that this plan cannot show" in out
 
 
 def test_diagnose_as_json_has_the_keys_of_the_contract(command, cubic):
@@ -164,7 +164,7 @@ def test_compare_extend_and_history_see_the_error_fall(command, cubic, tmp_path)
         "extend", model, "third_order", "--effects", "bias,scale,misalignment", "--why", "the maps", "--by", "Q"
     )
     assert status == 0
-    assert "begun with version 1" in out
+    assert "created with version 1" in out
     status, out, _ = command("extend", model, "bias_asymmetry", "--json")
     assert json.loads(out)["version"] == 3
     status, out, _ = command("compare", *lot, "--model", model, "--json")
@@ -291,8 +291,8 @@ def test_the_report_is_one_file_that_needs_no_network(command, cubic, tmp_path):
     for part in (
         "third_order",
         "Residuals on the sphere",
-        "The ladder of candidates",
-        "What this plan could not have seen",
+        "Candidates",
+        "Effects that this plan cannot show",
         "<svg",
     ):
         assert part in text

@@ -46,9 +46,15 @@ def test_an_example_prints_what_the_guide_says(command: str, printed: str, share
     assert re.fullmatch(expected, found), done.stdout
 
 
-def test_json_holds_the_whole_answer_and_nothing_else(shared_data: Path, tmp_path: Path) -> None:
-    done = run(TUMBLE, shared_data, tmp_path / "archive", "--json")
-    document = json.loads(done.stdout)
+@pytest.fixture(scope="module")
+def tumble(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
+    """The document of the import of the tumble recording, and its archive."""
+    archive = tmp_path_factory.mktemp("tumble") / "archive"
+    return json.loads(run(TUMBLE, shared_data, archive, "--json").stdout), archive
+
+
+def test_json_holds_the_whole_answer_and_nothing_else(shared_data: Path, tumble: tuple[dict, Path]) -> None:
+    document, _ = tumble
     assert document["adequate"] is True
     file = shared_data / "xsens-tumble" / "xsens_acc.mat.gz"
     assert document["source"]["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
@@ -57,20 +63,22 @@ def test_json_holds_the_whole_answer_and_nothing_else(shared_data: Path, tmp_pat
     )  # 1.0 mm/s² without weights was published, 1.1 with the noise of each dwell
 
 
-def test_the_mapping_file_of_the_guide_does_the_same(shared_data: Path, tmp_path: Path) -> None:
+def test_the_mapping_file_of_the_guide_does_the_same(
+    shared_data: Path, tmp_path: Path, tumble: tuple[dict, Path]
+) -> None:
     content = re.search(r"```toml\n(.*?)```", GUIDE, flags=re.DOTALL)
     assert content is not None
     file = tmp_path / "mapping.toml"
     file.write_text(content[1], encoding="utf-8")
     command = f"tumbleline import $DATA/xsens-tumble/xsens_acc.mat.gz --mapping {file} --fit norm --json"
     document = json.loads(run(command, shared_data, tmp_path / "archive").stdout)
-    by_options = json.loads(run(TUMBLE, shared_data, tmp_path / "archive", "--json").stdout)
+    by_options, _ = tumble
     assert document == by_options
 
 
-def test_an_import_is_a_run_that_other_commands_read(shared_data: Path, tmp_path: Path) -> None:
-    archive = tmp_path / "archive"
-    run_id = json.loads(run(TUMBLE, shared_data, archive, "--json").stdout)["run"]
+def test_an_import_is_a_run_that_other_commands_read(shared_data: Path, tumble: tuple[dict, Path]) -> None:
+    document, archive = tumble
+    run_id = document["run"]
     dwells = read_dwells(run_id, archive=archive)
     assert len(dwells) == 38
     shown = json.loads(run(f"tumbleline show {run_id} coefficients --json", shared_data, archive).stdout)

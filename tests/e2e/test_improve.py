@@ -107,7 +107,7 @@ def test_an_end_of_input_is_no_answer(alike: Path, tmp_path: Path) -> None:
     words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", tmp_path / "m.toml")
     status, _, err = run(*words)
     assert status == 2
-    assert "give --yes where nobody answers" in err
+    assert "give --yes to run without an operator" in err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -17,7 +17,8 @@ from pipelines.archive import Archive
 from pipelines.cli import app
 from pipelines.cli.documents import OperatorDocument
 from pipelines.inquiry.documents import InquiryDocument
-from pipelines.inquiry.inquiry import FollowUp, Inquiry, JointDiagnosis
+from pipelines.inquiry.inquiry import FollowUp, Inquiry
+from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from pipelines.inquiry.loop import Consent, Participants, Settings, run_inquiry
 from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse

@@ -45,7 +45,7 @@ def address(query: str, tmp_path_factory: pytest.TempPathFactory) -> str:
         list(Runner(job, Archive(address), measure=CaptureDouble(stop_after=5)).all())
     double = CaptureDouble()
     list(Runner(job, Archive(address), measure=double).all())
-    assert len(double.measured) == job.recipe.wanted_records - 5
+    assert len(double.measured) == job.recipe.planned_records - 5
     return address
 
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.flows.credentials import REFUSED
-from pipelines.flows.knock import knock
+from pipelines.flows.server_check import check_server
 from schemas.errors import LinkLost, WrongUse
 
 EVIL = "http://evil.example"
@@ -202,13 +202,13 @@ def test_a_client_with_no_key_or_a_wrong_one_is_told(
     assert isinstance(result.exception, WrongUse)
     assert told in str(result.exception)
     monkeypatch.setenv("PREFECT_API_AUTH_STRING", line.key)
-    knock()
+    check_server()
 
 
 def test_an_orchestrator_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
     with pytest.raises(LinkLost, match="does not answer"):
-        knock()
+        check_server()
 
 
 def test_a_server_without_a_key_does_not_start() -> None:

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from inertial.errors import NotIdentified
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.jobs.model_change import wanted
+from pipelines.jobs.model_change import change_from_options
 from pipelines.jobs.releases import release
 from schemas.errors import RecipeInvalid, WrongUse
 
@@ -163,7 +163,7 @@ def test_plan_of_a_recipe_with_the_lines_model_asks_the_archive_for_it(faces, tm
         '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment", "own_square"]\n\n'
         '[[formula]]\nid = "own_square"\ncolumns = ["f**2"]\nwhy = "a trial"\n'
     )
-    release(own, wanted("", model), datetime(2026, 1, 1, tzinfo=UTC), reason="test", force=True)
+    release(own, change_from_options("", model), datetime(2026, 1, 1, tzinfo=UTC), reason="test", force=True)
     document = json.loads(CliRunner().invoke(app, asked).stdout)
     assert document["model"] == ["bias", "scale", "misalignment", "own_square"]
     other = CliRunner().invoke(app, ["plan", str(faces), "--effects", "bias,scale,misalignment", "--json"])

@@ -70,7 +70,7 @@ def test_the_printed_lines_carry_the_history_and_confirm_the_effect(command, lag
         assert status == 0, err
     assert re.search(r"(?<!not )confirmed:", one_row(out))
     assert "warning" not in out
-    assert "take it out" not in out
+    assert "remove it from the model" not in out
 
 
 def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(
@@ -115,5 +115,5 @@ def test_without_a_history_the_effect_is_warned_of_and_never_refuted(command, la
     status, out, _ = command(*words)
     assert status == 0
     assert "no history of the fresh run was given" in one_row(out)
-    assert "take it out" not in out
+    assert "remove it from the model" not in out
     assert json.loads(command(*words, "--json")[1])["versions"][-1]["confirmed"] is None

@@ -112,7 +112,7 @@ def test_inspect_draws_the_record_and_writes_a_page(record, tmp_path: Path) -> N
     assert [column["resolution"] for column in document["columns"]][1:] == [1.0, 1.0, 1.0]
     assert "<svg" in (tmp_path / "a.svg").read_text(encoding="utf-8")
     page = (tmp_path / "a.html").read_text(encoding="utf-8")
-    assert "the axis stands still" in page
+    assert "the axis is constant" in page
     assert document["command"].replace("'", "&#39;") in page
 
 
@@ -168,7 +168,7 @@ def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(
     (tmp_path / "a.csv").write_text(frozen_file(record), encoding="utf-8")
     status, _, err = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
     assert status == 2
-    assert "axis z stands still for" in err
+    assert "axis z is constant for" in err
     assert f"from row {record.spans[4][0] + 1} on" in err
     document = imported(tmp_path / "a.csv", tmp_path, *MAPPED, "--faulty", "leave-out")
     assert document["dwells"] == 8
@@ -205,7 +205,7 @@ def test_two_files_one_after_another_are_one_recording(record, monkeypatch, caps
     document = imported([first, second], tmp_path, *MAPPED, "--join", "rows")
     assert document["samples"] == len(frame)
     assert [one["path"] for one in document["source"]["files"]] == [str(first), str(second)]
-    assert "2.csv: its clock begins anew, set behind 1.csv" in document["remarks"]
+    assert "2.csv: its clock restarts; it is continued after 1.csv" in document["remarks"]
     boundary = (half - 0.5) / 100.0
     assert all(not one["start_s"] < boundary < one["end_s"] for one in document["dwell_list"])
     other = _written(frame.rename(columns={"ax": "bx"}), tmp_path / "3.csv")

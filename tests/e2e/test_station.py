@@ -16,7 +16,7 @@ from inertial.frames import force_from_angles
 from pipelines.capture.capture import capture
 from pipelines.schedule.steps import steps
 from schemas.station import load_station
-from schemas.tables import check
+from schemas.table_check import check
 from stations import open_station
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -126,7 +126,7 @@ def test_a_lot_without_a_fault_ends_with_its_results_before_unloading(tmp_path: 
         one.press("text=Start the lot")
         one.sees(".question")
         one.press("[data-answer='go']")
-        until(lambda: "take the units out" in one.page.inner_text("main"), "the results are there before unloading")
+        until(lambda: "remove the units" in one.page.inner_text("main"), "the results are there before unloading")
         assert one.page.locator(".tile.pass, .tile.fail, .tile.refused").count() == 2
         one.shot(tmp_path, "unload")
         one.press("[data-answer='go']")

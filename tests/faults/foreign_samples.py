@@ -21,9 +21,9 @@ from pipelines.jobs.seating import read_seating
 from schemas.bounds import COLDEST_C, HOTTEST_C, LONGEST_WAIT_S
 from schemas.errors import TumblelineError
 from schemas.profile import parse_profile
-from schemas.recipe import read_text
 from schemas.serials import is_serial
 from schemas.station import load_station
+from schemas.toml_files import read_text
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = """[model]
@@ -289,7 +289,7 @@ def read_recipe(path):
     for name in ("soak_min_s", "settle_s", "dwell_s", "static_record_s"):
         assert 0.0 <= getattr(recipe, name) <= LONGEST_WAIT_S
     assert all(COLDEST_C <= t <= HOTTEST_C for t in recipe.temperatures_C)
-    assert recipe.wanted_records < 1e8
+    assert recipe.planned_records < 1e8
 
 
 def read_slots(path):

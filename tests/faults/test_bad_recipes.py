@@ -9,7 +9,7 @@ from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.seating import Seating, read_seating, scan
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
 from schemas.model import parse_model
-from schemas.recipe import parse_toml
+from schemas.toml_files import parse_toml
 
 ROOT = Path(__file__).resolve().parents[2]
 RECIPE = ROOT / "schemas" / "samples" / "production.toml"

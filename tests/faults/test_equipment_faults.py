@@ -66,7 +66,7 @@ def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_
     first = float(readings[readings["pose"] != "bias"]["start_s"].min())
     fault = FaultOrder(kind=kind, at_s=max(0.0, first - 0.2), for_s=0.6)
     again = take(tmp_path, name, [fault], "again")
-    events = [event for event in again.events.noted() if event.kind == "spoilt"]
+    events = [event for event in again.events.recorded() if event.kind == "spoilt"]
     assert events
     assert again.finished() == good.finished()
     assert ("exciter" if name == "sweep" else "shock") in events[0].reason

@@ -22,7 +22,7 @@ from pipelines.audit.index import up_to_date
 from pipelines.audit.index_check import check_index
 from pipelines.audit.sql import ask
 from pipelines.certificates import Ledger
-from pipelines.certificates.ledger_index import NOTED, histories_of
+from pipelines.certificates.ledger_index import INDEX_FOLDER, histories_of
 from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
@@ -390,9 +390,9 @@ def test_noted_events_that_were_edited_are_read_again(root: Path, caplog) -> Non
     first = sorted(map(repr, histories_of(root).units))
     for number in range(8):  # enough of one digit to be noted
         Ledger(root).revoke("A1", f"reason {number}", certificate=1) if not number else None
-    (root / NOTED).mkdir(parents=True, exist_ok=True)
+    (root / INDEX_FOLDER).mkdir(parents=True, exist_ok=True)
     digit = min(root.glob("calibrations/*/*")).parent.name[0]
-    (root / NOTED / f"{digit}.noted").write_bytes(b'{"files": {"data": "00"}}\nPAR1')
+    (root / INDEX_FOLDER / f"{digit}.noted").write_bytes(b'{"files": {"data": "00"}}\nPAR1')
     assert len(histories_of(root).units) == len(first)
     assert "was edited since it was made" in caplog.text
 

@@ -72,7 +72,7 @@ def test_refuses_records_that_contradict_their_mapping(change: object, words: st
 
 
 def test_refuses_g_claimed_as_counts(rng: np.random.Generator) -> None:
-    with pytest.raises(DataRejected, match="no whole numbers"):
+    with pytest.raises(DataRejected, match="not whole numbers"):
         imported(table(rng), how(units={"output": "LSB"}), "file.csv")
 
 
@@ -99,7 +99,7 @@ def test_a_covariate_may_have_any_name_and_a_likely_slip_is_remarked() -> None:
 
 
 def test_refuses_a_record_of_nobody(rng: np.random.Generator) -> None:
-    with pytest.raises(WrongUse, match="whose record"):
+    with pytest.raises(WrongUse, match="no unit is mapped"):
         imported(table(rng), how(unit=""), "f")
 
 

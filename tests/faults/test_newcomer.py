@@ -78,7 +78,7 @@ def test_a_model_with_as_many_coefficients_as_dwells_is_not_called_adequate(
     model = ("--effects", "bias,scale,misalignment")
     status, out, message = told(monkeypatch, capsys, command, str(tmp_path / "few.csv"), *model)
     assert (status, out) == (2, "")
-    assert "4 dwells a unit leave nothing to judge the model by" in message
+    assert "4 dwells a unit leave no degree of freedom to judge the model" in message
 
 
 def test_a_kind_of_device_with_a_slip_is_refused_before_anything_moves(tmp_path: Path) -> None:

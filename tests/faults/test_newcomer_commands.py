@@ -58,7 +58,7 @@ def test_a_serial_number_alone_shows_what_holds_today(monkeypatch, capsys, tmp_p
     status, out, _ = told(monkeypatch, capsys, "show", "A1", "--archive", tmp_path)
     assert (status, "certificate A1/1 holds on" in out) == (0, True)
     status, out, _ = told(monkeypatch, capsys, "show", "B1", "--archive", tmp_path)
-    assert (status, "no calibration holds on" in out) == (1, True)
+    assert (status, "no calibration is valid on" in out) == (1, True)
 
 
 def test_a_slot_map_that_is_not_there_is_asked_for_in_both_its_forms(monkeypatch, capsys, tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def test_samples_that_change_on_their_way_are_measured_again(monkeypatch, byte: 
 
     sink, events = captured(monkeypatch, changing(script))
     assert changed
-    reasons = [event.reason for event in events.noted() if event.kind == "spoilt"]
+    reasons = [event.reason for event in events.recorded() if event.kind == "spoilt"]
     assert len(reasons) == 1
     assert "slot 1: sample" in reasons[0]
     assert (sink.all(1)["status"] == "ok").all()

@@ -25,7 +25,7 @@ def run(*faults, config=None, lot=None, sink=None, events=None, recipe=RECIPE, *
 
 
 def kinds(events):
-    return [event.kind for event in events.noted() if event.kind not in {"reference", "soak"}]
+    return [event.kind for event in events.recorded() if event.kind not in {"reference", "soak"}]
 
 
 def means(sink):
@@ -48,7 +48,7 @@ DISTURBANCES = {
 def test_a_condition_that_passes_costs_time_and_no_data(condition, undisturbed):
     sink, events = run(DISTURBANCES[condition])
     assert kinds(events) == ["spoilt", "resumed"]
-    spoilt, resumed = (next(e for e in events.noted() if e.kind == kind) for kind in ("spoilt", "resumed"))
+    spoilt, resumed = (next(e for e in events.recorded() if e.kind == kind) for kind in ("spoilt", "resumed"))
     assert condition in spoilt.reason
     assert spoilt.record == resumed.record == 1
     assert resumed.figures["paused_s"] >= 60.0
@@ -69,11 +69,11 @@ def test_a_chamber_that_loses_its_power_for_a_while_is_settled_anew():
         {"kind": "chamber_power", "at_s": far, "for_s": 900.0}, recipe=recipe.model_copy(update={"dwell_s": 60.0})
     )
     assert "spoilt" in kinds(events)
-    assert any("is needed" in event.reason for event in events.noted() if event.kind == "spoilt")
+    assert any("is needed" in event.reason for event in events.recorded() if event.kind == "spoilt")
     readings = sink.all(1)
     assert (abs(readings["unit_C"] - 60.0) <= 1.0).all()
     assert (readings["status"] == "ok").all()
-    assert sum(event.kind == "soak" for event in events.noted()) >= 2
+    assert sum(event.kind == "soak" for event in events.recorded()) >= 2
 
 
 def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
@@ -87,7 +87,7 @@ def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
     assert end.value.exit_status == 3
     assert sorted(sink.records) == [0]
     assert kinds(events) == ["spoilt", "stopped"]
-    assert events.noted()[-1].action == "outer axis stopped; inner axis stopped; sampling stopped; chamber to 25 °C"
+    assert events.recorded()[-1].action == "outer axis stopped; inner axis stopped; sampling stopped; chamber to 25 °C"
 
 
 def test_a_run_that_the_door_has_ended_goes_on_when_it_is_closed_and_the_command_given_again(undisturbed):
@@ -106,7 +106,7 @@ def test_the_emergency_stop_waits_for_nothing_and_leaves_the_station_safe():
     plant = make_plant(config, lot)
     with serve_plant(config, lot, plant) as station, pytest.raises(OperatorNeeded, match="emergency stop is pressed"):
         capture(station, RECIPE, lot, MemorySink(), progress=quiet_progress, events=events)
-    assert events.noted()[-1].kind == "emergency_stop"
+    assert events.recorded()[-1].kind == "emergency_stop"
     assert not plant.sampler.running
     assert plant.fixture.chamber.set_point == 25.0
     assert plant.now < DURING + 15.0
@@ -136,7 +136,7 @@ def test_a_dwell_spoilt_again_and_again_is_given_up_after_the_allowed_attempts()
 
 def test_soaks_tell_how_far_they_went_beyond():
     _, events = run(recipe=short_recipe(poses=1, temperatures=(25.0, 60.0)))
-    soaks = [event.figures for event in events.noted() if event.kind == "soak"]
+    soaks = [event.figures for event in events.recorded() if event.kind == "soak"]
     assert [soak["target_C"] for soak in soaks] == [25.0, 60.0]
     assert 0.2 < soaks[1]["air_overshoot_K"] < 2.0
     assert 0.0 <= soaks[1]["device_overshoot_K"] < soaks[1]["air_overshoot_K"]
@@ -174,4 +174,4 @@ def test_a_run_killed_around_a_pause_goes_on_bit_for_bit(records):
     assert sink.state == whole.state
     for part in range(3):
         pd.testing.assert_frame_equal(sink.all(part), whole.all(part), check_exact=True)
-    assert events.noted() == reasons.noted()
+    assert events.recorded() == reasons.recorded()

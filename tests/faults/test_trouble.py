@@ -114,7 +114,7 @@ def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, so
     runner = Runner(job, archive, measure=second)
     for stage in ORDER[:-1]:
         runner.stage(stage)
-    assert len(second.measured) == job.recipe.wanted_records - stop_after
+    assert len(second.measured) == job.recipe.planned_records - stop_after
     for name in sound.tables():
         assert (runner.run.path / f"{name}.parquet").read_bytes() == (sound.path / f"{name}.parquet").read_bytes()
 

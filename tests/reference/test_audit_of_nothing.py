@@ -7,10 +7,10 @@ from inertial.population.change_points import change_points
 from inertial.population.control_charts import alarms, baseline, false_alarms, signals
 from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import OWN, kind_drifts, unit_drifts
+from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.population import Figures, abilities, odd_ones
 from pipelines.audit.rules import load_rules
-from pipelines.audit.swaps import strangers
 
 DEVICE, YEAR_D = "adxl355", 365.25
 # bias µg, scale ppm, square mrad, rotation mrad, bias over temperature µg/K, scale over temperature ppm/K; each thrice
@@ -136,13 +136,13 @@ def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
 FIGURES, LIMIT = 7, 4.0  # as many figures, normal with σ = 1 and limits of ± 4: Ppk is 4/3
 
 
-def told_different(all_, columns):
+def told_different(every, columns):
     """Whether stations or slots are said to differ (p below 10⁻³, 2 % of the variance), and the share of Ppk that hold."""
-    n = len(all_)
+    n = len(every)
     names = np.repeat(np.array([f"figure_{k}" for k in range(len(columns))], dtype=object), n)
     texts = np.full(names.size, "1", dtype=object)
     rows = np.tile(np.arange(n), len(columns))
-    able, found = abilities(all_, Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts))
+    able, found = abilities(every, Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts))
     held = np.mean([one.ppk.low <= LIMIT / 3.0 <= one.ppk.high for one in able])
     return any(one.by != "lot" and one.p < 1e-3 and one.found.effect > 0.02 for one in found), held
 
@@ -156,11 +156,11 @@ def test_units_that_come_back_to_their_station_are_no_evidence_against_it(rng):
         serials = np.repeat([f"U{u:05d}" for u in range(units)], times)
         days, nothing = np.tile(180.0 * np.arange(times), units), np.zeros((units * times, len(NAMES)))
         stations = [f"line-{one}" for one in seat // 8]
-        all_ = calibrations(serials, days, nothing, stations=stations, slots=seat % 8)
+        every = calibrations(serials, days, nothing, stations=stations, slots=seat % 8)
         columns = [
             np.repeat(rng.standard_normal(units), times) + 0.05 * rng.standard_normal(300) for _ in range(FIGURES)
         ]
-        told, share = told_different(all_, columns)
+        told, share = told_different(every, columns)
         wrong, held = wrong + told, [*held, share]
     assert wrong <= 1
     assert np.mean(held) == pytest.approx(0.95, abs=0.05)
@@ -175,11 +175,11 @@ def test_lots_that_differ_are_no_evidence_against_their_stations(rng):
         stations = np.array([f"line-{one}" for one in rng.integers(0, 3, lots)])[lot]
         nothing = np.zeros((lot.size, len(NAMES)))
         runs = [f"r{one:03d}" for one in lot]
-        all_ = calibrations(serials, lot, nothing, stations=stations, slots=np.tile(np.arange(size), lots), runs=runs)
+        every = calibrations(serials, lot, nothing, stations=stations, slots=np.tile(np.arange(size), lots), runs=runs)
         columns = [
             (rng.standard_normal(lot.size) + rng.standard_normal(lots)[lot]) / np.sqrt(2.0) for _ in range(FIGURES)
         ]
-        told, share = told_different(all_, columns)
+        told, share = told_different(every, columns)
         wrong, held = wrong + told, [*held, share]
     assert wrong <= 1
     assert np.mean(held) == pytest.approx(0.94, abs=0.05)
@@ -193,8 +193,8 @@ def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
         lot = np.repeat(np.arange(150), rng.choice([4, 8, 32], 150, p=[0.2, 0.6, 0.2]))
         values = rng.standard_normal((lot.size, len(NAMES))) + differing * rng.standard_normal((150, len(NAMES)))[lot]
         serials, runs = [f"U{u:05d}" for u in range(lot.size)], [f"r{one:03d}" for one in lot]
-        all_ = calibrations(serials, lot, values, runs=runs)
-        found += sum(odd.kind == "lot" for odd in odd_ones(all_, np.ones(len(all_), dtype=bool)))
+        every = calibrations(serials, lot, values, runs=runs)
+        found += sum(odd.kind == "lot" for odd in odd_ones(every, np.ones(len(every), dtype=bool)))
     assert found <= 1
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from inertial.criticism.classes import TOLD_APART
+from inertial.criticism.classes import CLASS_WIDTH
 
 LOOKS, DWELLS, MORE, UNITS = 6, 72, 8, 4000
 
@@ -22,7 +22,7 @@ def test_six_looks_leave_the_wrong_rival_alone_in_less_than_one_run_of_a_thousan
     for look in range(1, LOOKS + 1):
         y, a, b = (np.concatenate(parts[:look], axis=-1) for parts in (noisy, true, wrong))
         lead = np.sum((y @ b) ** 2 / np.sum(b**2) - (y @ a) ** 2 / np.sum(a**2), axis=-1)
-        misled += int(np.count_nonzero((lead > TOLD_APART) & ~ended))
-        ended |= np.abs(lead) > TOLD_APART
+        misled += int(np.count_nonzero((lead > CLASS_WIDTH) & ~ended))
+        ended |= np.abs(lead) > CLASS_WIDTH
     assert misled <= 4
     assert np.mean(ended) > 0.2

@@ -3,8 +3,8 @@
 import pytest
 
 from pipelines.archive import Archive
+from pipelines.flows.archive_address import archive_of, named
 from pipelines.flows.credentials import credentials_in, refuse_credentials, without_credentials
-from pipelines.flows.places import archive_of, named
 from schemas.errors import WrongUse
 
 KEPT = [

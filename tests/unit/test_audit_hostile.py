@@ -18,11 +18,11 @@ from pipelines.archive import Archive
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
 from pipelines.audit.due import due, last_measured
+from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.findings import findings
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.rules import load_rules
 from pipelines.audit.serials import twice
-from pipelines.audit.swaps import strangers
 
 RULES = load_rules()
 

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
-from pipelines.audit.drifts import kind_drifts, pairs_of, unit_drifts
+from pipelines.audit.drifts import kind_drifts, unit_drifts
 from pipelines.audit.due import due
+from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.gauge_mounts import studies
+from pipelines.audit.pairs import pairs_of
 from pipelines.audit.parameters import NAMES, parameters_of
 from pipelines.audit.population import odd_ones, yields
 from pipelines.audit.rules import load_rules
 from pipelines.audit.stations_over_time import charts, slot_series
-from pipelines.audit.swaps import strangers
 
 START = day_of("2022-01-03")
 ERROR = 0.02

@@ -13,14 +13,14 @@ from typer.testing import CliRunner, Result
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE, make_key
 from pipelines.certificates import Ledger
+from pipelines.certificates.coefficient_remarks import library_remarks
 from pipelines.certificates.days import months_after
-from pipelines.certificates.handed_out import library_remarks
 from pipelines.certificates.measured import measured_on
 from pipelines.certificates.refusals import allowed_months
 from pipelines.chain import certify as certifying
 from pipelines.chain.certify import certify
 from pipelines.cli import app
-from pipelines.jobs.model_change import wanted
+from pipelines.jobs.model_change import change_from_options
 from pipelines.rerun.rerun import again
 from pipelines.stages.figures import UNITS
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
@@ -93,7 +93,7 @@ def test_without_dates_it_lasts_as_long_as_is_allowed(run: Run, typed: Typed) ->
 
 def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
-    new = run.archive.run(again(run.archive, run.id, wanted(limits=str(tmp_path / "half.toml"))).new)
+    new = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
     assert allowed_months(new) == 6
     assert measured_on(new) == day()
     ledger = Ledger(run.archive)
@@ -120,7 +120,7 @@ def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
 ) -> None:
     """While one checks its run, the other certifies a run of the same units: the first is told, and writes nothing."""
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
-    other = run.archive.run(again(run.archive, run.id, wanted(limits=str(tmp_path / "half.toml"))).new)
+    other = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
     ledger, real, done = Ledger(run.archive), certifying.refuse_unsound, []
 
     def meanwhile(which: Run, keys: object) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pandera.errors import SchemaError
 
-from schemas import tables
+from schemas import table_check, tables
 from schemas.columns import Seen, all_different
 
 GOOD = pd.DataFrame(
@@ -24,7 +24,7 @@ GOOD = pd.DataFrame(
 
 
 def right(frame: pd.DataFrame) -> bool:
-    return tables._plainly_right(tables.TABLES["covariance"], frame)
+    return table_check._plainly_right(tables.TABLES["covariance"], frame)
 
 
 def test_a_good_table_is_right_at_the_first_look() -> None:

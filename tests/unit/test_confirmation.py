@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from inertial.criticism.came_again import CameAgain
 from inertial.criticism.examination import Named
 from inertial.criticism.left_out import LeftOut
+from inertial.criticism.reproduced_change import ReproducedChange
 from pipelines.diagnosis import confirmation
 from pipelines.diagnosis.model_history import text_of
 
@@ -48,7 +48,9 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     monkeypatch.setattr(confirmation, "estimate", lambda model: model)
     monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
     monkeypatch.setattr(confirmation, "residuals_of", lambda problem, model: np.full((1, 9), next(sizes)))
-    monkeypatch.setattr(confirmation, "came_again", lambda *_: CameAgain(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base"))
+    monkeypatch.setattr(
+        confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
+    )
     monkeypatch.setattr(confirmation, "left_out", lambda _: missed(1e-4, 1.0))
     found = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
     assert found["confirmed"] is confirmed

@@ -30,16 +30,18 @@ def test_an_effect_added_from_a_class_is_not_called_found(capsys: pytest.Capture
         "not_parted": ["thermal_lag"],
     }  # fmt: skip
     said = ending(capsys, next_measurements=[row])
-    assert "Found in a class, not told apart" in said
-    assert "what was added, thermal_lag, is one of a class; these data fit as well with aging_log, warm_up." in said
-    assert "The measurement that tells them apart:" in said
-    assert "expected 60 if aging_log is true, 75 if warm_up is true; not told from the first by it: thermal_lag" in said
+    assert "Found in a class, not separated" in said
+    assert (
+        "the added effect, thermal_lag, is one of a class; these data fit equally well with aging_log, warm_up." in said
+    )
+    assert "The measurement that separates them:" in said
+    assert "expected 60 if aging_log is true, 75 if warm_up is true; not separated from the first: thermal_lag" in said
     assert "Found." not in said
 
 
 def test_where_no_measurement_parts_the_class_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "No measurement that the station is known to take tells them apart for sure." in ending(capsys)
-    words = {"why": "aging_log | warm_up: no steps of this station part them for sure; needed: a power cycle"}
+    assert "No measurement that the station can take is certain to separate them." in ending(capsys)
+    words = {"why": "aging_log | warm_up: no steps of this station are certain to separate them; needed: a power cycle"}
     said = ending(capsys, next_measurements=[words | {"measurable": False}])
     assert "needed: a power cycle" in said
 

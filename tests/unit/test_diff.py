@@ -10,7 +10,7 @@ from capture_double import CaptureDouble, small_job, small_run
 from pipelines.archive import Archive, Run
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.jobs.model_change import wanted
+from pipelines.jobs.model_change import change_from_options
 from pipelines.rerun.diff import diff
 from pipelines.rerun.rerun import again
 from schemas.errors import DataRejected
@@ -25,7 +25,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture(scope="module")
 def larger(run: Run) -> Run:
-    return run.archive.run(again(run.archive, run.id, wanted(effects=LARGER)).new)
+    return run.archive.run(again(run.archive, run.id, change_from_options(effects=LARGER)).new)
 
 
 def whats(document: dict) -> list[tuple[str, str]]:
@@ -47,7 +47,7 @@ def test_other_limits_flip_grades_and_no_coefficient_and_are_named(run: Run, tmp
     limits.write_text(
         f'name = "hard"\nrule = "simple_acceptance"\n[figures]\nzero_g_offset_mg = {{ max = {bias[1] + 0.1}, unit = "mg" }}\n'
     )
-    other = run.archive.run(again(run.archive, run.id, wanted(limits=str(limits))).new)
+    other = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(limits))).new)
     document = diff(run, other)
     worst = figures["unit"].iloc[-1]
     assert document["coefficients"] == []

@@ -11,7 +11,7 @@ from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected
-from schemas.tables import check
+from schemas.table_check import check
 
 LINEAR = ["bias", "scale", "misalignment", "bias_temperature"]
 LAG = [*LINEAR, "thermal_lag"]

@@ -32,7 +32,7 @@ def test_dwells_of_a_file_in_which_an_axis_stands_still_are_refused_or_left_out(
     frame.loc[7, "sy"] = 0.0
     columns = {"x": "ax", "y": "ay", "z": "az", "sd_x": "sx", "sd_y": "sy", "sd_z": "sz"}
     content = {"columns": columns, "units": {"output": "g"}, "unit": "A1", "rows": "dwells"}
-    with pytest.raises(DataRejected, match=r"axis y stands still in dwell 'dwell 7' \(row 8\).*1 such dwells"):
+    with pytest.raises(DataRejected, match=r"axis y is constant in dwell 'dwell 7' \(row 8\).*1 such dwells"):
         imported(frame, build(content, "t"), "f.csv")
     assert len(imported(frame, build({**content, "faulty": "leave-out"}, "t"), "f.csv").dwells) == 11
     assert len(imported(frame, build({**content, "faulty": "keep"}, "t"), "f.csv").dwells) == 12

@@ -12,7 +12,7 @@ from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive
 from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify
-from schemas import tables
+from schemas import table_check
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def test_every_table_keeps_its_contract_and_its_hash(made):
     run = archive.run(archive.runs()[0].id)
     assert len(run.tables()) == 15
     for name in run.tables():
-        assert len(tables.check(name, run.table(name))) == run.manifest(name)["rows"]
+        assert len(table_check.check(name, run.table(name))) == run.manifest(name)["rows"]
 
 
 def test_runs_come_in_order_of_time_with_ten_units_each(made):

@@ -151,7 +151,7 @@ def test_what_a_fresh_run_cannot_decide_asks_for_one_more_run_and_is_not_taken_o
     rows, _ = rows_of(model, {2: errors(15.0, 16.0, 15.5), 3: errors(14.9, 16.0, 15.4, judged(None, 0.5, 0.4, 0.1))})
     assert rows[-1]["confirmed"] is None
     assert "not decided" in rows[-1]["text"]
-    assert "one more run" in rows[-1]["text"]
+    assert "measure another run" in rows[-1]["text"]
 
 
 def test_without_a_fresh_run_nothing_is_refuted():

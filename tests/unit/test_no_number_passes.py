@@ -12,7 +12,7 @@ from inertial.noise.allan import overlapping
 from inertial.noise.terms import fit_terms
 from inertial.population.change_points import change_points
 from inertial.population.comparison import holm
-from pipelines.audit.few_units import _fits
+from pipelines.audit.exchanged_pairs import _fits
 from pipelines.stages.figures import UNITS
 from pipelines.stages.noise import limits_where_unexplained
 from schemas.limits import decide, parse_limits

@@ -5,7 +5,7 @@ import os
 import pytest
 from threadpoolctl import threadpool_info
 
-from pipelines.flows.spread import on_dask
+from pipelines.flows.dask_cluster import on_dask
 from pipelines.parallel import map_partitions
 from schemas.errors import DataRejected, LinkLost, WrongUse
 

@@ -53,7 +53,7 @@ def test_the_time_with_power_begins_again_and_the_readings_say_for_how_long_ther
     assert readings["since_power_s"][1] < 60.0 < readings["since_power_s"][0]
     assert readings["since_power_s"][2] > readings["since_power_s"][1]
     assert readings["start_s"][1] - readings["start_s"][0] > OFF_S
-    told = [(e.record, e.action) for e in events.noted() if e.kind == "power"]
+    told = [(e.record, e.action) for e in events.recorded() if e.kind == "power"]
     assert told == [(1, "devices off"), (1, "devices on again")]
 
 

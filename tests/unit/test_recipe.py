@@ -210,7 +210,7 @@ def test_a_recipe_may_say_soak_by_soak_which_poses_are_measured(tmp_path: Path) 
     assert (recipe.verification_at(1), recipe.verification_at(2)) == ([], recipe.verification)
     records = [s for s in steps(recipe) if s.kind != "allan"]
     assert len(records) == 4 + len(recipe.verification) + 4 + len(recipe.poses) + len(recipe.verification)
-    assert len(steps(recipe)) == recipe.wanted_records
+    assert len(steps(recipe)) == recipe.planned_records
 
 
 def test_refuses_soaks_that_name_a_pose_that_is_not_there(tmp_path: Path) -> None:

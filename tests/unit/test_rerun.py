@@ -13,7 +13,7 @@ from pipelines.archive import Archive, Run, code_hash
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.integrity import verify
-from pipelines.jobs.model_change import ModelChange, wanted
+from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.rerun import steps
 from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.partition import Batch, run_again
@@ -61,7 +61,7 @@ def test_nothing_is_done_where_nothing_changed(run: Run) -> None:
 
 def test_other_limits_only_grade_again(run: Run) -> None:
     before = files_of(run)
-    outcome = again(run.archive, run.id, wanted(limits="industrial"))
+    outcome = again(run.archive, run.id, change_from_options(limits="industrial"))
     new = run.archive.run(outcome.new)
     assert outcome.new != run.id
     assert [name for name, how in outcome.stages.items() if how == "computed"] == ["grade"]
@@ -72,7 +72,7 @@ def test_other_limits_only_grade_again(run: Run) -> None:
 
 
 def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
-    outcome = again(run.archive, run.id, wanted(effects=LARGER))
+    outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
     new = run.archive.run(outcome.new)
     assert {name for name, how in outcome.stages.items() if how == "computed"} == {
         "fit",
@@ -100,7 +100,7 @@ def test_what_a_rerun_makes_of_tables_that_it_made_itself_has_the_same_bytes(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     other_code(monkeypatch, "reduce", "fit", "verify", "noise", "grade")
-    outcome = again(run.archive, run.id, wanted(effects=LARGER))
+    outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
     assert outcome.stages["reduce"] == "computed"
     assert check(run.archive, outcome.new).same
 
@@ -113,7 +113,7 @@ def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_pa
     first = Runner(job, Archive(tmp_path / "first" / "archive"), measure=CaptureDouble())
     for stage in ORDER[:-1]:
         first.stage(stage)
-    outcome = again(run.archive, run.id, wanted(effects=",".join(effects)))
+    outcome = again(run.archive, run.id, change_from_options(effects=",".join(effects)))
     assert hashes(run.archive.run(outcome.new)) == hashes(first.run)
     assert outcome.new == first.run.id
 
@@ -122,7 +122,7 @@ def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_pa
 def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
     run: Run, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
 ) -> None:
-    change = wanted(effects=LARGER)
+    change = change_from_options(effects=LARGER)
     before = sorted(run.archive.root.rglob("*"))
 
     def unplugged(*_args: object) -> None:
@@ -141,7 +141,7 @@ def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
 
 @pytest.mark.parametrize("change", [{"effects": LARGER}, {"limits": "industrial"}])
 def test_a_rerun_is_finished_in_the_list_and_for_verify(run: Run, change: dict[str, str]) -> None:
-    new = again(run.archive, run.id, wanted(**change)).new
+    new = again(run.archive, run.id, change_from_options(**change)).new
     assert {info.id: info.finished for info in run.archive.runs()}[new]
     report = verify(run.archive, keys={})
     assert report.checked.findings == []
@@ -150,7 +150,7 @@ def test_a_rerun_is_finished_in_the_list_and_for_verify(run: Run, change: dict[s
 
 def test_a_rerun_that_only_takes_over_is_sealed_too(run: Run) -> None:
     """Interrupted by an older version before it was sealed: all stages are there, the chain does not name it."""
-    change = wanted(effects=LARGER)
+    change = change_from_options(effects=LARGER)
     new = run.archive.run(again(run.archive, run.id, change).new)
     (new.path / "sealed.json").unlink()
     shutil.rmtree(run.archive.root / "chain")
@@ -159,7 +159,7 @@ def test_a_rerun_that_only_takes_over_is_sealed_too(run: Run) -> None:
 
 
 def test_two_reruns_at_once_leave_one_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    change, real = wanted(effects=LARGER), BufferedRun.begin
+    change, real = change_from_options(effects=LARGER), BufferedRun.begin
     others: list[str] = []
 
     def meanwhile(self: BufferedRun, about: dict) -> None:
@@ -177,7 +177,7 @@ def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pipelines.jobs.job.ANALYSIS_KEYS", set())
-    outcome = again(run.archive, run.id, wanted(limits="industrial"))
+    outcome = again(run.archive, run.id, change_from_options(limits="industrial"))
     assert run.archive.run(outcome.new).about["capture"] == run.about["capture"]
 
 
@@ -192,7 +192,7 @@ def test_without_raw_samples_it_begins_at_the_dwells(run: Run, monkeypatch: pyte
 def test_refuses_another_model_where_the_static_record_is_gone(run: Run) -> None:
     shutil.rmtree(run.archive.root / "captures")
     with pytest.raises(DataRejected, match="static record is not in the archive"):
-        again(run.archive, run.id, wanted(effects=LARGER))
+        again(run.archive, run.id, change_from_options(effects=LARGER))
 
 
 def test_refuses_a_capture_that_is_not_finished(run: Run) -> None:
@@ -251,7 +251,7 @@ def test_a_check_says_what_it_could_not_check(run: Run) -> None:
 
 
 def test_chooses_runs_by_what_they_are(run: Run) -> None:
-    again(run.archive, run.id, wanted(limits="industrial"))
+    again(run.archive, run.id, change_from_options(limits="industrial"))
     archive = run.archive
     assert [e.id for e in selected(archive, ["all"])] == [run.id]
     assert [e.id for e in selected(archive, ["device:ADXL355", "unit:A2"])] == [run.id]
@@ -312,7 +312,7 @@ def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:
 def test_imported_dwells_are_graded_where_limits_are_named(imported: Run, tmp_path: Path) -> None:
     limits = tmp_path / "limits.toml"
     limits.write_text('name = "plain"\n[figures]\nzero_g_offset_mg = { max = 5.0, unit = "mg" }\n')
-    outcome = again(imported.archive, imported.id, wanted(limits=str(limits)))
+    outcome = again(imported.archive, imported.id, change_from_options(limits=str(limits)))
     grades = imported.archive.run(outcome.new).table("grades")
     assert grades["outcome"].tolist() == ["fail"]
     assert "zero_g_offset_mg fail" in grades["reasons"].iloc[0]

@@ -9,7 +9,7 @@ import pytest
 from pipelines.stages.coarse_digits import Coarse
 from pipelines.stages.fit import fit
 from pipelines.stages.noise import noise
-from schemas.tables import check
+from schemas.table_check import check
 
 RATE, N, WHITE = 10.0, 6000, 100.0
 EFFECTS = ["bias", "scale", "misalignment", "bias_temperature"]
@@ -82,7 +82,7 @@ def test_the_known_tempco_of_a_drifting_room_is_taken_out_of_a_record_and_told(c
     )
     assert false.mean() > 0.5
     assert not walk["identified"].any()
-    assert walk["note"].str.contains("known tempco's share").all()
+    assert walk["note"].str.contains("share of the known tempco").all()
     assert (walk["high"] < 0.3 * raw.xs("K", level="term")["high"]).all()
 
 
@@ -92,7 +92,7 @@ def test_what_rounding_adds_is_taken_out_of_the_white_noise(calibration: dict, s
     lsb = step * WHITE * np.sqrt(RATE / 2.0)
     values = white(rng, 20_000) + rng.uniform(0.0, lsb, (3, 1, 3))
     found = terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
-    assert found["note"].str.contains("taken out of N").all()
+    assert found["note"].str.contains("subtracted from N").all()
     np.testing.assert_allclose(found["value"], WHITE, rtol=0.04)
     assert (found["low"] < WHITE).mean() > 0.8
     assert (found["high"] > WHITE).mean() > 0.8

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas import tables
+from schemas import table_check, tables
 from schemas.errors import DataRejected
 
 
@@ -20,22 +20,22 @@ def dwells(**changes: object) -> pd.DataFrame:
 @pytest.mark.parametrize("column", ["out_x", "time_s", "unit_C"])
 def test_refuses_what_is_not_finite_and_names_unit_and_row(bad: float, column: str) -> None:
     with pytest.raises(DataRejected, match=rf"row 1 \(unit A2\), column {column}: found {bad}"):
-        tables.check("dwells", dwells(**{column: [1.0, bad]}))
+        table_check.check("dwells", dwells(**{column: [1.0, bad]}))
 
 
 def test_refuses_a_unit_that_is_there_twice() -> None:
     with pytest.raises(DataRejected, match="unit A1, dwell 0 is there twice"):
-        tables.check("dwells", dwells(unit=["A1", "A1"]))
+        table_check.check("dwells", dwells(unit=["A1", "A1"]))
 
 
 def test_names_a_missing_column_and_those_that_are_there() -> None:
     with pytest.raises(DataRejected, match="column out_z is missing, found unit, dwell"):
-        tables.check("dwells", dwells().drop(columns="out_z"))
+        table_check.check("dwells", dwells().drop(columns="out_z"))
 
 
 def test_refuses_words_where_numbers_are_needed() -> None:
     with pytest.raises(DataRejected, match="found many"):
-        tables.check("dwells", dwells(out_y=[1.0, "many"]))
+        table_check.check("dwells", dwells(out_y=[1.0, "many"]))
 
 
 def test_refuses_a_unit_of_output_that_it_does_not_know() -> None:
@@ -43,11 +43,11 @@ def test_refuses_a_unit_of_output_that_it_does_not_know() -> None:
         {"unit": ["A"], "slot": [0], "outcome": ["good"], "grade": [""], "reasons": [""], "rule": [""]}
     )
     with pytest.raises(DataRejected, match=r"row 0 \(unit A\), column outcome: found good"):
-        tables.check("grades", frame)
+        table_check.check("grades", frame)
 
 
 def test_keeps_columns_that_it_does_not_know() -> None:
-    assert "humidity_pct" in tables.check("dwells", dwells(humidity_pct=[40.0, 41.0]))
+    assert "humidity_pct" in table_check.check("dwells", dwells(humidity_pct=[40.0, 41.0]))
 
 
 def test_readings_of_a_silent_unit_may_have_gaps() -> None:
@@ -57,4 +57,4 @@ def test_readings_of_a_silent_unit_may_have_gaps() -> None:
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=2, max_size=2))
 def test_leaves_finite_numbers_as_they_are(values: list[float]) -> None:
-    assert tables.check("dwells", dwells(out_x=values))["out_x"].tolist() == values
+    assert table_check.check("dwells", dwells(out_x=values))["out_x"].tolist() == values

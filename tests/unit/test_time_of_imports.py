@@ -97,7 +97,7 @@ def test_day_and_month_that_cannot_be_told_apart_matter_only_where_the_date_chan
     form = "%d/%m/%Y %H:%M:%S.%f"
     same_day = [stamp.strftime(form) for stamp in STAMPS - pd.Timedelta(hours=1)]
     np.testing.assert_allclose(seconds(same_day)[0], STEPS / 100.0, atol=1e-6)
-    with pytest.raises(DataRejected, match="day and month cannot be told apart"):
+    with pytest.raises(DataRejected, match="day and month are ambiguous"):
         seconds([stamp.strftime(form) for stamp in STAMPS])
 
 

@@ -11,7 +11,7 @@ from inertial.criticism.classes import EffectClass, Member
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Problem
 from inertial.criticism.proposals import proposal, rivals_in, twins
-from inertial.criticism.separation import left_of, predictions, separations, widened
+from inertial.criticism.separation import predictions, residual_squares, separations, widened
 from inertial.design import grid_of
 from inertial.planning.sequences import SequenceStep
 from pipelines.diagnosis.next_measurement import Proposed
@@ -50,7 +50,7 @@ def test_level_and_the_offset_of_the_outer_encoder_get_a_sentence_and_no_steps(p
     assert proposal(model, group) is None
     rows = Proposed(((group, None),), None, (alike,)).rows()
     assert [row["measurable"] for row in rows] == [False]
-    assert "no measurement of this station parts them; needed: a level on the table" in rows[0]["why"]
+    assert "no measurement of this station separates them; needed: a level on the table" in rows[0]["why"]
 
 
 def test_rivals_that_poses_part_are_no_twins(part) -> None:
@@ -68,11 +68,12 @@ def test_a_kink_that_may_move_is_not_promised_as_far_away_as_one_that_may_not(pa
     steps = [SequenceStep(o, 0.0, t, 2.0) for t in (30.0, 10.0) for o in (0.0, np.pi)]
     free = separations(found, steps)[0, 1]
     wide = widened(found, steps, None)
-    noise = wide.covariance.taken(found.noise, found.covariance)
-    fixed = left_of(Model(wide, [*found.rest, group.members[1].term]), predictions(found, wide), noise)[0]
+    noise = wide.covariance.rescaled(found.noise, found.covariance)
+    fixed = residual_squares(Model(wide, [*found.rest, group.members[1].term]), predictions(found, wide), noise)[0]
     assert free < 0.5 * fixed * found.weight / found.variance
 
 
+@pytest.mark.slow
 def test_what_is_proposed_parts_the_rivals_when_it_is_measured(part) -> None:
     """One run of the benchmark `python benchmarks/worlds part`, with a generator that the proposal knows nothing of."""
     found = part.followed(("cubic on 18, faint", 9100))[1]

@@ -66,8 +66,8 @@ def test_dwells_left_out_as_tails_are_listed_beside_a_verdict_of_adequate(tmp_pa
     assert document["classes"] == []
     assert document["removed"]["heavy_tails"] is True
     print_diagnosis(document, source="dwells.parquet", model=None)
-    assert "the noise of this run may have tails that reach as far" in " ".join(capsys.readouterr().out.split())
-    assert "may have tails that reach as far" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "the tails of the noise of this run may reach as far" in " ".join(capsys.readouterr().out.split())
+    assert "the tails of the noise of this run may reach as far" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 def test_a_converters_fault_in_every_unit_is_no_verdict_on_the_model(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inertial.criticism.handling.not_soaked import NotSoaked
-from pipelines.inquiry.inquiry import NO_FOLLOW_UP, _ended, _not_parted
+from pipelines.inquiry.endings import NO_FOLLOW_UP, ending_of, no_follow_up
 from pipelines.jobs.recipes import _resolve
 from schemas.errors import RecipeInvalid
 
@@ -28,7 +28,7 @@ def joint(
 
 
 def test_a_model_that_cannot_be_judged_ends_with_the_reason_and_is_not_called_inadequate() -> None:
-    ending = _ended(joint(None))
+    ending = ending_of(joint(None))
     assert ending is not None
     assert ending.end == "not_judged"
     assert ending.text == "the model cannot be judged: 6 degrees of freedom, 15 are needed"
@@ -37,7 +37,7 @@ def test_a_model_that_cannot_be_judged_ends_with_the_reason_and_is_not_called_in
 
 def test_a_model_that_is_not_adequate_ends_otherwise() -> None:
     unexplained, alone, open_ = (
-        _ended(joint(False)), _ended(joint(False, ["third_order"])), _ended(joint(False, ["third_order", "clipping"])),
+        ending_of(joint(False)), ending_of(joint(False, ["third_order"])), ending_of(joint(False, ["third_order", "clipping"])),
     )  # fmt: skip
     assert unexplained is not None
     assert unexplained.end == "unexplained"
@@ -50,7 +50,7 @@ def test_what_no_dwells_left_out_judge_is_named_and_said_to_be_unconfirmed() -> 
     one = joint(False, ["cross_coupling"])
     one.document["classes"][0] |= {"scope": "sensor", "heldout_after_ug": None}
     one.document["recommended"] = []
-    ending = _ended(one)
+    ending = ending_of(one)
     assert ending is not None
     assert ending.text.startswith(
         "every class contains one effect: cross_coupling; not recommended yet: cross_coupling"
@@ -59,8 +59,8 @@ def test_what_no_dwells_left_out_judge_is_named_and_said_to_be_unconfirmed() -> 
 
 def test_a_class_that_no_follow_up_parts_for_sure_is_not_called_impossible_to_part() -> None:
     group = ["third_order", "clipping"]
-    assert "no follow-up was found" in _not_parted(joint(False, group))
-    assert _not_parted(joint(False, group, twins=(("third_order", "clipping"),))).startswith("no measurement on this")
+    assert "no follow-up was found" in no_follow_up(joint(False, group))
+    assert no_follow_up(joint(False, group, twins=(("third_order", "clipping"),))).startswith("no measurement on this")
 
 
 @pytest.mark.parametrize(("size", "possible"), [(1.15, True), (0.7, True), (0.022, False), (-1.0, False), (8.0, False)])

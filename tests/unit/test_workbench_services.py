@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from pipelines.archive import Archive
 from pipelines.jobs.model_files import read_model
 from pipelines.workbench.services import jobs as job_table
 from pipelines.workbench.services import lots, models, sources, uploads
@@ -94,7 +95,7 @@ def test_a_question_is_answered_once_and_by_its_number(settings: Settings) -> No
     with pytest.raises(lots.Stale):
         lots.answer(settings, name, 1, "go")
     lots.answer(settings, name, 2, "go")
-    with pytest.raises(lots.Stale, match="elsewhere"):
+    with pytest.raises(lots.Stale, match="another page"):
         lots.answer(settings, name, 2, "stop")
     assert json.loads((settings.folder / "lots" / name / "answer-2.json").read_text()) == {"answer": "go"}
     with pytest.raises(WrongUse):
@@ -163,3 +164,33 @@ def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: Se
             uploads.keep(settings, name, b"1")
     with pytest.raises(WrongUse):
         uploads.resolve(settings, "/etc/passwd")
+
+
+def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_not_looked_at_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipelines.workbench.services import index as shared
+
+    looked: list[int] = []
+    look = shared.up_to_date
+
+    def counted(archive: Archive) -> object:
+        looked.append(1)
+        return look(archive)
+
+    monkeypatch.setattr(shared, "up_to_date", counted)
+    archive = Archive(str(tmp_path / "archive"))
+    recent = shared.RecentIndex(str(tmp_path / "archive"))
+    question = "SELECT run FROM runs ORDER BY run"
+    assert recent.ask(question).rows == []
+    names = []
+    for number in range(3):
+        names.append(archive.open_run(f"lot{number}", {"recipe": {"name": "r"}, "lot": {"units": []}}, number).id)
+        assert [name for (name,) in recent.ask(question).rows] == names
+    before = len(looked)
+    for _ in range(5):
+        recent.ask(question)
+    assert len(looked) == before
+    monkeypatch.setattr(shared, "USABLE_S", 0.0)  # old
+    recent.ask(question)
+    assert len(looked) == before + 1

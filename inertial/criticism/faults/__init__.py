@@ -1,4 +1,4 @@
-"""Data faults: what must be mended before physics is diagnosed. The first look that finds one stands for a unit."""
+"""Data faults, which must be corrected before effects are diagnosed. The first test that finds one decides for a unit."""
 
 from inertial.criticism.faults.exchanges import changed_units, swapped_units, wrong_poses
 from inertial.criticism.faults.fault import Fault, Look
@@ -27,11 +27,11 @@ LOOKS: tuple[Look, ...] = (
 )
 
 STILL_LOOKS: tuple[Look, ...] = (truncated, clock, temperature_units, stale, noisy, quantised, dropped)
-"""Looks for a record in one pose: nothing is known of its response, and an output may well repeat."""
+"""Tests for a record in one pose: its response is unknown, and its output may repeat."""
 
 
 def find_faults(readings: Readings) -> list[Fault]:
-    """Data faults of a lot, at most one kind per unit; a unit without one is fit for diagnosis."""
+    """Data faults of a lot, at most one kind per unit; a unit without one can be diagnosed."""
     found: dict[int, Fault] = {}
     for look in LOOKS if readings.turned else STILL_LOOKS:
         for fault in look(readings):

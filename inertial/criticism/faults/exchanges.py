@@ -1,4 +1,4 @@
-"""Readings under a wrong name: of another unit, of another range, of another pose."""
+"""Readings with a wrong assignment: of another unit, another range, another pose."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from inertial.criticism.faults.fault import Fault, dwells_of
 from inertial.criticism.readings import Array, Readings, exchanged, find_split
 
 _COMMON = 5.0
-"""Times the usual misfit that half of the units reach in a dwell whose pose is wrong for all."""
+"""Multiple of the usual misfit that half of the units exceed in a dwell whose pose is wrong for all."""
 
 
 def changed_units(readings: Readings) -> Iterator[Fault]:
@@ -25,7 +25,7 @@ def changed_units(readings: Readings) -> Iterator[Fault]:
                 "units_swapped",
                 unit,
                 places,
-                f"from dwell {split.place} on it carries the calibration of unit {partner}",
+                f"from dwell {split.place} on it has the calibration of unit {partner}",
             )
         elif not 0.75 < split.ratio < 1.33:
             yield Fault(
@@ -50,7 +50,7 @@ def swapped_units(readings: Readings) -> Iterator[Fault]:
     for (one, other), places in exchanged.items():
         if len(places) >= max(3, n // 20):
             for unit, partner in ((one, other), (other, one)):
-                evidence = f"{len(places)} dwells carry the bias and scale of unit {partner}"
+                evidence = f"{len(places)} dwells have the bias and scale of unit {partner}"
                 yield Fault("units_swapped", unit, tuple(places), evidence)
 
 
@@ -75,7 +75,7 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
     typical = np.nanmedian(size, axis=1, keepdims=True)
     out = size > np.maximum(0.02, 15.0 * typical)
     if len(out) > 2:
-        # what most units show is the plan's or the table's, not one unit's: the search for effects tells it for all
+        # an error of most units belongs to the plan or the table: the search for effects reports it
         ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)
         out &= ratio < _COMMON
     for unit, row in enumerate(out):
@@ -86,8 +86,8 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         turned = np.abs(np.linalg.norm(felt, axis=-1) - 1.0) < 0.02
         if not turned.any():
             continue
-        name, told = _which_pose(readings.force[unit], places[turned], felt[turned])
-        yield Fault(name, unit, dwells_of(places[turned]), told)
+        name, text = _which_pose(readings.force[unit], places[turned], felt[turned])
+        yield Fault(name, unit, dwells_of(places[turned]), text)
 
 
 def _felt(readings: Readings, unit: int, places: NDArray[np.intp]) -> Array:
@@ -101,6 +101,6 @@ def _which_pose(force: Array, places: NDArray[np.intp], felt: Array) -> tuple[st
         for j in range(i + 1, len(places)):
             b = places[j]
             if np.linalg.norm(felt[i] - force[b]) < 0.05 and np.linalg.norm(felt[j] - force[a]) < 0.05:
-                return "swapped_dwells", f"dwells {a} and {b} carry each other's pose"
+                return "swapped_dwells", f"dwells {a} and {b} have exchanged poses"
     angle = np.degrees(np.arccos(np.clip(np.sum(felt[0] * force[places[0]]), -1.0, 1.0)))
-    return "wrong_pose", f"dwell {places[0]} was taken {angle:.1f}° from the commanded pose"
+    return "wrong_pose", f"dwell {places[0]} was measured {angle:.1f}° from the commanded pose"

@@ -1,4 +1,4 @@
-"""A data fault of one unit, and a look for one kind of them."""
+"""A data fault of one unit, and a test for one kind of them."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from inertial.criticism.readings import Readings
 
 @dataclass(frozen=True)
 class Fault:
-    """A data fault of one unit: its name, the places of the dwells in it, and what shows it."""
+    """A data fault of one unit: its name, its dwells, and the evidence."""
 
     name: str
     unit: int
@@ -23,5 +23,5 @@ Look = Callable[[Readings], Iterator[Fault]]
 
 
 def dwells_of(places: NDArray[np.intp]) -> tuple[int, ...]:
-    """Places of dwells, as a fault names them."""
+    """Places of dwells, as listed in a fault."""
     return tuple(int(place) for place in places)

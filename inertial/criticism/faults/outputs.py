@@ -1,4 +1,4 @@
-"""What the outputs of single dwells show without physics: repeats, spikes, torn words, coarse steps."""
+"""Faults of the outputs of single dwells: repeats, spikes, torn words, coarse steps."""
 
 from collections.abc import Iterator
 
@@ -15,7 +15,7 @@ def stuck(readings: Readings) -> Iterator[Fault]:
     for unit, out in enumerate(readings.output):
         still = _still(readings, unit)
         if still.size:
-            evidence = f"an axis stands still in {still.size} dwells: no scatter, as it has in the others"
+            evidence = f"an axis is constant in {still.size} dwells: it has no scatter, unlike in the others"
             yield Fault("stuck_output", unit, dwells_of(still), evidence)
             continue
         moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
@@ -45,7 +45,7 @@ def noisy(readings: Readings) -> Iterator[Fault]:
     common = np.nanmedian(ratio, axis=0, keepdims=True) if len(ratio) > 2 else np.ones((1, *ratio.shape[1:]))
     loud: NDArray[np.bool_] = np.logical_and(ratio > 5.0, ratio > 3.0 * common)
     few = np.count_nonzero(loud.any(axis=-1), axis=1) < 3
-    loud &= ~(few[:, None, None] & (ratio < 10.0))  # one restless dwell is a transient, not a fault of the reading
+    loud &= ~(few[:, None, None] & (ratio < 10.0))  # one noisy dwell is a transient, not a fault of the reading
     if readings.vibration is not None:
         level = np.nanmedian(readings.vibration, axis=1, keepdims=True)
         loud &= ~(readings.vibration > 2.0 * np.maximum(level, 1e-12))[..., None]
@@ -71,7 +71,7 @@ def outliers(readings: Readings) -> Iterator[Fault]:
     for unit, row in enumerate(np.asarray(out)):
         places = np.flatnonzero(row)
         if 0 < places.size <= 0.1 * row.size:
-            yield Fault("spikes", unit, dwells_of(places), f"{places.size} dwells far off the others")
+            yield Fault("spikes", unit, dwells_of(places), f"{places.size} dwells far from the others")
 
 
 def quantised(readings: Readings) -> Iterator[Fault]:
@@ -136,7 +136,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
 
 
 _MOST_STEPS = 20_000
-"""Steps over the range of the means beyond which the step cannot be told from so few dwells."""
+"""Steps over the range of the means beyond which the step cannot be told from these dwells."""
 
 
 def _white(readings: Readings, unit: int, axis: int) -> float | None:

@@ -1,4 +1,4 @@
-"""What a unit's record lacks: dwells, samples of a dwell, an order of time."""
+"""Gaps of a unit's record: missing dwells, missing samples, wrong order of time."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from inertial.criticism.readings import Readings
 
 
 def truncated(readings: Readings) -> Iterator[Fault]:
-    """Dwells that the rest of the lot has and a unit lacks: all at the end, or here and there."""
+    """Dwells that a unit lacks and the rest of the lot has: at the end, or in between."""
     there = readings.there
     for unit, row in enumerate(there):
         missing = np.flatnonzero(~row)
@@ -25,7 +25,7 @@ def truncated(readings: Readings) -> Iterator[Fault]:
                 "truncated_file",
                 unit,
                 (),
-                "the record of temperature goes on, and the last round of poses is not complete",
+                "the record of temperature continues, and the last round of poses is incomplete",
             )
 
 

@@ -1,4 +1,4 @@
-"""What a unit's response to gravity shows: a dead axis, another scale than its lot's, axes exchanged or turned round."""
+"""Faults of a unit's response to gravity: a dead axis, a scale unlike the lot, exchanged or inverted axes."""
 
 from collections.abc import Iterator
 
@@ -10,13 +10,13 @@ from inertial.criticism.readings import Readings
 
 
 def dead(readings: Readings) -> Iterator[Fault]:
-    """An axis that answers to no direction of gravity."""
+    """An axis that does not respond to gravity."""
     for unit, fit in enumerate(readings.fits):
         size = np.linalg.norm(fit[:, 1:], axis=1)
         weak = np.flatnonzero(size < 0.2 * np.median(size)) if np.median(size) > 0.0 else np.arange(3)
         for axis in weak[:1]:
             share = size[axis] / max(float(np.median(size)), 1e-300)
-            evidence = f"axis {'xyz'[axis]} answers to gravity with {share:.1%} of the other axes' scale"
+            evidence = f"axis {'xyz'[axis]} responds to gravity with {share:.1%} of the other axes' scale"
             yield Fault("dead_channel", unit, (), evidence)
 
 
@@ -44,7 +44,7 @@ def flipped(readings: Readings) -> Iterator[Fault]:
         signs = np.sign(k[rows, columns])
         if np.min(np.abs(k[rows, columns])) < 0.6 or (np.array_equal(rows, columns) and np.all(signs > 0)):
             continue
-        told = ", ".join(
+        text = ", ".join(
             f"{'xyz'[i]} reads {'+' if s > 0 else '−'}{'xyz'[j]}" for i, j, s in zip(rows, columns, signs, strict=True)
         )
-        yield Fault("axis_flip", unit, (), told)
+        yield Fault("axis_flip", unit, (), text)

@@ -1,4 +1,4 @@
-"""Thermometers: another unit than °C, and readings that stand still."""
+"""Faults of thermometers: a unit other than °C, and constant readings."""
 
 from collections.abc import Iterator
 
@@ -35,14 +35,14 @@ def stale(readings: Readings) -> Iterator[Fault]:
 
 
 def _noisy_steps(steps: Array) -> bool:
-    """Whether readings go up and down at random: steps of noise turn round two times in three, those of a drift seldom."""
+    """Whether readings go up and down at random: steps of noise reverse two times in three, those of a drift rarely."""
     if steps.size < 6 or np.mean(steps == 0.0) > 0.1:
         return False
     return bool(np.mean(np.sign(steps[1:]) != np.sign(steps[:-1])) > 0.45)
 
 
 def _moved_elsewhere(readings: Readings, unit: int, stretch: slice) -> float:
-    """How far the chamber, or the other units, moved meanwhile, K."""
+    """Change of the chamber, or of the other units, in the meantime, K."""
     moves = [0.0]
     if readings.chamber is not None:
         moves.append(float(np.ptp(readings.chamber[unit, stretch])))

@@ -1,4 +1,4 @@
-"""Alternatives to physics that handling makes, one per file; a file that is there takes part."""
+"""Handling errors, the alternatives to effects, one per file; every file of the package takes part."""
 
 from functools import cache
 from importlib import import_module

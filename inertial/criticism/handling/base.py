@@ -1,6 +1,7 @@
-"""What handling can do to a run that looks like physics: a unit that moved, a wrong pose, a thermometer that is off in one soak.
+"""Handling errors that look like effects: a unit that moved, a wrong pose, a thermometer with an offset in one soak.
 
-Such alternatives have one to three coefficients, and stand in the same search as the effects, which have one for every unit and
+Such alternatives have one to three coefficients, and take part in the same search as the effects, which have one for every unit
+and
 axis. They are of scope "data": no model is extended by them.
 """
 
@@ -20,19 +21,19 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Misfit = Callable[["Lot", tuple[int, ...]], float]
-"""Whitened sum of squares that the model leaves of a lot of some units, by their numbers in the whole lot."""
+"""Whitened sum of squares of the model's residuals on a lot of some units, by their numbers in the whole lot."""
 
 _PLACES = 40
-_EDGE = 3  # dwells at both ends after which, or before which, nothing can be told to have changed
+_EDGE = 3  # dwells at both ends after which, or before which, no change can be detected
 _SOAK_APART = 3.0  # K
 
 
 class Handling(Effect):
-    """An alternative to physics.
+    """A handling error.
 
     Attributes
     ----------
-    fewest_units : below which it cannot be told from the sensor itself, and is not looked for
+    fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
     single : whether each of its places is one dwell, ``at``; then :meth:`every_dwell` has the columns of all of them
     """
 
@@ -45,32 +46,32 @@ class Handling(Effect):
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Where it is looked for: values of ``unit``, ``dwell``, ``soak`` or ``pose``; units one after the other."""
+        """The places of the search: values of ``unit``, ``dwell``, ``soak`` or ``pose``; units in order."""
 
     @abstractmethod
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """Columns of the units it concerns, (units or 1, n, 3, k), g per unit of the coefficient."""
+        """Columns of the affected units, (units or 1, n, 3, k), g per unit of the coefficient."""
 
     @abstractmethod
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
-        """What happened, for people; ``size`` (k,) are the coefficients."""
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+        """The description for people; ``size`` (k,) are the coefficients."""
 
     def possible(self, size: Array) -> bool:
-        """Whether coefficients (k,) are such as the alternative can have; others are something else of the same shape."""
+        """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""
         del size
         return True
 
     def every_dwell(self, lot: "Lot") -> Array:
-        """Columns (units or 1, n, 3, k) of an alternative of one dwell, for each dwell as if it were the one."""
+        """Columns (units or 1, n, 3, k) of an alternative of one dwell, for each dwell in turn."""
         raise NotImplementedError(self.id)
 
     def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
-        """Other places that may explain the same dwells as well."""
+        """Other places that may explain the same dwells equally well."""
         del lot, place
         return []
 
     def short(self, size: Array, **place: float) -> str:
-        """One of :meth:`instead` in a few words."""
+        """A short text for one of :meth:`instead`."""
         raise NotImplementedError(self.id)
 
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
@@ -82,22 +83,22 @@ class Handling(Effect):
         return [{**place, "dwell": float(k)} for k in range(low, high + 1)]
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
-        """The lot without it; None where nothing but its term in the model takes it out."""
+        """The lot without it; None if only its term in the model removes it."""
         del lot, size, place
         return None
 
     def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
-        """The same where it takes more than the coefficients: ``misfit`` tells how well the model fits a lot of some units."""
+        """The same if it needs more than the coefficients: ``misfit`` is the misfit of the model on a lot of some units."""
         del misfit
         return self.mended(lot, size, **place)
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:
-        """Places of the dwells that it concerns: the first after a change, or each one that is wrong."""
+        """Places of the affected dwells: the first after a change, or each one that is wrong."""
         del lot
         return [int(place["dwell"])] if "dwell" in place else []
 
     def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """Columns of all blocks, (blocks, n, k); zero in units that it does not concern."""
+        """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
         change = self.change(lot, slope, **place)
         units, n = lot.state.time.shape
         whole = np.zeros((units, n, 3, change.shape[-1]))
@@ -115,12 +116,12 @@ def by_block(change: Array) -> Array:
 
 
 def stride(lot: "Lot") -> int:
-    """Dwells between places at which a change is looked for first."""
+    """Distance in dwells of the places of the first search for a change."""
     return max(1, int(np.ceil(lot.state.time.shape[1] / _PLACES)))
 
 
 def times(lot: "Lot") -> list[int]:
-    """Dwells from which on something may have changed, ends left out."""
+    """Dwells from which on a change is possible, without the ends."""
     n = lot.state.time.shape[1]
     return list(range(_EDGE, n - _EDGE + 1, stride(lot)))
 
@@ -146,7 +147,7 @@ def tilts(state: State) -> Array:
 
 
 def soaks(state: State) -> NDArray[np.intp]:
-    """Number of the soak of each dwell, (n,); all zero where the temperature stays."""
+    """Number of the soak of each dwell, (n,); all zero at constant temperature."""
     return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
 
 
@@ -162,7 +163,7 @@ def _soaks(state: State) -> NDArray[np.intp]:
 
 
 def without(lot: "Lot", dwells: list[int]) -> "Lot":
-    """The lot with some dwells taken out of all units."""
+    """The lot without some dwells of all units."""
     error = lot.error.copy()
     error[:, dwells] = np.inf
     return replace(lot, error=error)

@@ -27,7 +27,7 @@ class FixtureMoved(Handling):
         del slope
         return turns(lot.state.force) * after(lot, place["dwell"])[:, None, None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The angle and its axis."""
         del lot, place
         angle = float(np.linalg.norm(size))

@@ -62,7 +62,7 @@ class NotSoaked(Handling):
         """
         return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The time constant."""
         del size
         behind = np.abs(_temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0))

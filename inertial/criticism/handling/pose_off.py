@@ -1,4 +1,4 @@
-"""The table stood elsewhere than commanded whenever it went to one pose."""
+"""The table was not at the commanded angles in every dwell of one pose."""
 
 from typing import TYPE_CHECKING, ClassVar
 
@@ -20,7 +20,7 @@ class PoseOff(Handling):
     breaker: ClassVar[str] = "check the angles of that pose in the recipe, and measure it again"
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Every pose that comes more than once; none where the angles are not known."""
+        """Every pose that comes more than once; none if the angles are unknown."""
         if lot.state.outer is None or lot.state.inner is None:
             return []
         number, count = np.unique(_poses(lot), return_counts=True)
@@ -32,7 +32,7 @@ class PoseOff(Handling):
         del slope
         return tilts(lot.state) * (_poses(lot) == int(place["pose"]))[:, None, None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
         del lot, place
         angles = np.degrees(size)

@@ -25,7 +25,7 @@ class ReferenceStep(Handling):
         del slope
         return (lot.state.force * after(lot, place["dwell"])[:, None])[..., None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The change."""
         del lot, place
         return f"the scale factors of all units changed by {1e6 * size[0]:+.0f} ppm; look at the reader's reference"

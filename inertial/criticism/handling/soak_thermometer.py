@@ -1,4 +1,4 @@
-"""The thermometers read off by the same in one soak."""
+"""All thermometers have the same offset in one soak."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class SoakThermometer(Handling):
-    """A reading of temperature that is off in one soak, for all units."""
+    """An offset of the temperature reading in one soak, for all units."""
 
     id: ClassVar[str] = "soak_thermometer"
     symbol: ClassVar[str] = "ΔT"
@@ -23,17 +23,17 @@ class SoakThermometer(Handling):
     hides_behind: ClassVar[tuple[str, ...]] = ("scale_temperature_quadratic", "bias_temperature_quadratic")
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Every soak, where there are more than two."""
+        """Every soak, if there are more than two."""
         number = int(soaks(lot.state).max()) + 1
         return [{"soak": float(k)} for k in range(number)] if number > 2 else []
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """What an offset of one kelvin adds, by each unit's own coefficients."""
+        """The contribution of an offset of one kelvin, by each unit's own coefficients."""
         if slope is None:
             return np.zeros((*lot.state.time.shape, 3, 1))
         return -(slope * (soaks(lot.state) == int(place["soak"]))[:, None])[..., None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
         del lot
         return f"the thermometers read {self.short(size, **place)}; the readings are corrected by it"

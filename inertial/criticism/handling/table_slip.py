@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class TableSlip(Handling):
-    """A table whose angles are off from a dwell on."""
+    """A table whose angles have offsets from a dwell on."""
 
     id: ClassVar[str] = "table_slip"
     symbol: ClassVar[str] = "εα, εβ(t)"
@@ -18,7 +18,7 @@ class TableSlip(Handling):
     hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset",)
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Every place in time; none where the angles are not known."""
+        """Every place in time; none if the angles are unknown."""
         return [] if lot.state.outer is None or lot.state.inner is None else [{"dwell": float(k)} for k in times(lot)]
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
@@ -26,7 +26,7 @@ class TableSlip(Handling):
         del slope
         return tilts(lot.state) * after(lot, place["dwell"])[:, None, None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
         del lot, place
         off = f"{1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner)"

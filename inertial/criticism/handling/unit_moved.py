@@ -31,7 +31,7 @@ class UnitMoved(Handling):
         force = np.broadcast_to(lot.state.force, (*lot.state.time.shape, 3))[int(place["unit"])]
         return (turns(force) * after(lot, place["dwell"])[:, None, None])[None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The angle and its axis."""
         del lot, place
         angle = float(np.linalg.norm(size))

@@ -1,4 +1,4 @@
-"""One unit was behind the temperature that was read: it had not soaked, or its contact with the plate is poor."""
+"""One unit lagged the temperature reading: it had not soaked, or its contact with the plate is poor."""
 
 from typing import TYPE_CHECKING, ClassVar
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class UnitNotSoaked(NotSoaked):
-    """A temperature of one unit that relaxes to what was read with a time constant of its own."""
+    """A temperature of one unit that relaxes to the reading with its own time constant."""
 
     id: ClassVar[str] = "unit_not_soaked"
     equation: ClassVar[str] = "E(T_d) − E(T), T_d′ = (T − T_d)/τ, one unit"
@@ -22,6 +22,6 @@ class UnitNotSoaked(NotSoaked):
         return [{"unit": float(u), **place} for u in range(units) for place in super(UnitNotSoaked, self).places(lot)]
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """What being behind adds in the unit."""
+        """The contribution of the lag in the unit."""
         unit = int(place["unit"])
         return super().change(lot, slope, **place)[unit : unit + 1]

@@ -1,4 +1,4 @@
-"""One unit's thermometer reads off in one soak."""
+"""The thermometer of one unit has an offset in one soak."""
 
 from typing import TYPE_CHECKING, ClassVar
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class UnitThermometer(Handling):
-    """A reading of temperature that is off in one soak, for one unit."""
+    """An offset of the temperature reading in one soak, for one unit."""
 
     id: ClassVar[str] = "unit_thermometer"
     symbol: ClassVar[str] = "ΔT"
@@ -22,19 +22,19 @@ class UnitThermometer(Handling):
     fewest_units: ClassVar[int] = 1
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Every soak of every unit, where there are more than two soaks."""
+        """Every soak of every unit, if there are more than two soaks."""
         number = int(soaks(lot.state).max()) + 1
         units = lot.state.time.shape[0]
         return [{"unit": float(u), "soak": float(k)} for u in range(units) for k in range(number)] if number > 2 else []
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
-        """What an offset of one kelvin adds in the unit."""
+        """The contribution of an offset of one kelvin in the unit."""
         if slope is None:
             return np.zeros((1, lot.state.time.shape[1], 3, 1))
         own = slope[int(place["unit"])]
         return -(own * (soaks(lot.state) == int(place["soak"]))[:, None])[None, ..., None]
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
         del lot
         return f"the thermometer of the unit reads {self.short(size, **place)}; its readings are corrected by it"

@@ -1,4 +1,4 @@
-"""The table stood elsewhere than commanded in one dwell."""
+"""The table was not at the commanded angles in one dwell."""
 
 from typing import TYPE_CHECKING, ClassVar
 
@@ -20,7 +20,7 @@ class WrongPose(Handling):
     single: ClassVar[bool] = True
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Every dwell; none where the angles are not known."""
+        """Every dwell; none if the angles are unknown."""
         known = lot.state.outer is not None and lot.state.inner is not None
         there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
         return [{"at": float(k)} for k in there] if known else []
@@ -35,7 +35,7 @@ class WrongPose(Handling):
         """Errors of the two angles in each dwell."""
         return tilts(lot.state)
 
-    def told(self, lot: "Lot", size: Array, **place: float) -> str:
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
         del lot, place
         angles = np.degrees(size)
@@ -43,7 +43,7 @@ class WrongPose(Handling):
         return f"the pose was off by {off} for all units; the dwell is left out"
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
-        """Without the dwell: two angles find it but do not mend it."""
+        """Without the dwell: two angles identify it but do not correct it."""
         del size
         return without(lot, [int(place["at"])])
 

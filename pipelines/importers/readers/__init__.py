@@ -1,7 +1,7 @@
-"""The readers of files: each is one module of this package and is found here by itself.
+"""The readers of files: each is one module of this package and is discovered here.
 
-A module states ``NAME`` (of the format, as the archive keeps it), ``TITLE`` (for people), ``EXTRA`` (the optional dependency that
-it needs, or empty), ``ORDER`` (readers are asked in this order), ``recognised`` and ``read``.
+A module states ``NAME`` (of the format in the archive), ``TITLE`` (for people), ``EXTRA`` (the optional dependency that
+it needs, or empty), ``ORDER`` (order in which readers are tried), ``recognised`` and ``read``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Reader(Protocol):
     ORDER: int
 
     def recognised(self, data: bytes) -> bool:
-        """Whether the first bytes of a file say that it has this format."""
+        """Whether the first bytes of a file are those of this format."""
         ...
 
     def read(self, name: str, data: bytes, group: str) -> Content:
@@ -32,7 +32,7 @@ class Reader(Protocol):
         Parameters
         ----------
         name : of the file, for messages.
-        group : the group of channels wanted, where a file has several; empty otherwise.
+        group : the group of channels, if a file has several; empty otherwise.
         """
         ...
 
@@ -43,9 +43,9 @@ def _found() -> dict[str, Reader]:
 
 
 READERS: dict[str, Reader] = _found()
-"""By name, in the order in which they are asked."""
+"""By name, in the order in which they are tried."""
 
 
 def reader_of(data: bytes) -> Reader:
-    """The reader that recognises a file by its first bytes; delimited text where no other does."""
+    """The reader that recognises a file by its first bytes; delimited text if no other does."""
     return next(reader for reader in READERS.values() if reader.recognised(data))

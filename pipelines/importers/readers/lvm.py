@@ -43,8 +43,8 @@ def read(name: str, data: bytes, group: str) -> Content:
     heads = [parts[1], *(part.replace("\r", "").rpartition("\n\n")[2] for part in parts[2:-1])]
     bodies = [part.replace("\r", "").rpartition("\n\n")[0] or part for part in parts[2:-1]] + [parts[-1]]
     names = [(str(k + 1), body.count("\n")) for k, body in enumerate(bodies)]
-    wanted = int(chosen(names, group, f"{name}: segments")) - 1
-    return _segment(_settings(heads[wanted], divider), bodies[wanted], divider, decimal, name)
+    index = int(chosen(names, group, f"{name}: segments")) - 1
+    return _segment(_settings(heads[index], divider), bodies[index], divider, decimal, name)
 
 
 def _settings(text: str, divider: str | None) -> dict[str, list[str]]:

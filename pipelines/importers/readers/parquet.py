@@ -51,20 +51,20 @@ def table_of(name: str, data: bytes) -> pd.DataFrame:
         schema, claimed = file.schema_arrow, _claimed(file)
     _refuse_odd_columns(schema, name)
     refuse_larger(claimed, len(data), name)
-    wanted = [label for label in schema.names if not _INDEX.fullmatch(label)]
+    labels = [label for label in schema.names if not _INDEX.fullmatch(label)]
     texts = [field.name for field in schema if _is_text(field.type)]
     with foreign(broken, REMEDY):
         # texts stay in their dictionaries until it is known how long they are
         reader = pq.ParquetFile(pa.BufferReader(data), read_dictionary=texts)
     pieces: list[pa.RecordBatch] = []
     size = 0
-    for piece in _pieces(reader, wanted, broken):
+    for piece in _pieces(reader, labels, broken):
         size += _unpacked(piece)
         refuse_larger(size, len(data), name)
         pieces.append(piece)
     with foreign(broken, REMEDY):
-        table = pa.Table.from_batches(pieces, reader.schema_arrow.empty_table().select(wanted).schema)
-        return pd.DataFrame({label: _plain(table.column(label)) for label in wanted})
+        table = pa.Table.from_batches(pieces, reader.schema_arrow.empty_table().select(labels).schema)
+        return pd.DataFrame({label: _plain(table.column(label)) for label in labels})
 
 
 def _claimed(file: pq.ParquetFile) -> int:
@@ -77,9 +77,9 @@ def _claimed(file: pq.ParquetFile) -> int:
     return max(about.num_rows * about.num_columns * VALUE_BYTES, groups)
 
 
-def _pieces(reader: pq.ParquetFile, wanted: list[str], broken: str) -> Iterator[pa.RecordBatch]:
+def _pieces(reader: pq.ParquetFile, labels: list[str], broken: str) -> Iterator[pa.RecordBatch]:
     with foreign(broken, REMEDY):
-        batches = reader.iter_batches(BATCH_ROWS, columns=wanted)
+        batches = reader.iter_batches(BATCH_ROWS, columns=labels)
     while True:
         with foreign(broken, REMEDY):
             piece = next(batches, None)

@@ -20,7 +20,7 @@ from schemas.foreign import foreign, shown
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-_MOST_SAID = 4
+_MOST_MESSAGES = 4
 NAME, TITLE, EXTRA, ORDER = "tdms", "TDMS", "tdms", 60
 MAGIC = b"TDSm"
 REMEDY = "copy it again, or export the group as CSV"
@@ -35,12 +35,12 @@ def read(name: str, data: bytes, group: str) -> Content:
     """The channels of one group; `time` in s where the file states an interval (``wf_increment``)."""
     nptdms = library("nptdms", EXTRA, f"{name}: a TDMS file")
     broken = f"{name}: a TDMS file that cannot be read"
-    said = _Said()
-    with foreign(broken, REMEDY), said.heard():
+    messages = _LibraryLog()
+    with foreign(broken, REMEDY), messages.collected():
         about = nptdms.TdmsFile.read_metadata(io.BytesIO(data))
         claimed = sum(8 * len(channel) for one in about.groups() for channel in one.channels())
     refuse_larger(claimed, len(data), name)
-    with foreign(broken, REMEDY), said.heard():
+    with foreign(broken, REMEDY), messages.collected():
         file = nptdms.TdmsFile.read(io.BytesIO(data))
         groups = {one.name: [c for c in one.channels() if len(c) and _numeric(c)] for one in file.groups()}
     groups = {label: channels for label, channels in groups.items() if channels}
@@ -49,10 +49,10 @@ def read(name: str, data: bytes, group: str) -> Content:
     label = chosen([(one, len(channels[0])) for one, channels in groups.items()], group, name)
     with foreign(broken, REMEDY):
         found = _content(groups[label], name)
-    return replace(found, remarks=(*found.remarks, *(f"the reader says: {text}" for text in said.texts)))
+    return replace(found, remarks=(*found.remarks, *(f"the reader says: {text}" for text in messages.texts)))
 
 
-class _Said(logging.Handler):
+class _LibraryLog(logging.Handler):
     """What the library logs about a file: it goes into the remarks, not to standard error."""
 
     def __init__(self) -> None:
@@ -62,11 +62,11 @@ class _Said(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Keep a message once."""
         text = shown(record.getMessage(), 160)
-        if text not in self.texts and len(self.texts) < _MOST_SAID:
+        if text not in self.texts and len(self.texts) < _MOST_MESSAGES:
             self.texts.append(text)
 
     @contextmanager
-    def heard(self) -> Generator[None]:
+    def collected(self) -> Generator[None]:
         """A block in which the library's log comes here."""
         loggers = [
             logging.getLogger(name)

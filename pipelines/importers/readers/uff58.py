@@ -59,8 +59,8 @@ def read(name: str, data: bytes, group: str) -> Content:
         )
     clocks = {record[1]: len(record[2]) for record in records}
     names = [(_clock_name(clock), count) for clock, count in clocks.items()]
-    wanted = chosen(names, group, name)
-    clock = next(one for one in clocks if _clock_name(one) == wanted)
+    group_name = chosen(names, group, name)
+    clock = next(one for one in clocks if _clock_name(one) == group_name)
     kept = [record for record in records if record[1] == clock]
     if clock[3] != TIME:
         raise DataRejected(

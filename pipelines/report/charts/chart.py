@@ -32,7 +32,7 @@ ROLES: dict[Role, str] = {
     "good": "#1b7f3b",
     "ink": "#3a3f47",
 }
-"""Colours on a white page, told apart with any colour vision (Okabe and Ito); a page replaces them by those of its theme."""
+"""Colours on a white page for any colour vision (Okabe and Ito); a page replaces them by those of its theme."""
 
 DIVERGING = ((0.0, "#2166ac"), (0.25, "#67a9cf"), (0.5, "#efefef"), (0.75, "#ef8a62"), (1.0, "#b2182b"))
 SEQUENTIAL = ((0.0, "#2b4b8f"), (0.25, "#5a6f96"), (0.5, "#8b8f86"), (0.75, "#c6b45d"), (1.0, "#fde333"))
@@ -42,7 +42,7 @@ SEQUENTIAL = ((0.0, "#2b4b8f"), (0.25, "#5a6f96"), (0.5, "#8b8f86"), (0.75, "#c6
 class PlotAxis:
     """An axis: its label with the unit.
 
-    dates : whether values are days since 1970, UTC · names : of the places 0, 1, … where they stand for things
+    dates : whether values are days since 1970, UTC · names : of the places 0, 1, … of a categorical axis
     low, high : limits; None for those of the values
     """
 
@@ -56,7 +56,7 @@ class PlotAxis:
 
 @dataclass(frozen=True)
 class ColourScale:
-    """What colours stand for: a label with its unit, and the values at both ends."""
+    """The meaning of colours: a label with its unit, and the values at both ends."""
 
     label: str
     low: float
@@ -66,13 +66,13 @@ class ColourScale:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Values that are drawn alike.
+    """Values with the same drawing style.
 
     x, y : (n,) · high : (n,), upper edge of a band · error : (n,), half length of an error bar
     colour : (n,), values on the chart's colour scale; the role's colour where None
     counts : (rows, columns), of a density; x and y are then the middles of columns and rows
-    texts : (n,), shown beside a label, or when a point is pointed at
-    picks : (n,), what a click on a point chooses; empty where it chooses nothing
+    texts : (n,), shown beside a label or at the pointer
+    picks : (n,), selection by a click on a point; empty for none
     """
 
     name: str
@@ -94,7 +94,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Plot:
-    """One pair of axes with its traces; a ``sphere`` has none and keeps its proportions."""
+    """One pair of axes with its traces; a ``sphere`` has no axes and keeps its proportions."""
 
     title: str
     x: PlotAxis
@@ -107,7 +107,7 @@ class Plot:
 class Chart:
     """Plots side by side in ``columns`` columns, one colour scale for all.
 
-    title : says what is seen, for those who do not see it · height : of one row, in pixels of a page
+    title : description for screen readers · height : of one row, in pixels of a page
     """
 
     title: str
@@ -132,7 +132,7 @@ def symmetric(values: Array, label: str) -> ColourScale:
 
 
 def density(x: Array, y: Array, *, columns: int = 80, rows: int = 60) -> Trace:
-    """Counts of many points in cells of a grid: what a crowd looks like where its points would cover each other."""
+    """Counts of many points in cells of a grid: for points that would cover each other."""
     there = np.isfinite(x) & np.isfinite(y)
     counts, xs, ys = np.histogram2d(x[there], y[there], bins=(columns, rows))
     middle = lambda edges: 0.5 * (edges[1:] + edges[:-1])  # noqa: E731 - twice, in one line

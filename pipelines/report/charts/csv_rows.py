@@ -1,4 +1,4 @@
-"""A chart as comma-separated values: one row per point, with what its axes are called."""
+"""A chart as comma-separated values: one row per point, with the labels of its axes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEADS = ("=", "+", "-", "@", "\t", "\r")
 
 
 def csv_text(chart: Chart) -> str:
-    """The numbers of a chart; the lines that only guide the eye are left out."""
+    """The numbers of a chart; guide lines are omitted."""
     sink = io.StringIO()
     writer = csv.writer(sink, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -50,5 +50,5 @@ def _number(values: np.ndarray | None, k: int) -> str:
 
 
 def _cell(text: str) -> str:
-    """A name as a cell that no spreadsheet takes for a formula."""
+    """A name as a cell that spreadsheets do not evaluate as a formula."""
     return f"'{text}" if text.startswith(_LEADS) else text

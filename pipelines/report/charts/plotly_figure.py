@@ -22,7 +22,7 @@ MANY = 4000
 DAY_MS = 86_400_000.0
 GAP_X, GAP_PX = 0.06, 74.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
-NARROW_D = 20.0  # dates nearer together are shown with room around them
+NARROW_D = 20.0  # closer dates get a margin
 LONGEST = 28
 CONFIG = {
     "displaylogo": False,
@@ -32,7 +32,7 @@ CONFIG = {
     "topojsonURL": "/none",
     "modeBarButtonsToRemove": ["sendChartToCloud", "select2d", "lasso2d", "autoScale2d"],
 }
-"""Nothing of a figure leaves the page: Plotly's toolbar offers to send it to its maker otherwise."""
+"""Options that keep the figure on the page: by default Plotly's toolbar offers to send it to a server."""
 
 
 def plotly_figure(chart: Chart) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
     if plot.sphere:
         layout[along.replace("y", "yaxis")] |= {"scaleanchor": across, "scaleratio": 1.0}
     elif column and chart.plots[number - 1].y.label == plot.y.label:
-        del layout[along.replace("y", "yaxis")]["title"]  # said at the left already
+        del layout[along.replace("y", "yaxis")]["title"]  # labelled at the left already
     if plot.title:
         layout["annotations"].append({
             "text": f"<b>{_safe(plot.title)}</b>", "x": left, "y": top, "xref": "paper", "yref": "paper",
@@ -184,7 +184,7 @@ def _colour_axis(chart: Chart) -> dict[str, Any]:
         return {}
     colours = [list(one) for one in (DIVERGING if scale.diverging else SEQUENTIAL)]
     if scale.diverging:
-        colours[len(colours) // 2][1] = "role:middle"  # zero is as quiet on a dark page as on a light one
+        colours[len(colours) // 2][1] = "role:middle"  # zero has the colour of the page
     title = {"text": _safe(scale.label), "side": "right", "font": {"size": 13}}
     return {
         "cmin": scale.low, "cmax": scale.high, "colorscale": colours,
@@ -200,7 +200,7 @@ def packed(values: NDArray[np.float64], *, dates: bool = False) -> dict[str, str
 
 
 def _safe(text: str) -> str:
-    """A text that Plotly takes for nothing but text."""
+    """A text without markup for Plotly."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 

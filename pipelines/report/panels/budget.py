@@ -1,4 +1,4 @@
-"""The uncertainty budget of the lot: references, shares, what verification shows and cannot show, and the risk of decisions."""
+"""The uncertainty budget of the lot: references, shares, coverage by verification, and the risk of decisions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PICTURED = {
     ("scale", "x"): "scale, x",
     ("orthogonality", "xy"): "angle between x and y",
     ("output", "norm"): "corrected output, magnitude",
-    ("bias_error", "z"): "error of z, as a user meets it",
+    ("bias_error", "z"): "error of z for the user",
     ("bias_error_period", "z"): "error of z over the period",
 }
 NO_REFERENCE = dict.fromkeys(("what", "laboratory", "U", "k", "unit"), "")
@@ -32,27 +32,27 @@ TEMPLATE = """\
 {% if not stated %}<p><b>Noise only:</b> the station states no [uncertainty]. Uncertainties are those of noise and fit; no grade above consumer, no certificate.</p>{% else %}
 <p>Frame {{ frame }}; figures of the references by {{ source }}. Unit {{ unit }}: share of each contribution in u².</p>
 {{ plot | safe }}
-{% for name, rules in missing.items() %}<p class="note">not stated: {{ name }} (rules {{ rules }})</p>{% endfor %}
+{% for name, rules in missing.items() %}<p class="note">not stated: {{ name }} (dominates {{ rules }})</p>{% endfor %}
 {% if references %}<table>
 <tr><th>reference standard</th><th>quantity</th><th>certificate</th><th>laboratory</th><th>due</th><th class="n">U</th><th class="n">k</th><th>unit</th></tr>
 {% for one in references %}<tr><td>{{ one.id }}</td><td>{{ one.what }}</td><td>{{ one.certificate }}</td><td>{{ one.laboratory }}</td><td>{{ one.due }}</td><td class="n">{{ one.U or "" }}</td><td class="n">{{ one.k or "" }}</td><td>{{ one.unit or "" }}</td></tr>{% endfor %}
 </table>{% endif %}
 {% if seen %}<table>
-<tr><th>unit</th><th>axis</th><th class="n">verification shows<br><small>u of the references, µg</small></th><th class="n">a user meets<br><small>u of the references, µg</small></th><th class="n">verification cannot show<br><small>u, µg</small></th></tr>
+<tr><th>unit</th><th>axis</th><th class="n">shown by verification<br><small>u of the references, µg</small></th><th class="n">error for the user<br><small>u of the references, µg</small></th><th class="n">not shown by verification<br><small>u, µg</small></th></tr>
 {% for row in seen %}<tr><td>{{ row.unit }}</td><td>{{ row.axis }}</td><td class="n">{{ row.shown }}</td><td class="n">{{ row.met }}</td><td class="n">{{ row.unseen }}</td></tr>{% endfor %}
 </table>
-<p class="note">Verification on the same station repeats its errors: local gravity, thermometer, seat, supply and gain cancel in it and come from the budget alone. Worst axis of each unit; what verification shows is in the frame of the fixture.</p>{% endif %}
+<p class="note">Verification on the same station repeats its errors: local gravity, thermometer, seat, supply and gain cancel in it and are known from the budget only. Worst axis of each unit; the part shown by verification is in the frame of the fixture.</p>{% endif %}
 {% endif %}
 {% if risks %}<table>
 <tr><th>figure</th><th class="n">limit</th><th class="n">accepted up to<br><small>mean</small></th><th class="n">lot mean</th><th class="n">process σ</th><th class="n">u</th><th class="n">PFA, %</th><th class="n">PFR, %</th><th class="n">largest PFA of an accepted unit, %</th><th>unit</th></tr>
 {% for row in risks %}<tr><td>{{ row.title }}</td>{% for name in ["limit", "accept", "mean", "process", "u", "pfa", "pfr", "largest"] %}<td class="n">{{ row[name] }}</td>{% endfor %}<td>{{ row.unit_text }}</td></tr>{% endfor %}
 </table>
-<p class="note">PFA, PFR: probability of false acceptance and false rejection over the production that the lot stands for (JCGM 106, normal); –: fewer than three units.</p>{% endif %}
+<p class="note">PFA, PFR: probability of false acceptance and false rejection over the production that the lot represents (JCGM 106, normal); –: fewer than three units.</p>{% endif %}
 """
 
 
 def render(report: ReportContext) -> str:
-    """The budget; a notice for runs that state none, as runs of earlier versions do."""
+    """The budget; a notice for runs without one, such as runs of earlier versions."""
     sums, station = report.tables.get("uncertainties", pd.DataFrame()), report.about.get("station") or {}
     recipe = report.recipe
     entries = {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}

@@ -20,7 +20,7 @@ TEMPLATE = """\
 {% else %}
 <p>Pauses: {{ interruptions.pauses }}, {{ (interruptions.paused_s / 60) | round(1) }} min waited. Door opened: {{ interruptions.door_opened }}. Dwells measured again: {{ interruptions.repeated_dwells | length }}.</p>
 <table>
-<tr><th class="n">time<br><small>min</small></th><th>event</th><th>dwell</th><th>reason</th><th>what was done</th></tr>
+<tr><th class="n">time<br><small>min</small></th><th>event</th><th>dwell</th><th>reason</th><th>action</th></tr>
 {% for event in interruptions.events %}
 <tr><td class="n">{{ (event.time_s / 60) | round(1) }}</td><td>{{ event.kind | replace("_", " ") }}</td><td>{% if event.record >= 0 %}{{ event.record }} {{ event.pose }}{% endif %}</td><td>{{ event.reason }}</td><td>{{ event.action }}</td></tr>
 {% endfor %}

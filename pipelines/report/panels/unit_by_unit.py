@@ -1,4 +1,4 @@
-"""The panels of each unit, which open one by one."""
+"""The panels of each unit, in sections that can be opened."""
 
 from __future__ import annotations
 
@@ -27,5 +27,5 @@ TEMPLATE = """\
 
 
 def render(report: ReportContext) -> str:
-    """Every calibrated unit with the panels that have something to show."""
+    """Every calibrated unit with its panels."""
     return fill(TEMPLATE, units=[(unit, rendered(UNIT_PANELS, unit)) for unit in report.calibrated])

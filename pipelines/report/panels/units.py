@@ -36,7 +36,8 @@ TEMPLATE = """\
 {% endfor %}
 </table>
 <p class="note">Decided by {{ rule }}. fit: residual of the model on the poses it was fitted to. verification: largest difference between the magnitude of the corrected
-specific force and local gravity on poses that the fit has not seen, mean over the dwells of a pose. N and B: noise of the worst axis, an upper limit where the record does not identify the term.</p>
+specific force and local gravity on poses that the fit has not used, mean over the dwells of a pose. N and B: noise of the worst
+axis, an upper limit where the record does not identify the term.</p>
 """
 
 

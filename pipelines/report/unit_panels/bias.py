@@ -1,4 +1,4 @@
-"""Uncertainty of a unit's bias, by what it is the bias of."""
+"""Uncertainty of a unit's bias by measurand."""
 
 from __future__ import annotations
 

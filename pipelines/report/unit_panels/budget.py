@@ -1,4 +1,4 @@
-"""Uncertainty of every quantity of a unit, with what rules it."""
+"""Uncertainty of every quantity of a unit, with its largest contributions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NAMES = {
     "scale_temperature": "scale over temperature",
     "orthogonality": "angle between axes, from 90°",
     "output": "corrected output, worst of the certified range",
-    "bias_error": "error on poses not used, as a user meets it",
+    "bias_error": "error on poses not used, for the user",
     "verification_norm": "error of the magnitude, worst pose",
     "bias_error_period": "error expected over the period of validity",
 }
@@ -36,7 +36,7 @@ TEMPLATE = """\
 <tr><td>{{ line.name }}</td><td>{{ line.axis }}</td><td class="n">{{ line.value }}</td><td class="n">{{ line.a }}</td><td class="n">{{ line.b }}</td><td class="n">{{ line.dof }}</td><td class="n">{{ line.k }}</td><td class="n">{{ line.expanded }}</td><td>{{ line.unit }}</td><td><small>{{ line.largest }}</small></td></tr>
 {% endfor %}
 </table>
-<p class="note">Type A: noise of the run. Type B: references, station and device as they are stated. U = k·u, coverage about 95 %.</p>
+<p class="note">Type A: noise of the run. Type B: references, station and device as stated. U = k·u, coverage about 95 %.</p>
 """
 
 

@@ -31,7 +31,7 @@ SHARED = "base"
 
 
 class IncompleteFigure(Exception):
-    """A module that defines no figure, or one whose name or place another figure has: its author repairs the module."""
+    """A module without a figure, or with a name or order that another figure has: its author must correct it."""
 
 
 class Figure(NamedTuple):

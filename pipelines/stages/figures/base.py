@@ -1,4 +1,4 @@
-"""What a figure of merit is, the tables of one unit that it is computed from, and the formulas that several share."""
+"""A figure of merit, the tables of one unit that it is computed from, and shared formulas."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Value(NamedTuple):
     why_not: str = ""
 
     def reach(self, guard: float) -> float:
-        """Magnitude with the guard band: what comes nearest to a limit."""
+        """Magnitude with the guard band: the value that is compared with a limit."""
         return abs(self.value) + guard * self.uncertainty
 
 
 class LotCoefficients:
-    """Coefficients of a calibrated lot; those of an effect are taken out of the calibration once for all units.
+    """Coefficients of a calibrated lot; those of an effect are read from the calibration once for all units.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def rms(errors: NDArray[np.float64]) -> Value:
 
 
 def largest_error(rows: UnitRows, uncertainty: str, guard: float) -> Value:
-    """The error that comes closest to any limit under a guard band, as a magnitude."""
+    """The error that is closest to a limit under a guard band, as a magnitude."""
     errors, spread = rows["error_ug"], rows[uncertainty]
     worst = int(np.argmax(np.abs(errors) + guard * spread))
     return Value(abs(float(errors[worst])), float(spread[worst]))
@@ -209,7 +209,7 @@ def largest_error(rows: UnitRows, uncertainty: str, guard: float) -> Value:
 def worst_axis(rows: UnitRows, term: str, guard: float) -> Value | None:
     """A noise term of the worst axis; a term that is not identified counts with its upper limit.
 
-    A silent axis has no figure, and so the unit has none: what was not measured is not within a limit.
+    A unit with a silent axis has no figure: a value that was not measured is not within a limit.
     """
     if not len(rows):
         return None

@@ -20,7 +20,7 @@ def _value(tables: UnitTables) -> Value | None:
 
 
 def _as_met(tables: UnitTables, axis: str) -> Value:
-    """RMS error of one axis with the uncertainty of what a user meets: verification's own, and that of the references."""
+    """RMS error of one axis with its uncertainty for the user: that of the verification, and that of the references."""
     shown = _of_axis(tables.verification, axis)
     return shown._replace(uncertainty=float(np.hypot(shown.uncertainty, tables.stated_u("bias_error", axis))))
 

@@ -11,7 +11,7 @@ POINTS = 2001
 
 
 def _value(tables: UnitTables) -> Value | None:
-    """From the nonlinear coefficients of the model; tumbling sees ±1 g only, and so much of the range is judged."""
+    """From the nonlinear coefficients of the model; tumbling covers ±1 g only, and only this part of the range is judged."""
     own, lot = tables.coefficients, tables.coefficients.lot
     force = np.linspace(-1.0, 1.0, POINTS)
     curve, variance, found = np.zeros((3, POINTS)), np.zeros(3), False

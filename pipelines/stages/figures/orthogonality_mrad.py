@@ -1,4 +1,4 @@
-"""Deviation from 90° of the angle between two axes, the largest: free of the seat in the fixture."""
+"""Deviation from 90° of the angle between two axes, the largest: independent of the seat in the fixture."""
 
 from __future__ import annotations
 

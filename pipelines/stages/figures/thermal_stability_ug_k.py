@@ -12,7 +12,7 @@ LEVELS = 61
 
 
 def _value(tables: UnitTables) -> Value | None:
-    """The uncertainty is that of the linear coefficient: the span is ruled by it."""
+    """The uncertainty is that of the linear coefficient: it dominates the span."""
     linear = tables.coefficients.nearest("bias_temperature", 1e6, tables.guard)
     if linear is None or "unit_C" not in tables.residuals:
         return None

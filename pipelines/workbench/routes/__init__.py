@@ -1,1 +1,1 @@
-"""The pages: each module has a ``router``, and is found by itself; HEADING and ORDER put it into the navigation."""
+"""The pages: each module has a ``router``, and is discovered; HEADING and ORDER place it in the navigation."""

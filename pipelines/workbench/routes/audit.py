@@ -1,4 +1,4 @@
-"""The audit: findings with their evidence, what is due, charts of stations and drifts."""
+"""The audit: findings with their evidence, calibrations due, charts of stations and drifts."""
 
 from __future__ import annotations
 
@@ -56,5 +56,5 @@ def _found(bench: Workbench, request: Request) -> dict[str, Any]:
     state, _ = state_of(request, AuditPage)
     found: dict[str, Any] | None = bench.jobs.result("audit", requests.audit(bench.settings, state)[1])
     if found is None:
-        raise WrongUse("audit: it is not done yet; wait for it")
+        raise WrongUse("audit: not finished; wait until it is done")
     return found

@@ -1,4 +1,4 @@
-"""What is missing: is the model adequate, where does it fail, which effect explains it, what to measure next."""
+"""Missing effects: adequacy of the model, drivers of the residual, effects that explain it, the next measurement."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from starlette.responses import JSONResponse, Response
 
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.report.diagnosis import chance
-from pipelines.workbench.pages import Wanted, figure, page, run_table, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import (
+    RequestBody,
+    figure,
+    page,
+    page_part,
+    part_of,
+    run_table,
+    state_of,
+    table_csv,
+    workbench_of,
+)
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import MissingPage
@@ -23,15 +33,18 @@ if TYPE_CHECKING:
     from pipelines.workbench.results import Diagnosed
 
 router = APIRouter()
-HEADING, ORDER, ADDRESS = "What is missing", 20, "/missing"
+HEADING, ORDER, ADDRESS = "Missing effects", 20, "/missing"
 CANDIDATES, INFLUENCE = 12, 12
 
 
 @router.get("/missing")
 def missing(request: Request) -> Response:
-    """The page; what is not computed yet is asked for by the page itself."""
+    """The page; the page itself requests missing results."""
     bench = workbench_of(request)
     state, problems = state_of(request, MissingPage)
+    if part_of(request) == "samples" and state.source and not problems:
+        state = requests.settled(bench.settings, state)
+        return page_part(request, "missing_samples.html", state, is_file=sources.is_file(bench.settings, state.source))
     chosen, found, rows, work = sources.sources(bench.settings), None, None, {}
     if state.source:
         try:
@@ -71,27 +84,27 @@ def candidates(request: Request) -> Response:
 
 
 @router.post("/missing/save")
-def save(request: Request, wanted: Wanted) -> JSONResponse:
+def save(request: Request, body: RequestBody) -> JSONResponse:
     """Save the model of a page's address as the next version of a model file."""
     bench = workbench_of(request)
-    state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
+    state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))
     found = _diagnosed(bench, state)
     if found is None:
-        raise WrongUse("model: the diagnosis of this model is not done yet; wait for it, then save")
+        raise WrongUse("model: the diagnosis of this model is not finished; wait until it is done, then save")
     added = list(state.added)
     start = [name for name in found.document["effects"] if name not in added]
-    name, why = str(wanted.get("name", "")), str(wanted.get("why", ""))
+    name, why = str(body.get("name", "")), str(body.get("why", ""))
     place, version = models.save(bench.settings, name, start, added, state.formula, why, state.source)
     return JSONResponse({"done": f"{place}: version {version} is saved"})
 
 
 @router.post("/missing/formula")
-def formula(wanted: Wanted) -> JSONResponse:
-    """The address of the page with a formula tried beside the model; refused where it is no formula."""
+def formula(body: RequestBody) -> JSONResponse:
+    """The address of the page with a formula added to the model; an invalid formula is refused."""
     from inertial import effects
 
-    state, _ = MissingPage.parse(_pairs(str(wanted.get("address", ""))))
-    written = str(wanted.get("formula", "")).strip()
+    state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))
+    written = str(body.get("formula", "")).strip()
     with effects.additions_forgotten():
         (name,) = use_written_formulas([written], "formula")
     kept = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)

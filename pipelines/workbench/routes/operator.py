@@ -1,11 +1,11 @@
-"""Lots on the station: slots as tiles, serials scanned, questions answered, results before unloading."""
+"""Lots on the station: slots as tiles, scan of serials, answers to questions, results before unloading."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
-from pipelines.workbench.pages import Wanted, page, state_of, workbench_of
+from pipelines.workbench.pages import RequestBody, page, state_of, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.state import OperatorPage
 from schemas.errors import WrongUse, did_you_mean
@@ -16,15 +16,15 @@ HEADING, ORDER, ADDRESS = "Operator", 40, "/operator"
 REMEDIES = {
     "load": "Seat each unit in its slot, then press Done.",
     "confirm": "Move the units to the slots of the list, then press Done.",
-    "trouble": "Put the station right as described, then press Done: the lot goes on after its last record.",
-    "unload": "Take the units out and sort them by result, then press Done.",
-    "approve": "Press Done to spend the extra station time, Stop to leave it.",
+    "trouble": "Correct the station as described, then press Done: the lot continues after its last record.",
+    "unload": "Remove the units and sort them by result, then press Done.",
+    "approve": "Press Done to approve the extra station time, Stop to decline it.",
 }
 
 
 @router.get("/operator")
 def operator(request: Request) -> Response:
-    """The newest lot as tiles, or the one of the address; seats to scan where none is under way."""
+    """The newest lot as tiles, or the one of the address; seats to scan if no lot is running."""
     bench = workbench_of(request)
     state, problems = state_of(request, OperatorPage)
     found = lots.lots(bench.settings)
@@ -38,21 +38,21 @@ def operator(request: Request) -> Response:
 
 
 @router.post("/operator/start")
-def start(request: Request, wanted: Wanted) -> JSONResponse:
-    """Begin a lot from the serials that were scanned, slot by slot."""
+def start(request: Request, body: RequestBody) -> JSONResponse:
+    """Start a lot with the scanned serials, slot by slot."""
     bench = workbench_of(request)
     known = requests.recipes(bench.settings)
-    recipe = str(wanted.get("recipe", ""))
+    recipe = str(body.get("recipe", ""))
     if recipe not in known:
         raise WrongUse(f"lot: no recipe is called '{recipe[:60]}'; {did_you_mean(recipe, known)}")
     seats = {
-        int(key.removeprefix("slot-")): str(value).strip() for key, value in wanted.items() if key.startswith("slot-")
+        int(key.removeprefix("slot-")): str(value).strip() for key, value in body.items() if key.startswith("slot-")
     }
     filled = {slot: serial for slot, serial in sorted(seats.items()) if serial}
     if not filled:
         raise WrongUse("lot: no serial number was scanned, one at least is needed; scan a unit into its slot")
-    faults = [part.strip() for part in str(wanted.get("fault", "")).split() if part.strip()]
-    repeat = str(wanted.get("repeat", "0") or "0")
+    faults = [part.strip() for part in str(body.get("fault", "")).split() if part.strip()]
+    repeat = str(body.get("repeat", "0") or "0")
     if not repeat.isdecimal() or len(repeat) > 6:
         raise WrongUse(f"lot: repeat '{repeat[:20]}', a whole number from 0 on is needed; correct it")
     lot = lots.start(bench.settings, recipe, list(filled.values()), list(filled), faults, int(repeat))
@@ -60,24 +60,24 @@ def start(request: Request, wanted: Wanted) -> JSONResponse:
 
 
 @router.post("/operator/{name}/answer")
-def answer(request: Request, name: str, wanted: Wanted) -> JSONResponse:
-    """The answer to the question that the page showed; refused where something else is asked by now."""
-    number = str(wanted.get("number", ""))
+def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
+    """The answer to the question on the page; refused if the question has changed."""
+    number = str(body.get("number", ""))
     if not number.isdecimal():
-        raise WrongUse("lot: the number of the question is missing; fetch the page again")
-    lots.answer(workbench_of(request).settings, name, int(number), str(wanted.get("answer", "")))
+        raise WrongUse("lot: the number of the question is missing; reload the page")
+    lots.answer(workbench_of(request).settings, name, int(number), str(body.get("answer", "")))
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 
 @router.post("/operator/{name}/stop")
 def stop(request: Request, name: str) -> JSONResponse:
-    """Have the lot's process make the station safe and end."""
+    """Stop the lot's process after the safe state."""
     lots.stop(workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 
 @router.post("/operator/{name}/continue")
 def again(request: Request, name: str) -> JSONResponse:
-    """Go on with a lot that was stopped."""
+    """Continue a stopped lot."""
     lot = lots.again(workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})

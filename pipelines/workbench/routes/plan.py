@@ -1,11 +1,11 @@
-"""The plan of a recipe: poses, temperatures, what is seen, what is not, and what it costs."""
+"""The plan of a recipe: poses, temperatures, visible effects, hidden effects, and station time."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from pipelines.report.plan import scientific
+from pipelines.report.numbers import scientific
 from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import requests
 from pipelines.workbench.state import PlanPage
@@ -51,7 +51,7 @@ def drawn(request: Request, name: str, ending: str) -> Response:
 
 @router.get("/plan/effects.csv")
 def effects(request: Request) -> Response:
-    """What the plan sees, effect by effect."""
+    """Visibility of each effect under the plan."""
     bench = workbench_of(request)
     state, _ = state_of(request, PlanPage)
     found = bench.jobs.result("plan", requests.plan(bench.settings, state)[1])

@@ -1,4 +1,4 @@
-"""Jobs begun and stopped, and the stream that tells how far they are."""
+"""Start and stop of jobs, and the stream of their progress."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl, urlsplit
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from pipelines.workbench.pages import Wanted, workbench_of
+from pipelines.workbench.pages import RequestBody, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.services.events import stream
 from schemas.errors import WrongUse
@@ -20,10 +20,10 @@ router = APIRouter()
 
 
 @router.post("/jobs")
-def start(request: Request, wanted: Wanted) -> JSONResponse:
-    """Begin the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
+def start(request: Request, body: RequestBody) -> JSONResponse:
+    """Start the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
     bench = workbench_of(request)
-    kind, address = str(wanted.get("kind", "")), urlsplit(str(wanted.get("address", "")))
+    kind, address = str(body.get("kind", "")), urlsplit(str(body.get("address", "")))
     title, content = requests.of_address(
         bench.settings, kind, address.path, parse_qsl(address.query, keep_blank_values=True)
     )
@@ -35,13 +35,13 @@ def stop(request: Request, name: str) -> JSONResponse:
     """End a job."""
     job = workbench_of(request).jobs.stop(name)
     if job is None:
-        raise WrongUse(f"jobs: none is called '{name[:40]}'; it may have been of a server before this one")
+        raise WrongUse(f"jobs: none is called '{name[:40]}'; it may belong to an earlier server process")
     return JSONResponse(job.document())
 
 
 @router.get("/jobs/{name}")
 def look(request: Request, name: str) -> JSONResponse:
-    """How far a job is."""
+    """Progress of a job."""
     job = workbench_of(request).jobs.get(name)
     if job is None:
         raise WrongUse(f"jobs: none is called '{name[:40]}'")

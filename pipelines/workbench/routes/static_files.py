@@ -19,8 +19,8 @@ PLOTLY_SHA256 = "4ac841837b31c1bfd2ab140e3a248ddcc6c2106978fbf2c1c18a7aada930a37
 
 @router.get("/static/{version}/{name}")
 def static(request: Request, version: str, name: str) -> Response:
-    """A file of ours, or Plotly's bundle."""
-    del version  # it only makes the address another one when the content is
+    """A file of the product, or Plotly's bundle."""
+    del version  # it changes the address when the content changes
     headers = {"cache-control": FOREVER}
     if name == PLOTLY:
         if "gzip" in request.headers.get("accept-encoding", ""):
@@ -35,7 +35,7 @@ def static(request: Request, version: str, name: str) -> Response:
 
 @router.get("/favicon.ico")
 def icon() -> Response:
-    """Browsers ask for it by themselves."""
+    """The icon that browsers request by default."""
     return Response(_file("icon.svg") or b"", media_type=KINDS["svg"], headers={"cache-control": FOREVER})
 
 
@@ -46,6 +46,6 @@ def _bundle() -> bytes:
 
 @cache
 def _file(name: str) -> bytes | None:
-    """The content of a file; None where there is none of the name."""
+    """The content of a file; None if it does not exist."""
     known = {place.name: place for place in (files("pipelines.workbench") / "static").iterdir() if place.is_file()}
     return known[name].read_bytes() if name in known and name.rpartition(".")[2] in KINDS else None

@@ -1,4 +1,4 @@
-"""The station of a run: temperatures and angles over its time, what paused it, how long soaks took."""
+"""The station of a run: temperatures and angles over its time, pauses, and duration of soaks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def station(request: Request) -> Response:
         if not tables >= NEEDED:
             problems = [
                 *problems,
-                f"run {run.id} was not measured on a station of ours: there are no temperatures over its time",
+                f"run {run.id} was not measured on a station of this archive: it has no temperatures over time",
             ]
     return page(
         request, "station.html", state, problems, run=run, events=events[::-1], soaks=soaks, infos=infos[:50],

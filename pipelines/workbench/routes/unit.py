@@ -9,11 +9,10 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.audit.calibrations import day_of
-from pipelines.audit.sql import ask
 from pipelines.certificates import Ledger
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import figure, page, run_table, state_of, workbench_of
+from pipelines.workbench.pages import figure, page, page_part, part_of, run_table, state_of, workbench_of
 from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage
@@ -32,7 +31,7 @@ CERTIFICATES = 20
 
 @router.get("/unit")
 def unit(request: Request) -> Response:
-    """Everything that is known of a unit in a run."""
+    """All data of a unit in a run."""
     bench = workbench_of(request)
     state, problems = state_of(request, UnitPage)
     run = bench.archive.run(state.run)
@@ -40,6 +39,8 @@ def unit(request: Request) -> Response:
     state = state.model_copy(update={"run": run.id, "unit": state.unit or (units[0] if units else "")})
     if state.unit not in units:
         raise WrongUse(f"unit '{state.unit[:80]}' is not in run {run.id}; its units are {', '.join(units[:8])}")
+    if part_of(request) == "samples":
+        return page_part(request, "unit_samples.html", state)
     tables = run.tables()
     own = {
         name: _own(bench, state, name)
@@ -98,7 +99,7 @@ def _own(bench: Workbench, state: UnitPage, name: str) -> list[dict[str, Any]]:
 
 def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     """The unit's coefficients in all its runs, with the day of each."""
-    answer = ask(bench.archive, history_question(serial))
+    answer = bench.index.ask(history_question(serial))
     rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
 

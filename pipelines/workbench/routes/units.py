@@ -1,18 +1,19 @@
-"""Units and runs, searched."""
+"""Search of units and runs."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from pipelines.audit.sql import ask
+from pipelines.archive.listing import info_of
 from pipelines.workbench.pages import page, state_of, table_csv, workbench_of
-from pipelines.workbench.questions import ROWS, units_question, yield_question
+from pipelines.workbench.questions import ROWS, newest_question, units_question, yield_question
 from pipelines.workbench.state import UnitsPage
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Units", 10, "/units"
 EVERYTHING = 1_000_000
+NEWEST = 12
 
 
 @router.get("/units")
@@ -20,22 +21,21 @@ def units(request: Request) -> Response:
     """A page of units, newest first."""
     bench = workbench_of(request)
     state, problems = state_of(request, UnitsPage)
-    infos = bench.archive.runs()
-    rows, counts = [], {}
-    if infos:
-        answer = ask(bench.archive, units_question(state))
-        rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
-        counts = {str(name): int(count) for name, count in ask(bench.archive, yield_question(state)).rows}
+    answer = bench.index.ask(units_question(state))
+    rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+    counts = {str(name): int(count) for name, count in bench.index.ask(yield_question(state)).rows}
+    newest = bench.index.ask(newest_question(NEWEST)).rows
+    infos = [info_of(bench.archive.run(str(name))) for name, _ in newest]
     return page(
         request, "units.html", state, problems, rows=rows, counts=counts, total=sum(counts.values()), per_page=ROWS,
-        runs=infos[::-1][:12], run_count=len(infos),
+        runs=[one for one in infos if one is not None], run_count=newest[0][1] if newest else 0,
     )  # fmt: skip
 
 
 @router.get("/units/table.csv")
 def table(request: Request) -> Response:
-    """All units that the page's fields choose."""
+    """All units of the search."""
     state, _ = state_of(request, UnitsPage)
     question = units_question(state.model_copy(update={"page": 1})).replace(f"LIMIT {ROWS}", f"LIMIT {EVERYTHING}")
-    answer = ask(workbench_of(request).archive, question)
+    answer = workbench_of(request).index.ask(question)
     return table_csv([dict(zip(answer.columns, row, strict=True)) for row in answer.rows], "units")

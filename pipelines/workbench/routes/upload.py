@@ -1,4 +1,4 @@
-"""A file of one's own: what it is read as, corrected, imported, with coefficients out."""
+"""A file of the user: interpretation of its columns, correction, import, and coefficients."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MEANINGS = ("time", "x", "y", "z", "temperature", "unit", "dwell")
 
 @router.get("/upload")
 def upload(request: Request) -> Response:
-    """The page: drop a file, see what it is read as, correct it, import it."""
+    """The page: drop a file, check the interpretation of its columns, correct it, import it."""
     bench = workbench_of(request)
     state, problems = state_of(request, UploadPage)
     found, job, done = None, None, None
@@ -43,7 +43,7 @@ def upload(request: Request) -> Response:
 
 @router.put("/upload/file")
 async def dropped(request: Request, name: str) -> JSONResponse:
-    """Keep a file; the address of the page that shows it."""
+    """Store a file; return the address of its page."""
     parts: list[bytes] = []
     size = 0
     async for part in request.stream():

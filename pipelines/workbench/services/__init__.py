@@ -1,1 +1,1 @@
-"""What pages share: sources of dwells, work in other processes, its progress, lots on the station."""
+"""Services of the pages: sources of dwells, work in other processes, its progress, lots on the station."""

@@ -1,6 +1,7 @@
-"""One stream of server-sent events: which server it is, which jobs have moved, which lots and runs have changed.
+"""One stream of server-sent events: server process, progress of jobs, changes of lots and runs.
 
-The first event names the server's life; a page that sees another one fetches itself again.
+The first event states the id of
+the server process; a page with another id reloads.
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ if TYPE_CHECKING:
     from pipelines.workbench.services.jobs import Jobs
 
 EVERY_S = 0.15
-HEARTBEAT = 60  # looks without news after which the line is kept alive
+HEARTBEAT = 60  # polls without news before a keep-alive message
 STAMP_EVERY = 4
 
 
 async def stream(request: Request, boot: str, jobs: Jobs, stamps: Callable[[], dict[str, str]]) -> AsyncIterator[str]:
-    """The events, until the browser goes.
+    """The events, until the browser disconnects.
 
     Parameters
     ----------
-    boot : of this life of the server
-    stamps : of things that other processes change; a page is told which changed
+    boot : id of this process of the server
+    stamps : of data that other processes change; the event states which changed
     """
     seen, known, quiet = jobs.version, await asyncio.to_thread(stamps), 0
     yield _event(

@@ -1,7 +1,7 @@
-"""Work that takes longer than a request: in processes of its own, with progress, and with an end when it is not wanted.
+"""Work that takes longer than a request: in separate processes, with progress and cancellation.
 
-A job is known by the hash of what decides its result, so that two browsers that want the same share it. Results are kept in
-memory, the newest of them; what was under way when the server died is shown as interrupted, never as running.
+A job is known by the hash of what decides its result, so that two browsers share the same job. Results are kept in
+memory, the newest of them; jobs that ran when the server ended are shown as interrupted.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GRACE_S = 2.0
 
 @dataclass
 class Job:
-    """One piece of work and how far it is."""
+    """A job and its progress."""
 
     id: str
     kind: str
@@ -54,7 +54,7 @@ class Job:
 
 
 class _Process:
-    """A process that does one job after the other; it has imported the science by its first."""
+    """A process that runs jobs in order; the first job imports the science."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -64,7 +64,7 @@ class _Process:
         other.close()
 
     def end(self) -> None:
-        """End the process, with what it is at."""
+        """End the process and its job."""
         self.process.terminate()
         self.process.join(GRACE_S)
         if self.process.is_alive():
@@ -73,7 +73,7 @@ class _Process:
 
 
 def _serve(pipe: Connection) -> None:
-    """The life of a process: a request in, messages of its progress and its result out."""
+    """The loop of a process: it receives requests and sends progress and results."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server decides when its processes end
@@ -103,7 +103,7 @@ class Jobs:
         self._remember()
 
     def submit(self, kind: str, title: str, request: Mapping[str, Any]) -> Job:
-        """The job for a request: the one that is there already, or a new one at the end of the queue."""
+        """The job for a request: the existing one, or a new one at the end of the queue."""
         name = key_of(kind, request)
         with self._lock:
             known = self._jobs.get(name)
@@ -121,7 +121,7 @@ class Jobs:
             return job
 
     def result(self, kind: str, request: Mapping[str, Any]) -> Any:
-        """The result of a request; None where it is not there."""
+        """The result of a request; None if there is none."""
         name = key_of(kind, request)
         with self._lock:
             if name in self._results:
@@ -129,7 +129,7 @@ class Jobs:
             return self._results.get(name)
 
     def known(self, kind: str, request: Mapping[str, Any]) -> Job | None:
-        """The job of a request, where there is one."""
+        """The job of a request, if there is one."""
         with self._lock:
             return self._jobs.get(key_of(kind, request))
 
@@ -173,7 +173,7 @@ class Jobs:
             thread.start()
 
     def _work(self) -> None:
-        """The life of a thread: it owns one process, and a new one after that has ended."""
+        """The loop of a thread: it owns one process, and a new one after that has ended."""
         process: _Process | None = None
         while (name := self._queue.get()) is not None:
             with self._lock:
@@ -194,7 +194,7 @@ class Jobs:
             process.end()
 
     def _follow(self, job: Job, process: _Process) -> None:
-        """Hand a job to a process, and take note of what it says until it is done."""
+        """Send a job to a process, and record its messages until it is done."""
         kind, request = self._requests.pop(job.id)
         try:
             process.pipe.send((kind, request))
@@ -208,7 +208,7 @@ class Jobs:
                 self._end(job, message, content)
                 return
         except (EOFError, OSError):
-            self._end(job, "failed", "the process that did it ended; look at the log of the server, and try again")
+            self._end(job, "failed", "the process of this job ended; look at the log of the server, and try again")
 
     def _end(self, job: Job, message: str, content: Any) -> None:
         with self._lock:
@@ -231,20 +231,20 @@ class Jobs:
             self._keep()
 
     def _keep(self) -> None:
-        """Write down which jobs there are, so that a server that died can say what it was at."""
+        """Store the list of jobs, so that the next server can state the interrupted ones."""
         with suppress(ArchiveUnusable, OSError):
             content = [job.document() for job in list(self._jobs.values())[-20:]]
             self._place.parent.mkdir(parents=True, exist_ok=True)
             files.publish(self._place, files.json_bytes({"jobs": content}), "jobs", files.ELSEWHERE)
 
     def _remember(self) -> None:
-        """The jobs of a server before this one that had not ended."""
+        """The unfinished jobs of an earlier server process."""
         if not self._place.is_file():
             return
         with suppress(ArchiveUnusable, KeyError, TypeError):
             for one in files.read_json(self._place)["jobs"]:
                 if one["state"] in {"waiting", "running"}:
-                    note = "the server ended before it was done; ask for it again"
+                    note = "the server ended before it was done; start it again"
                     job = Job(str(one["id"]), str(one["kind"]), str(one["title"]), "interrupted", note=note)
                     self._jobs[job.id] = job
 

@@ -1,4 +1,4 @@
-"""The process that measures one lot, with the pages in the operator's place: ``python -m … FOLDER``."""
+"""The process that measures one lot, with the pages as operator: ``python -m … FOLDER``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EVERY_S = 0.25
 
 
 class Pages:
-    """The state of a lot, written for the pages; and their answers."""
+    """The state of a lot, written for the pages; and the answers of the pages."""
 
     def __init__(self, place: Path, before: dict[str, Any]) -> None:
         self._place, self._told = place, 0.0
@@ -45,12 +45,12 @@ class Pages:
         self._told = time.monotonic()
 
     def progress(self, done: int, total: int, note: str) -> None:
-        """How far the capture is; not every record is worth a file."""
+        """Progress of the capture; not every record writes a file."""
         if time.monotonic() - self._told > EVERY_S or done == total:
             self.put(phase="measuring", done=done, total=total, note=note)
 
     def ask(self, prompt: Prompt) -> Answer:
-        """The answer of whoever is at a page, however long it takes."""
+        """The answer of the user of a page, without time limit."""
         number = int(self._state["number"]) + 1
         question = {"kind": prompt.kind, "text": prompt.text, "slots": [list(one) for one in prompt.slots]}
         self.put(phase="asks", question=question, number=number)
@@ -70,7 +70,7 @@ def measure(place: Path) -> str:
     try:
         _measured(request, pages)
     except KeyboardInterrupt:
-        pages.put(phase="stopped", question=None, note="stopped; the station was made safe")
+        pages.put(phase="stopped", question=None, note="stopped; the station is in the safe state")
         return "stopped"
     except OperatorNeeded as problem:
         pages.put(phase="stopped", question=None, note="", problem=str(problem))
@@ -88,12 +88,12 @@ def measure(place: Path) -> str:
 
 def _measured(request: dict[str, Any], pages: Pages) -> None:
     keys = ("units", "slots", "faults")
-    wanted = Request(
+    lot_request = Request(
         recipe=request["recipe"], station=Path(request["station"]) if request["station"] else None, seed=request["seed"],
         repeat=int(request["repeat"]), **{key: tuple(request[key]) for key in keys},
     )  # fmt: skip
     archive = Archive(request["archive"])
-    job = wanted.job(archive)
+    job = lot_request.job(archive)
     runner = Runner(job, archive, pages.progress)
     pages.put(run=runner.run.id)
     beside = Attendance(pages, job, runner.run.id)

@@ -1,6 +1,6 @@
-"""Lots on the station: each is measured by a process of its own that outlives the server; its state lies in small files.
+"""Lots on the station: each is measured by a separate process that survives the server; its state is in small files.
 
-``lots/<id>/request.json`` is what was asked for, ``state.json`` how far it is, ``answer-<n>.json`` the answer to question n,
+``lots/<id>/request.json`` is the request, ``state.json`` its progress, ``answer-<n>.json`` the answer to question n,
 created once: of two answers to one question the second is refused.
 """
 
@@ -31,12 +31,12 @@ NEWEST = 12
 
 
 class Stale(TumblelineError):
-    """An action that was based on a state which is not the present one any more."""
+    """An action based on an outdated state."""
 
 
 @dataclass(frozen=True)
 class LotState:
-    """How far a lot is.
+    """The state of a lot.
 
     phase : ``starting``, ``measuring``, ``asks``, ``computing``, ``done``, ``stopped``, ``failed``, ``interrupted``
     number : of the question, which its answer names · slots : slot, serial, result
@@ -60,19 +60,19 @@ class LotState:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing is under way any more."""
+        """Whether the lot has ended."""
         return self.phase in ENDED
 
 
 def start(
     settings: Settings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int
 ) -> LotState:
-    """A lot begun, or gone on with where the same one was stopped.
+    """A new lot, or the continuation of the same stopped lot.
 
     Raises
     ------
     TumblelineError
-        The recipe, the seats or the faults cannot be; nothing was moved.
+        The recipe, the seats or the faults are invalid; nothing was moved.
     """
     from pipelines.archive import Archive
     from pipelines.jobs.job import Request
@@ -80,7 +80,7 @@ def start(
     if len(set(units)) < len(units):
         twice = next(unit for unit in units if list(units).count(unit) > 1)
         raise WrongUse(f"lot: serial '{twice}' is in two slots, each unit has one; scan the slots again")
-    wanted = Request(
+    lot_request = Request(
         recipe=recipe,
         station=settings.station,
         units=tuple(units),
@@ -88,13 +88,17 @@ def start(
         repeat=repeat,
         faults=tuple(faults),
     )
-    job = wanted.job(Archive(settings.archive))
-    content = {**wanted.parameters(), "archive": settings.archive, "seats": [[u.slot, u.serial] for u in job.lot.units]}
+    job = lot_request.job(Archive(settings.archive))
+    content = {
+        **lot_request.parameters(),
+        "archive": settings.archive,
+        "seats": [[u.slot, u.serial] for u in job.lot.units],
+    }
     name = digest(content)[:12]
     for other in lots(settings):
         if not other.ended and other.id != name:
             raise WrongUse(
-                f"lot: the station is at lot {other.id}, one lot at a time is measured; finish or stop that one first"
+                f"lot: the station measures lot {other.id}, one lot at a time is possible; finish or stop that one first"
             )
     place = settings.folder / FOLDER / name
     known = state_of(place) if (place / "state.json").is_file() else None
@@ -114,7 +118,7 @@ def start(
 
 
 def again(settings: Settings, name: str) -> LotState:
-    """A lot that was stopped, gone on with."""
+    """The continuation of a stopped lot."""
     request = files.read_json(place_of(settings, name) / "request.json")
     return start(
         settings, request["recipe"], request["units"], request["slots"], request["faults"], int(request["repeat"])
@@ -127,25 +131,23 @@ def answer(settings: Settings, name: str, number: int, reply: str) -> LotState:
     Raises
     ------
     Stale
-        The lot asks something else by now, or was answered already.
+        The question has changed, or was answered already.
     """
     place = place_of(settings, name)
     now = state_of(place)
     if now.phase != "asks" or now.number != number:
-        raise Stale(f"lot {name}: the question was answered already; the page shows what is asked now")
+        raise Stale(f"lot {name}: the question was answered already; the page shows the present question")
     try:
         handle = os.open(place / f"answer-{number}.json", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
     except FileExistsError:
-        raise Stale(
-            f"lot {name}: the question was answered at the same moment elsewhere; nothing more is needed"
-        ) from None
+        raise Stale(f"lot {name}: another page answered the question at the same time; no action is needed") from None
     with os.fdopen(handle, "w") as file:
         json.dump({"answer": "stop" if reply == "stop" else "go"}, file)
     return now
 
 
 def stop(settings: Settings, name: str) -> LotState:
-    """Have a lot's process make the station safe and end; it goes on when it is started again."""
+    """Stop a lot's process after the safe state; it continues when it is started again."""
     place = place_of(settings, name)
     now = state_of(place)
     if not now.ended and now.pid and _alive(now.pid):
@@ -171,7 +173,7 @@ def place_of(settings: Settings, name: str) -> Path:
 
 
 def state_of(place: Path) -> LotState:
-    """The state of a lot; one whose process is gone without an end is interrupted."""
+    """The state of a lot; one whose process ended unexpectedly is interrupted."""
     request, now = files.read_json(place / "request.json"), files.read_json(place / "state.json")
     phase = str(now["phase"])
     pid = int(now.get("pid", 0))
@@ -190,12 +192,12 @@ def state_of(place: Path) -> LotState:
 
 
 def write_state(place: Path, content: dict[str, Any]) -> None:
-    """Put a lot's state in the place of the one before, whole."""
+    """Replace a lot's state atomically."""
     files.publish(place / "state.json", files.json_bytes(content), "lot", files.ELSEWHERE)
 
 
 def stamp(settings: Settings) -> str:
-    """What changes when any lot does."""
+    """A value that changes when any lot changes."""
     top = settings.folder / FOLDER
     if not top.is_dir():
         return ""

@@ -1,4 +1,4 @@
-"""A model as it stands on a page, saved as the next version of a model file, with the reason."""
+"""The model of a page, saved as the next version of a model file, with the reason."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 from inertial import effects
 from pipelines.diagnosis.inputs import WHY, use_written_formulas
 from pipelines.jobs.model_files import ModelStep, extended, model_text, new_model, publish_model
-from schemas.errors import WrongUse
+from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from pipelines.jobs.releases import Release
     from pipelines.workbench.settings import Settings
 
 FOLDER = "models"
@@ -25,9 +26,42 @@ _ALONE = threading.Lock()
 
 
 def models(settings: Settings) -> list[str]:
-    """Names of the model files that there are."""
+    """Names of the existing model files."""
     folder = settings.folder / FOLDER
     return sorted(place.stem for place in folder.glob("*.toml")) if folder.is_dir() else []
+
+
+def place_of(settings: Settings, name: str) -> Path:
+    """The file of a model.
+
+    Raises
+    ------
+    WrongUse
+        There is none of this name.
+    """
+    known = models(settings)
+    if name not in known:
+        raise WrongUse(f"model: no file is called '{name[:60]}'; {did_you_mean(name, known or ['none'])}")
+    return settings.folder / FOLDER / f"{name}.toml"
+
+
+def release(settings: Settings, name: str, since: str, device: str, station: str, reason: str) -> Release:
+    """A model released to the line from a day on; only one whose what-if says "better".
+
+    Raises
+    ------
+    WrongUse
+        There is no such model, no evidence, no reason, or the day is no date.
+    """
+    from pipelines.archive import Archive
+    from pipelines.jobs.model_change import change_from_options
+    from pipelines.jobs.releases import release as publish
+    from pipelines.rerun.selection import moment
+
+    with _ALONE, effects.additions_forgotten():
+        change = change_from_options("", place_of(settings, name), where="release")
+        archive = Archive(settings.archive)
+        return publish(archive, change, moment(since, "release"), device=device, station=station, reason=reason)
 
 
 def save(
@@ -43,13 +77,13 @@ def save(
 
     Parameters
     ----------
-    start : the model that a new file begins with · formulas : ``id = expression`` of those that are used
-    why, source : the reason, and the dwells that showed it
+    start : the model that a new file begins with · formulas : ``id = expression`` of the used ones
+    why, source : the reason, and the dwells with the evidence
 
     Raises
     ------
     WrongUse
-        The name or the reason is missing, or there is nothing to save.
+        The name or the reason is missing, or there is no change to save.
     """
     if not NAME.fullmatch(name):
         raise WrongUse(
@@ -70,7 +104,7 @@ def save(
             text, after = extended(text, ModelStep(effect, by, at, why.strip(), source), f"model {place.name}")
             version = after.model.version
         if version == 0 and place.is_file():
-            raise WrongUse(f"model: {place} holds these effects already; nothing was written")
+            raise WrongUse(f"model: {place} has these effects already; nothing was written")
         place.parent.mkdir(parents=True, exist_ok=True)
         publish_model(place, text)
     return place, version or 1

@@ -1,4 +1,4 @@
-"""The work that a page needs, from its state: what a browser asks for is a page's address, never a request as such."""
+"""The work that a page needs, from its state: a browser sends the address of a page, never a request itself."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.workbench.services import sources, uploads
-from pipelines.workbench.state import AuditPage, MissingPage, PageState, PlanPage, UploadPage
+from pipelines.workbench.services import models, sources, uploads
+from pipelines.workbench.state import AuditPage, MissingPage, ModelsPage, PageState, PlanPage, UploadPage
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def _judging(settings: Settings, page: MissingPage) -> dict[str, Any]:
 
 
 def settled(settings: Settings, page: MissingPage) -> MissingPage:
-    """The page with the source's own name, and with the model that it begins with where none is named."""
+    """The page with the source's own name, and with the starting model if none is given."""
     name = sources.resolve(settings, page.source, "source")
     if page.effects:
         return page.model_copy(update={"source": name})
@@ -62,13 +62,13 @@ def settled(settings: Settings, page: MissingPage) -> MissingPage:
 
 @lru_cache(maxsize=64)
 def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
-    """The model that a diagnosis of these dwells judges where none is named."""
+    """The default model of a diagnosis of these dwells."""
     from inertial import effects
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.inputs import judged_effects
     from pipelines.importers.exchange import read_dwells
 
-    del stamp  # another content is another answer
+    del stamp  # other content gives another result
     with effects.additions_forgotten():
         judged = judged_effects(name, archive, "", None, "diagnose")
     return tuple(judged or default_model(read_dwells(name, archive=archive)))
@@ -93,6 +93,20 @@ def plan(settings: Settings, page: PlanPage) -> Request:
     return f"plan of {page.recipe}", content
 
 
+def what_if(settings: Settings, page: ModelsPage) -> Request:
+    """The lots of the archive with a model beside their own."""
+    from pipelines.archive import Archive
+
+    place = models.place_of(settings, page.model)
+    runs = Archive(settings.archive).root / "runs"
+    return f"what if {place.stem}", {
+        "archive": settings.archive,
+        "model": str(place),
+        "stamp": place.stat().st_mtime_ns,
+        "runs": runs.stat().st_mtime_ns if isinstance(runs, Path) and runs.is_dir() else 0,
+    }
+
+
 def audit(settings: Settings, page: AuditPage) -> Request:
     """The audit of the archive."""
     from pipelines.archive import Archive
@@ -115,7 +129,7 @@ def bring_in(settings: Settings, page: UploadPage) -> Request:
 
 
 def recipes(settings: Settings) -> list[str]:
-    """Recipes that can be chosen: the built-in one, and files of the workbench's folder."""
+    """Available recipes: the built-in one, and files of the workbench's folder."""
     found = [str(place) for place in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
     return ["production", *(name for name in found if _is_recipe(Path(name)))]
 
@@ -133,5 +147,6 @@ KINDS: dict[str, tuple[type[PageState], Callable[[Settings, Any], Request]]] = {
     "ladder": (MissingPage, ladder),
     "plan": (PlanPage, plan),
     "audit": (AuditPage, audit),
+    "whatif": (ModelsPage, what_if),
     "import": (UploadPage, bring_in),
 }

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def samples_of(
     archive: Archive, run: str, dwell: str, read: Callable[[str], pd.DataFrame]
 ) -> tuple[pd.DataFrame, str, str]:
-    """Samples of a dwell ``UNIT:DWELL``, the unit of their values, and what they are called.
+    """Samples of a dwell ``UNIT:DWELL``, the unit of their values, and a title.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def samples_of(
     Raises
     ------
     WrongUse
-        There is no such dwell, or its samples were never recorded.
+        There is no such dwell, or its samples were not recorded.
     """
     found = archive.run(run)
     unit, _, number = dwell.rpartition(":")
@@ -46,7 +46,7 @@ def samples_of(
     own = [one[one["unit"] == unit] for one in tables]
     kept = [one for one in own if len(one)]
     if not kept:
-        raise WrongUse(f"run {found.id}: no samples of dwell {number} of unit {unit} are kept")
+        raise WrongUse(f"run {found.id}: no samples of dwell {number} of unit {unit} are stored")
     import pandas as pd
 
     out_unit = str(row["out_unit"]) if "out_unit" in rows.columns else ""

@@ -1,4 +1,4 @@
-"""What can be looked at: runs of the archive, and files of dwells in the workbench's folder; nothing else of the machine."""
+"""Available sources: runs of the archive, and files of dwells in the workbench's folder; no other files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_FILES = 500
 
 @dataclass(frozen=True)
 class Source:
-    """Dwells that can be chosen: ``name`` as a command line has it."""
+    """Available dwells: ``name`` as on a command line."""
 
     name: str
     label: str
@@ -34,23 +34,28 @@ def sources(settings: Settings) -> list[Source]:
 
 
 def resolve(settings: Settings, name: str, where: str) -> str:
-    """The name of a source that is there.
+    """The name of an existing source.
 
     Raises
     ------
     WrongUse
         It is neither a run of the archive nor a file of the folder.
     """
-    files = {one.name for one in _files(settings.folder)}
-    if name in files:
+    if is_file(settings, name):
         return name
+    files = {one.name for one in _files(settings.folder)}
     if "/" in name or "\\" in name or name.endswith(ENDINGS):
         raise WrongUse(f"{where}: no file '{name}' in {settings.folder}; {did_you_mean(name, files or {'none'})}")
     return Archive(settings.archive).run(name).id
 
 
+def is_file(settings: Settings, name: str) -> bool:
+    """Whether a source is a file of the folder."""
+    return name in {one.name for one in _files(settings.folder)}
+
+
 def stamp(settings: Settings, name: str) -> str:
-    """What changes with the content of a source."""
+    """A value that changes with the content of a source."""
     place = Path(name)
     if place.suffix and place.is_file():
         about = place.stat()
@@ -60,7 +65,7 @@ def stamp(settings: Settings, name: str) -> str:
 
 
 def twin(settings: Settings, name: str) -> str:
-    """The fresh measurement that stands beside a file of dwells; empty where there is none."""
+    """The fresh measurement beside a file of dwells; empty if there is none."""
     place = Path(name)
     for stem in (place.stem.replace("dwells", "fresh"), f"{place.stem}-fresh", f"fresh-{place.stem}"):
         beside = place.with_name(stem + place.suffix)

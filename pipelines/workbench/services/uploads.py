@@ -1,4 +1,4 @@
-"""A file of somebody's own: kept in the folder, read as it is said to be, brought into the archive."""
+"""An uploaded file: stored in the folder, read by its mapping, imported into the archive."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ GUESSES: dict[str, tuple[str, ...]] = {
     "unit": ("unit", "serial", "sn", "device"),
     "dwell": ("dwell",),
 }
-"""Columns that are offered for a meaning, by their names; whoever uploads says whether it is so."""
+"""Columns proposed for a meaning, by their names; the user confirms them."""
 MOST_ROWS = 8
 
 
@@ -41,7 +41,7 @@ class Reading:
     """A file as it was read.
 
     columns : its own · head : the first rows · offered : meanings with the columns that their names suggest
-    data : what it comes to with the mapping, rows of its dwells · problem : why it cannot be read so
+    data : the result of the mapping, rows of its dwells · problem : the reason why it cannot be read
     """
 
     file: str
@@ -60,12 +60,12 @@ class Reading:
 
 
 def keep(settings: Settings, name: str, content: bytes) -> str:
-    """The place of a file that was dropped; one of the same name and other content gets a number.
+    """The path of a dropped file; another content under the same name gets a number.
 
     Raises
     ------
     WrongUse
-        Its name has an ending that no reader knows.
+        The ending of its name is unknown.
     """
     plain = NAME.sub("_", Path(name.replace("\\", "/")).name).strip(" .")[-120:]
     if not plain.lower().endswith(ENDINGS):
@@ -86,7 +86,7 @@ def keep(settings: Settings, name: str, content: bytes) -> str:
 
 
 def resolve(settings: Settings, name: str) -> Path:
-    """The place of an uploaded file, and of no other."""
+    """The path of an uploaded file."""
     folder = settings.folder / FOLDER
     place = Path(name)
     if place.parent != folder or not place.is_file() or place.is_symlink():
@@ -140,20 +140,20 @@ def mapping_of(request: Mapped[str, Any]) -> Any:
     from pipelines.importers import mapping
 
     units = {"output": request["output"], "time": request["time"], "temperature": request["temperature"]}
-    wanted: dict[str, Any] = {
+    keys: dict[str, Any] = {
         "columns": mapping.pairs(",".join(request["columns"]), "columns"),
         "units": units,
         "rows": request["rows"],
     }
-    wanted |= {"unit": request["serial"]} if request["serial"] else {}
-    wanted |= {"rate_hz": request["rate"]} if request["rate"] else {}
-    wanted |= {"local_gravity_m_s2": request["gravity"]} if request["gravity"] else {}
-    wanted |= {"poses": mapping.pairs(request["poses"], "poses")} if request["poses"] else {}
-    return mapping.build(wanted, "upload")
+    keys |= {"unit": request["serial"]} if request["serial"] else {}
+    keys |= {"rate_hz": request["rate"]} if request["rate"] else {}
+    keys |= {"local_gravity_m_s2": request["gravity"]} if request["gravity"] else {}
+    keys |= {"poses": mapping.pairs(request["poses"], "poses")} if request["poses"] else {}
+    return mapping.build(keys, "upload")
 
 
 def imported(request: Mapped[str, Any]) -> dict[str, Any]:
-    """A file brought into the archive, with the fit that was wanted."""
+    """A file imported into the archive, with the requested fit."""
     from pipelines.diagnosis.imported import judge
     from pipelines.importers import files, keep, record
 
@@ -163,7 +163,7 @@ def imported(request: Mapped[str, Any]) -> dict[str, Any]:
     data = record.imported(content.table, how, place.name, content)
     if data.dwells is None:
         raise DataRejected(
-            f"{place.name}: nothing stands still in it, dwells are needed; record every pose for some seconds"
+            f"{place.name}: it has no static interval, dwells are needed; record every pose for some seconds"
         )
     judged = judge(request["fit"], data, how) if request["fit"] else None
     run = keep.keep(data, source, how, judged, request["archive"])

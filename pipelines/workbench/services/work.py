@@ -1,4 +1,4 @@
-"""The work of jobs, in a process of its own: each calls what a command calls. Results are plain and can be sent."""
+"""The work of jobs, in separate processes: each calls the functions of a command. Results can be pickled."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from schemas.errors import TumblelineError
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    Tell = Callable[[int, int, str], None]
+    ReportProgress = Callable[[int, int, str], None]
 
 
-def done_in_process(kind: str, request: Mapping[str, Any], tell: Tell) -> tuple[str, Any]:
-    """What came of a request: ``done`` with the result, or ``failed`` with a sentence."""
+def done_in_process(kind: str, request: Mapping[str, Any], report_progress: ReportProgress) -> tuple[str, Any]:
+    """The result of a request: ``done`` with the result, or ``failed`` with a sentence."""
     from threadpoolctl import threadpool_limits
 
     from inertial import effects
@@ -23,7 +23,7 @@ def done_in_process(kind: str, request: Mapping[str, Any], tell: Tell) -> tuple[
 
     try:
         with threadpool_limits(1), effects.additions_forgotten():
-            return "done", WORK[kind](request, tell)
+            return "done", WORK[kind](request, report_progress)
     except (TumblelineError, InertialError) as problem:
         return "failed", str(problem)
     except Exception as problem:  # noqa: BLE001 - a defect: the page says so, the details go to the server's log
@@ -46,10 +46,10 @@ def _inputs(request: Mapping[str, Any], where: str) -> tuple[Any, Any, list[str]
     return leave_out(table, named_dwells(",".join(request["without"]))), history, judged
 
 
-def diagnose(request: Mapping[str, Any], tell: Tell) -> Diagnosed:
+def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Diagnosed:
     """The diagnosis of a source against a model; and the residuals of the model before it."""
     steps = 4
-    tell(0, steps, "reading the dwells")
+    report_progress(0, steps, "reading the dwells")
     from inertial.quantities import formula_names
     from pipelines.diagnosis.condense import condense
     from pipelines.diagnosis.diagnose import default_model
@@ -60,16 +60,16 @@ def diagnose(request: Mapping[str, Any], tell: Tell) -> Diagnosed:
     dwells, history, judged = _inputs(request, "diagnose")
     added = list(request["added"])
     model = [*(judged or default_model(dwells)), *added]
-    tell(1, steps, "searching for missing effects")
+    report_progress(1, steps, "searching for missing effects")
     made = examination(dwells, history, model, request["without"])
     faulty = {unit for fault in made.document["blocked_by"] for unit in fault["units"]}
     units = tuple(unit for unit in made.found.units if unit not in faulty)
     table, ladder, before = None, [], None
     if made.diagnosis is not None:
-        tell(2, steps, "laying out the residuals")
+        report_progress(2, steps, "computing the residuals")
         table, ladder = residual_table(made.found, made.diagnosis, units), ladder_of(made.diagnosis)
         if added:
-            tell(3, steps, "fitting the model before")
+            report_progress(3, steps, "fitting the model before the last step")
             before = residuals_of_model(condense(dwells), history, model[:-1], units)
     state = made.found.state
     known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
@@ -78,7 +78,7 @@ def diagnose(request: Mapping[str, Any], tell: Tell) -> Diagnosed:
     return Diagnosed(made.document, table, ladder, before, names)
 
 
-def ladder(request: Mapping[str, Any], tell: Tell) -> list[dict[str, Any]]:
+def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[dict[str, Any]]:
     """The errors of every version of a model: fitted, cross-validated, on a fresh run, and the floor."""
     from pipelines.diagnosis.compare import compare
     from pipelines.diagnosis.diagnose import default_model
@@ -100,36 +100,51 @@ def ladder(request: Mapping[str, Any], tell: Tell) -> list[dict[str, Any]]:
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
         nonlocal count
-        tell(count, len(versions), f"fitting version {count + 1}")
+        report_progress(count, len(versions), f"fitting version {count + 1}")
         count += 1
         return compare(dwells, effects, history, fresh, fresh_history, before)
 
     return evolution(versions, compared)
 
 
-def plan(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
-    """The plan of a recipe, and what its pictures are drawn from."""
-    tell(0, 2, "reading the recipe")
+def plan(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """The plan of a recipe, and the data of its charts."""
+    report_progress(0, 2, "reading the recipe")
     from pipelines.workbench.views.planned import planned
 
-    tell(1, 2, "what the plan sees")
+    report_progress(1, 2, "visibility of effects")
     return planned(request)
 
 
-def audit(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
-    """The audit of the archive, and what its pictures are drawn from."""
-    tell(0, 2, "reading the runs")
+def what_if(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """The effect of a model on the lots of the archive; kept there as evidence for its release."""
+    from pathlib import Path
+
+    from pipelines.archive import Archive
+    from pipelines.jobs.model_change import change_from_options
+    from pipelines.rerun.selection import selected
+    from pipelines.rerun.whatif import evaluated
+
+    steps = iter(range(3))
+    change, archive = change_from_options("", Path(request["model"]), where="what if"), Archive(request["archive"])
+    runs = [entry.id for entry in selected(archive, ["all"])]
+    return evaluated(archive, runs, change, report_progress=lambda text: report_progress(next(steps), 3, text))
+
+
+def audit(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """The audit of the archive, and the data of its charts."""
+    report_progress(0, 2, "reading the runs")
     from pipelines.workbench.views.audited import audited
 
-    return audited(request, tell)
+    return audited(request, report_progress)
 
 
-def bring_in(request: Mapping[str, Any], tell: Tell) -> dict[str, Any]:
-    """A file of somebody's own, in the archive."""
-    tell(0, 2, "reading the file")
+def bring_in(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
+    """The import of an uploaded file."""
+    report_progress(0, 2, "reading the file")
     from pipelines.workbench.services.uploads import imported
 
-    tell(1, 2, "importing")
+    report_progress(1, 2, "importing")
     return imported(request)
 
 
@@ -138,5 +153,6 @@ WORK: dict[str, Any] = {
     "ladder": ladder,
     "plan": plan,
     "audit": audit,
+    "whatif": what_if,
     "import": bring_in,
 }

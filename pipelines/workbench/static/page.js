@@ -3,7 +3,14 @@ import { draw, drawAll, forget, repaint } from "./figure.js";
 import { listen, start } from "./events.js";
 
 const main = () => document.getElementById("main");
-let boot = document.body.dataset.boot, going = null;
+let boot = document.body.dataset.boot, going = null, pressed = null;
+
+// what lies under a pressed pointer is not replaced: the press would be lost
+document.addEventListener("pointerdown", () => {
+  pressed = new Promise((resolve) => {
+    for (const kind of ["pointerup", "pointercancel"]) document.addEventListener(kind, () => setTimeout(() => { pressed = null; resolve(); }), { once: true, capture: true });
+  });
+}, { capture: true });
 
 export async function go(address, { push = true, part = "", focus = false, renews = false } = {}) {
   if (renews && going && !going.renews) return;  // a page that somebody has asked for is on its way
@@ -11,7 +18,7 @@ export async function go(address, { push = true, part = "", focus = false, renew
   const now = (going = Object.assign(new AbortController(), { renews }));
   let answer, text;
   try {
-    answer = await fetch(address, { headers: { accept: "text/html" }, signal: now.signal });
+    answer = await fetch(address, { headers: { accept: "text/html", "x-part": part }, signal: now.signal });
     text = await answer.text();
   } catch (problem) {
     if (problem.name !== "AbortError") lost(true);
@@ -19,9 +26,13 @@ export async function go(address, { push = true, part = "", focus = false, renew
   } finally {
     if (going === now) going = null;
   }
+  if (renews && pressed) {
+    await pressed;
+    if (going) return;  // the press has led elsewhere
+  }
   const page = new DOMParser().parseFromString(text, "text/html");
   if (push) history.pushState(null, "", answer.redirected ? answer.url : address);
-  document.title = page.title;
+  if (page.title) document.title = page.title;  // a part of a page has none
   const wanted = part ? [...document.querySelectorAll(`[data-swap="${CSS.escape(part)}"]`)] : [];
   const fresh = part ? [...page.querySelectorAll(`[data-swap="${CSS.escape(part)}"]`)] : [];
   if (part && wanted.length && wanted.length === fresh.length) {
@@ -32,7 +43,9 @@ export async function go(address, { push = true, part = "", focus = false, renew
     const next = page.getElementById("main");
     if (!next) { location.assign(address); return; }
     forget(main());
+    const kept = renews ? entered() : [];
     main().replaceWith(document.adoptNode(next));
+    enter(kept);
     for (const link of document.querySelectorAll(".bar nav a")) {
       if (link.pathname === location.pathname) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
     }
@@ -40,6 +53,23 @@ export async function go(address, { push = true, part = "", focus = false, renew
     if (focus) main().focus({ preventScroll: true });
   }
   arrived();
+}
+
+// a page that comes anew by itself keeps what a person has entered in its fields
+const FIELDS = "input:not([type=hidden]):not([type=file]), textarea";
+function entered() {
+  return [...main().querySelectorAll(FIELDS)].map((field, k) => ({ k, name: field.name, value: field.value, typed: field.value !== field.defaultValue, focused: field === document.activeElement }))
+    .filter((one) => one.typed || one.focused);
+}
+
+function enter(kept) {
+  const fields = [...main().querySelectorAll(FIELDS)];
+  for (const one of kept) {
+    const field = fields[one.k];
+    if (!field || field.name !== one.name) continue;
+    if (one.typed) field.value = one.value;
+    if (one.focused) field.focus();
+  }
 }
 
 function arrived() {

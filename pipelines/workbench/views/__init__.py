@@ -1,1 +1,1 @@
-"""What pages show: charts and rows from tables of the product; nothing is computed that a command does not compute."""
+"""Content of pages: charts and rows from tables of the product; every number comes from a function of a command."""

@@ -1,4 +1,4 @@
-"""The audit of the archive for its page: the document of ``tumbleline audit`` and charts of what its findings rest on."""
+"""The audit of the archive for its page: the document of ``tumbleline audit`` and charts of the evidence."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def audited(request: Mapping[str, Any], tell: Callable[[int, int, str], None]) -
     from pipelines.audit.rules import load_rules
 
     found = audit(Archive(request["archive"]), load_rules(None), scope_of(*(str(request[name]) for name in NAMES)))
-    tell(1, 2, "what its findings rest on")
+    tell(1, 2, "the evidence of its findings")
     if not len(found.all) and not found.problems:
         raise WrongUse(
             f"audit: {request['archive']} has no calibration in this time, one at least is needed; make a run"
@@ -77,7 +77,7 @@ def yield_chart(months: list[Any]) -> Chart:
 
 
 def due_chart(audit: Audit) -> Chart:
-    """Units that come due, month by month over the next two years."""
+    """Units due, by month over the next two years."""
     months = (audit.due.day - audit.scope.until) / (YEAR_D / 12.0)
     ahead = np.bincount(np.floor(months[(months >= 0.0) & (months < MONTHS)]).astype(int), minlength=MONTHS)
     late = int(np.count_nonzero(months < 0.0))
@@ -153,7 +153,7 @@ def series_chart(one: StationSeries) -> Chart:
 
 
 def drift_chart(audit: Audit, one: UnitDrift) -> Chart:
-    """The history of a unit's parameter, with the tolerance about the last calibration and where the drift leads."""
+    """The history of a unit's parameter, with the tolerance about the last calibration and the extrapolated drift."""
     rows = np.flatnonzero(audit.good & (audit.all.unit == one.unit) & (audit.all.device == one.device))
     day, value, error = audit.all.day[rows], audit.all.column(one.parameter)[rows], audit.all.error(one.parameter)[rows]
     end = day[-1] + YEAR_D * 2.0

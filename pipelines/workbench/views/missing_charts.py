@@ -1,4 +1,4 @@
-"""Charts of what is missing: residuals on the sphere, against what was recorded, before and after, and the ladder of error."""
+"""Charts of missing effects: residuals on the sphere and against recorded quantities, and errors by version."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TURNS: dict[int, tuple[str, Any]] = {
     0: ("first soak", "circle"),
 }
 ROLES: dict[str, Role] = {"x": "x", "y": "y", "z": "z", "norm": "norm"}
-FEW = 12  # units whose points are all shown
+FEW = 12  # number of units up to which all points are shown
 LADDER = (
     ("fitted_ug", "fitted", "before", "circle"),
     ("heldout_ug", "cross-validated", "ink", "square"),
@@ -47,10 +47,10 @@ def chosen_unit(table: ResidualTable, page: MissingPage) -> int:
 
 
 def chosen_driver(found: Diagnosed, page: MissingPage) -> str:
-    """The quantity of the address, else the one along which the model fails most, else force."""
+    """The quantity of the address, else the one that the residual follows most, else force."""
     known = {} if found.table is None else found.table.drivers
-    told = [str(place["driver"]) for place in found.document["where"]]
-    return next((name for name in (page.against, *told) if name in known), "force")
+    drivers = [str(place["driver"]) for place in found.document["where"]]
+    return next((name for name in (page.against, *drivers) if name in known), "force")
 
 
 def sphere_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
@@ -98,7 +98,7 @@ def sphere_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
 
 
 def driver_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
-    """Residuals against a recorded quantity; the model before on the left where there is one, on one scale."""
+    """Residuals against a recorded quantity; the previous model on the left if there is one, on one scale."""
     table = found.table
     if table is None:
         return None
@@ -118,7 +118,7 @@ def driver_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
 
 
 def _driven(table: ResidualTable, residual: Array, values: Array, unit: int, page: MissingPage) -> list[Trace]:
-    """The crowd of all units in the background, the chosen one in front, and a smooth curve through it."""
+    """All units in the background, the chosen one in front, and a smooth curve through it."""
     traces: list[Trace] = []
     per_axis = values.ndim == 3
     if len(table.units) > 1:
@@ -155,7 +155,7 @@ def _along(values: Array, axis: int, *, per_axis: bool) -> Array:
 def _groups(
     table: ResidualTable, unit: int, page: MissingPage
 ) -> Callable[[int, str], list[tuple[str, Role, Any, NDArray[np.bool_]]]]:
-    """How the points of an axis are parted: by axis alone, by the way the temperature was reached, or by slot."""
+    """Grouping of the points of an axis: by axis alone, by the way the temperature was reached, or by slot."""
     turning = table.turning[unit]
 
     def by_axis(axis: int, name: str) -> list[tuple[str, Role, Any, NDArray[np.bool_]]]:
@@ -200,7 +200,7 @@ def ladder_chart(rows: list[dict[str, Any]]) -> Chart:
 
 
 def slot_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
-    """Mean residual of every unit by slot, axis by axis: what the place on the fixture does."""
+    """Mean residual of every unit by slot, axis by axis: the influence of the place on the fixture."""
     table = found.table
     if table is None or "slot" not in table.drivers:
         return None

@@ -79,7 +79,7 @@ def sphere_chart(context: PlanContext) -> Chart:
 
 
 def temperature_chart(context: PlanContext) -> Chart:
-    """Chamber and slowest device over the station's time, with what is measured when."""
+    """Chamber and slowest device over the station's time, with the times of the measurements."""
     time, air, device = np.array(temperatures(context.activities, context.station)).T
     hours = time / 3600.0
     low = float(min(air.min(), device.min()))

@@ -1,4 +1,4 @@
-"""Temperatures and angles of a run over the station's time, with what happened."""
+"""Temperatures and angles of a run over the station's time, with events."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def station_chart(history: pd.DataFrame, readings: pd.DataFrame, events: pd.Data
         Trace("units, coldest to warmest", hours, cold[::step], "band", "accent", high=warm[::step]),
         Trace("chamber", hours, chamber[::step], "line", "before"),
     ]
-    told = events[~events["kind"].isin(["reference", "soak"])]
-    if len(told):
-        texts = tuple(f"{row.kind}: {row.reason}" for row in told.itertuples())
-        place = np.full(len(told), float(np.nanmin(chamber)))
+    interruptions = events[~events["kind"].isin(["reference", "soak"])]
+    if len(interruptions):
+        texts = tuple(f"{row.kind}: {row.reason}" for row in interruptions.itertuples())
+        place = np.full(len(interruptions), float(np.nanmin(chamber)))
         traces.append(
             Trace(
                 "events",
-                told["time_s"].to_numpy(float) / 3600.0,
+                interruptions["time_s"].to_numpy(float) / 3600.0,
                 place,
                 role="limit",
                 symbol="diamond",

@@ -72,13 +72,13 @@ class Acutrol(Equipment):
         """Orders rate 0; the interlock opens at standstill by the machine's own logic."""
         self.values.write("rate", 0.0)
 
-    def _wait(self, wanted: float, band: float) -> None:
+    def _wait(self, rate_deg_s: float, band: float) -> None:
         end = self.clock.now() + PATIENCE_S
-        while not abs(self.values.number("rate_read") - wanted) <= band:
+        while not abs(self.values.number("rate_read") - rate_deg_s) <= band:
             self._require_no_fault()
             if self.clock.now() > end:
                 self.make_safe()
-                raise StationTimeout(f"{self.name}: not at {wanted:g} °/s after {PATIENCE_S:g} s; check the drive")
+                raise StationTimeout(f"{self.name}: not at {rate_deg_s:g} °/s after {PATIENCE_S:g} s; check the drive")
             self.clock.sleep(POLL_S)
 
     def _require_no_fault(self) -> None:

@@ -73,8 +73,8 @@ class Centrifuge:
         way = ACCELERATION_DEG_S2 * 1e-6 * (self._world.now_us - self._since_us)
         return self._from + math.copysign(min(way, abs(self._to - self._from)), self._to - self._from)
 
-    def _go(self, wanted: float) -> None:
-        self._from, self._to, self._since_us = self.rate(), wanted, self._world.now_us
+    def _go(self, rate_deg_s: float) -> None:
+        self._from, self._to, self._since_us = self.rate(), rate_deg_s, self._world.now_us
 
     def _watch(self) -> None:
         """Trips by door and overspeed, and the stop after a silence; all follow from the plant's time."""

@@ -1,8 +1,9 @@
-"""How much of a change that an effect predicts comes again on a fresh run: λ with its standard error.
+"""Part of a predicted change that a fresh run reproduces: λ with its standard error.
 
-e0 is what the model without the effect misses the fresh run by, d the difference of the two models' predictions. Both less what
-may be another on another day (the base model's coefficients, or each unit's bias alone where the fresh run does not determine
-them), λ = Σ dᵀV⁻¹e0 / Σ dᵀV⁻¹d: one where the effect is there as it was fitted, zero where it is not.
+e0 is the error of the model without the effect on the fresh run, d the difference of the predictions of the two models. Both are
+without the part that may change from day to day (the base model's coefficients, or each unit's bias alone where the fresh run
+does not determine
+them), λ = Σ dᵀV⁻¹e0 / Σ dᵀV⁻¹d: one if the effect is real and has its fitted size, zero if it is not real.
 """
 
 from dataclasses import dataclass
@@ -21,19 +22,20 @@ from inertial.criticism.space import Space
 Array = NDArray[np.float64]
 
 _ENOUGH = 3
-"""Units, or stretches of time, from which on their scatter tells of an error."""
+"""Fewest units, or stretches of time, whose scatter gives a standard error."""
 
 _SPARE = 2.0
-"""Dwells per coefficient of the base model from which on a fresh run determines it again."""
+"""Dwells per coefficient of the base model that a fresh run needs to determine it again."""
 
 
 @dataclass(frozen=True)
-class CameAgain:
-    """What a fresh run says of an effect.
+class ReproducedChange:
+    """Evidence of a fresh run on an effect.
 
     part : λ; error : of it, one standard deviation
-    before, after : RMS that the models leave, g, what may be another on another day taken out; fall_error : of their difference
-    again : what was estimated again, "base" or "bias"
+    before, after : RMS errors of the models, g, without the part that may change from day to day; fall_error : of their
+    difference
+    again : the part that was estimated again, "base" or "bias"
     """
 
     part: float
@@ -45,7 +47,7 @@ class CameAgain:
 
     @property
     def fall(self) -> float:
-        """By how much the error falls, g."""
+        """Decrease of the error, g."""
         return self.before - self.after
 
     @property
@@ -58,8 +60,8 @@ class CameAgain:
         return False if self.part + 2.0 * self.error < REFUTED else None
 
 
-def came_again(lot: Lot, before: Estimate, after: Estimate) -> CameAgain:
-    """The part of a predicted change that came again.
+def reproduced_change(lot: Lot, before: Estimate, after: Estimate) -> ReproducedChange:
+    """The part of a predicted change that the fresh run reproduces.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def came_again(lot: Lot, before: Estimate, after: Estimate) -> CameAgain:
         problem.covariance, noise, left * zero, base.local, np.concatenate([base.shared, change[..., None]], axis=-1)
     )
     shared = space.gram[1:, 1:]
-    # what all share and is estimated again comes first, the change last: its coefficient is λ
+    # columns shared by all that are estimated again come first, the change last: its coefficient is λ
     own = float(shared[-1, -1])
     along = float(space.gram[-1, 0])
     if shared.shape[0] > 1:
@@ -86,13 +88,13 @@ def came_again(lot: Lot, before: Estimate, after: Estimate) -> CameAgain:
         along -= float(shared[-1, :-1] @ rest @ space.gram[1:-1, 0])
         own -= float(shared[-1, :-1] @ rest @ shared[:-1, -1])
     if own <= 1e-9 * max(float(np.sum(space.whiten(change[..., None]) ** 2)), 1e-300):
-        return CameAgain(float("nan"), float("nan"), *_falls(problem, base, left, change), again)
+        return ReproducedChange(float("nan"), float("nan"), *_falls(problem, base, left, change), again)
     wide = _together(Model(problem, after.terms, near=noise), space.targets[..., -1])
-    return CameAgain(along / own, float(np.sqrt(wide / own)), *_falls(problem, base, left, change), again)
+    return ReproducedChange(along / own, float(np.sqrt(wide / own)), *_falls(problem, base, left, change), again)
 
 
 def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
-    """What is estimated again: the whole base where the fresh run determines it, else the bias alone."""
+    """The part estimated again: the whole base model if the fresh run determines it, else only the bias."""
     base = Model(problem, [t for t in terms if t.first is None])
     space = base.at(problem.covariance.white_noise())
     columns = base.local.shape[-1]
@@ -103,7 +105,7 @@ def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
 
 
 def _together(model: Model, change: Array) -> float:
-    """Factor on the variance of λ where the units share noise and the change is alike in them."""
+    """Factor on the variance of λ if the units share noise and the change is common to them."""
     units = model.problem.lot.state.time.shape[0]
     if units < 2 or model.problem.lot.radial:
         return 1.0
@@ -131,7 +133,7 @@ def _falls(problem: Problem, base: Model, left: Array, change: Array) -> tuple[f
 
 
 def _own_out(problem: Problem, base: Model, space: Space, series: Array) -> Array:
-    """Series (blocks, n), g, less what the base model takes up by plain least squares."""
+    """Series (blocks, n), g, without the part that the base model explains by ordinary least squares."""
     level = problem.covariance.level[:, None]
     local = np.where(np.isfinite(problem.error)[..., None], base.local, 0.0) / level[..., None]
     q = np.linalg.svd(local, full_matrices=False) if local.shape[-1] else None
@@ -145,7 +147,7 @@ def _own_out(problem: Problem, base: Model, space: Space, series: Array) -> Arra
 
 
 def _jackknife(parts: Array) -> float:
-    """Standard error of the fall, parts (k, 3) of squares before, after and counts left out in turn."""
+    """Standard error of the decrease, parts (k, 3) of squares before, after and counts left out in turn."""
     total = parts.sum(axis=0)
     rest = np.maximum(total - parts, 0.0)
     falls = np.sqrt(rest[:, 0] / np.maximum(rest[:, 2], 1.0)) - np.sqrt(rest[:, 1] / np.maximum(rest[:, 2], 1.0))

@@ -9,7 +9,7 @@ from ledger_events import event
 
 from pipelines.certificates import Ledger
 from pipelines.certificates import ledger_index as module
-from pipelines.certificates.ledger_index import NOTED, histories_of
+from pipelines.certificates.ledger_index import INDEX_FOLDER, histories_of
 from schemas.errors import ArchiveUnusable
 
 
@@ -29,11 +29,11 @@ def told(root: Path) -> list[str]:
 
 def test_what_was_noted_is_what_the_files_tell(ledger: Ledger, tmp_path: Path) -> None:
     first, files = told(tmp_path), histories_of(tmp_path)
-    assert (tmp_path / NOTED).is_dir()
+    assert (tmp_path / INDEX_FOLDER).is_dir()
     assert files.read == 0
     assert told(tmp_path) == first
     assert sorted(map(repr, [ledger.events(f"A{n:03d}") for n in range(200)])) == first
-    shutil.rmtree(tmp_path / NOTED)
+    shutil.rmtree(tmp_path / INDEX_FOLDER)
     assert told(tmp_path) == first
 
 
@@ -60,7 +60,7 @@ def test_events_that_are_gone_are_not_told_from_what_was_noted(ledger: Ledger, t
 
 def test_a_noted_file_that_is_foreign_or_cut_off_is_made_again(ledger: Ledger, tmp_path: Path) -> None:
     first = told(tmp_path)
-    ours = sorted((tmp_path / NOTED).iterdir())
+    ours = sorted((tmp_path / INDEX_FOLDER).iterdir())
     ours[0].write_bytes(ours[0].read_bytes()[:100])
     ours[1].write_bytes(b"foreign")
     assert told(tmp_path) == first
@@ -75,4 +75,4 @@ def test_a_ledger_that_may_only_be_read_is_told_all_the_same(
 
     monkeypatch.setattr(module.files, "publish", refuse)
     assert len(list(ledger.all())) == 400
-    assert not (tmp_path / NOTED).exists()
+    assert not (tmp_path / INDEX_FOLDER).exists()

@@ -16,7 +16,7 @@ POLL_S = 1.0
 TIMEOUT_S = 5.0
 
 
-def knock(patience_s: float = 0.0) -> None:
+def check_server(patience_s: float = 0.0) -> None:
     """Wait until the orchestrator of PREFECT_API_URL answers, and check that it accepts PREFECT_API_AUTH_STRING.
 
     Raises

@@ -20,7 +20,7 @@ PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 STOPS = (signal.SIGTERM, signal.SIGINT)
 
 
-def attend(command: Sequence[str]) -> int:
+def run_until_orphans_end(command: Sequence[str]) -> int:
     """Run a command, wait for it and its orphans, and return its exit status.
 
     A SIGTERM to this process is passed to the command, not to its orphans. The exit status of a child that a

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 COVERAGE = 2.0
 
 
-def exchanged_pairs(all_: Calibrations, own: Index, before: Index, rules: Rules) -> list[tuple[int, int, float]]:
+def exchanged_pairs(
+    calibrations: Calibrations, own: Index, before: Index, rules: Rules
+) -> list[tuple[int, int, float]]:
     """Pairs of calibrations of one run that fit each other's history and not their own; both directions, with the distance.
 
     A calibration fits a history where every parameter with a tolerance stays in it, or outside by at most the uncertainty of
@@ -31,29 +33,33 @@ def exchanged_pairs(all_: Calibrations, own: Index, before: Index, rules: Rules)
     own : rows of one kind of device
     before : (m,), index among them of the unit's previous calibration; −1 without one
     """
-    device = str(all_.device[own[0]]) if own.size else ""
+    device = str(calibrations.device[own[0]]) if own.size else ""
     bound = np.array([rules.tolerance_of(device, FAMILY_OF[name]) for name in NAMES])
     pairs, past = list[tuple[int, int, float]](), [int(own[place]) for place in before]
-    for run in np.unique(all_.run[own[before >= 0]].astype(str)):
-        here = np.flatnonzero((all_.run[own] == run) & (before >= 0))
-        far = [int(k) for k in here if not _fits(all_, own[k], past[k], bound)]
+    for run in np.unique(calibrations.run[own[before >= 0]].astype(str)):
+        here = np.flatnonzero((calibrations.run[own] == run) & (before >= 0))
+        far = [int(k) for k in here if not _fits(calibrations, own[k], past[k], bound)]
         pairs += [
-            (k, other, _distance(all_, own[k], past[k], bound))
+            (k, other, _distance(calibrations, own[k], past[k], bound))
             for k in far
             for other in far
-            if k != other and _fits(all_, own[k], past[other], bound) and _fits(all_, own[other], past[k], bound)
+            if k != other
+            and _fits(calibrations, own[k], past[other], bound)
+            and _fits(calibrations, own[other], past[k], bound)
         ]
     return pairs
 
 
-def _fits(all_: Calibrations, row: int, past: int, bound: Array) -> bool:
-    change = np.abs(all_.values[row] - all_.values[past])
-    expanded = COVERAGE * np.hypot(all_.errors[row], all_.errors[past])
+def _fits(calibrations: Calibrations, row: int, past: int, bound: Array) -> bool:
+    change = np.abs(calibrations.values[row] - calibrations.values[past])
+    expanded = COVERAGE * np.hypot(calibrations.errors[row], calibrations.errors[past])
     told = np.isfinite(change) & np.isfinite(
         bound
     )  # parameters outside the model are NaN and are ignored; without any parameter nothing fits
     return bool(told.any() and np.all(change[told] <= (bound + expanded)[told]))
 
 
-def _distance(all_: Calibrations, row: int, past: int, bound: Array) -> float:
-    return float(np.sqrt(np.nanmean(((all_.values[row] - all_.values[past]) / bound)[np.isfinite(bound)] ** 2)))
+def _distance(calibrations: Calibrations, row: int, past: int, bound: Array) -> float:
+    return float(
+        np.sqrt(np.nanmean(((calibrations.values[row] - calibrations.values[past]) / bound)[np.isfinite(bound)] ** 2))
+    )

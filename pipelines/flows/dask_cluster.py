@@ -15,12 +15,12 @@ from schemas.errors import WrongUse
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
-    from pipelines.parallel import Spread
+    from pipelines.parallel import Distributor
 
 SCHEMES = ("tcp://", "tls://", "ucx://", "ws://", "wss://")
 
 
-def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Spread | None:
+def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Distributor | None:
     """The distribution over the workers of a Dask cluster; None without an address.
 
     Parameters
@@ -38,13 +38,13 @@ def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Spread 
         return None
     _refuse_address(address)
 
-    def spread(function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
+    def distribute(function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
         with _orchestrator(home):
             from pipelines.flows.dask import run_on_dask  # Prefect reads its settings when it is imported
 
             return run_on_dask(function, partitions, address, workers, name)
 
-    return spread
+    return distribute
 
 
 def _refuse_address(dask: str) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial.population.fingerprints import ChangeScale, alike_below, change_scale, distance, foreign_above, nearest
-from pipelines.audit.few_units import exchanged_pairs
+from pipelines.audit.exchanged_pairs import exchanged_pairs
 from pipelines.audit.parameters import FAMILY_OF
 from pipelines.audit.parameters import NAMES as PARAMETERS
 

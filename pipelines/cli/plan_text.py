@@ -1,0 +1,110 @@
+"""A plan as text: station time, expected errors, reachable uncertainty, visible and hidden effects."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pipelines.cli.options import console, print_table, short
+from pipelines.cli.reach_text import print_reach
+
+RAISED = 3.0
+"""Factor by which 1/f and random walk must raise a floor to be listed."""
+
+
+def print_plan(document: dict[str, Any]) -> None:
+    """Print a plan."""
+    minutes, error = document["minutes"], document["dwell_error_ug"]
+    out = console()
+    out.print(
+        f"{document['recipe']} with {document['device']} on station {document['station']}: "
+        f"{document['dwells']} dwells in {document['poses']} poses at {_soaks(len(document['temperatures_C']))}"
+    )
+    parts = " + ".join(f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total")
+    out.print(f"{minutes['total']:.0f} min of station time: {parts}")
+    out.print(
+        f"error of a dwell (1σ): {short(error['together'])} µg; white {short(error['white'])}, wander {short(error['wander'])}"
+        f"{_longer(document['dwell_s'])}"
+    )
+    print_table(["coefficient", "error x, 1σ", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
+    if document["bias"] is not None:
+        bias = document["bias"]
+        again = (
+            "no repeatability is stated" if bias["switch_on_u_ug"] is None else f"{short(bias['switch_on_u_ug'])} µg"
+        )
+        out.print(
+            f"bias, 1σ of the worst axis: as the mean of the record {short(bias['record_u_ug'])} µg, of the day after it "
+            f"{short(bias['long_u_ug'])} µg; after the next switch-on: {again}"
+        )
+    print_reach(document.get("uncertainty"))
+    seen = [row for row in document["effects"] if row["seen"]]
+    print_table(
+        ["visible effect", "v", "1/v²", "floor, µg", "coefficient", "unit", "confounded with"],
+        [_visible_line(row) for row in seen],
+    )
+    faint = [row["effect"] for row in seen if row["faint"]]
+    if faint:
+        names = ", ".join(faint)
+        out.print(f"* floor above the typical size: {names}")
+    out.print(
+        "v: fraction of the effect's column that remains after the model; 1/v²: variance inflation; floor: smallest detectable "
+        "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
+        style="dim",
+    )
+    raised = [r for r in seen if r["floor_white_ug"] and r["floor_size_ug"] > RAISED * r["floor_white_ug"]]
+    if raised:
+        raised.sort(key=lambda r: -r["floor_size_ug"] / r["floor_white_ug"])
+        lines = [[r["effect"], short(r["floor_size_ug"]), short(r["floor_white_ug"]), r["breaker"]] for r in raised[:5]]
+        heads = ["raised by slow noise", "floor\nµg", "white only\nµg", "what lowers it"]
+        print_table(heads, lines)
+    in_part = [
+        [row["effect"], "; ".join(r["text"] for r in row["unseen_ranges"])] for row in seen if row["unseen_ranges"]
+    ]
+    if in_part:
+        print_table(["effect visible in part", "not visible for"], in_part)
+    invisible = [row for row in document["effects"] if not row["seen"]]
+    print_table(
+        ["effect not visible", "reason; what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in invisible]
+    )
+    if "page" in document:
+        out.print(f"Page: {document['page']}")
+
+
+def _soaks(count: int) -> str:
+    return f"{count} soak{'' if count == 1 else 's'}"
+
+
+def _longer(dwell: dict[str, float]) -> str:
+    """The effect of longer dwells on the error, as a clause; empty without wander."""
+    balanced = dwell["white_as_large_as_wander"]
+    if not math.isfinite(balanced):
+        return ""
+    if balanced < dwell["planned"]:
+        return "; longer dwells hardly reduce it"
+    return f"; longer dwells reduce it, up to {short(balanced, 2)} s"
+
+
+def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
+    """One line per coefficient with its three axes; one value for parameters of the station."""
+    lines: dict[tuple[str, int], list[str]] = {}
+    count: dict[tuple[str, str], int] = {}
+    for row in rows:
+        place = count.get((row["effect"], row["axis"]), 0)
+        count[row["effect"], row["axis"]] = place + 1
+        key = (row["effect"], place if row["axis"] != "*" else 100 + place)
+        line = lines.setdefault(key, [row["effect"] if place == 0 else "", "", "", "", row["unit"]])
+        line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
+    return list(lines.values())
+
+
+def _visible_line(row: dict[str, Any]) -> list[str]:
+    from pipelines.report.numbers import scientific
+
+    size = short(row["floor_size_ug"]) + (" *" if row["faint"] else "")
+    v, inflation = short(row["left"]), short(row["variance_inflation"])
+    return [row["effect"], v, inflation, size, scientific(row["floor_ug"], short), row["floor_unit"], _aliases(row)]
+
+
+def _aliases(row: dict[str, Any]) -> str:
+    exact = set(row["alias_exact"])
+    return ", ".join(f"={name}" if name in exact else name for name in row["alias"]) or "–"

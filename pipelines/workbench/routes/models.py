@@ -1,0 +1,89 @@
+"""Models: the versions of a model file, its effect on the archive's lots, and its release to the line."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import JSONResponse, Response
+
+from inertial import effects
+from pipelines.jobs.model_files import read_model, versions
+from pipelines.jobs.releases import released, releases
+from pipelines.workbench.pages import RequestBody, page, state_of, table_csv, workbench_of
+from pipelines.workbench.services import models, requests
+from pipelines.workbench.state import ModelsPage
+from schemas.errors import TumblelineError
+
+if TYPE_CHECKING:
+    from pipelines.workbench.pages import Workbench
+
+router = APIRouter()
+HEADING, ORDER, ADDRESS = "Models", 30, "/models"
+
+
+@router.get("/models")
+def shown(request: Request) -> Response:
+    """The page; the what-if is computed when it is asked for."""
+    bench = workbench_of(request)
+    state, problems = state_of(request, ModelsPage)
+    found, job, steps = None, None, []
+    if state.model:
+        try:
+            place = models.place_of(bench.settings, state.model)
+            with effects.additions_forgotten():
+                steps = versions(read_model(place))[::-1]
+            _, content = requests.what_if(bench.settings, state)
+            found, job = bench.jobs.result("whatif", content), bench.jobs.known("whatif", content)
+        except TumblelineError as problem:
+            problems = [*problems, str(problem)]
+    return page(
+        request, "models.html", state, problems, models=models.models(bench.settings), steps=steps, found=found, job=job,
+        releases=_releases(bench), today=datetime.now(UTC).date().isoformat(),
+    )  # fmt: skip
+
+
+@router.get("/models/lots.csv")
+def lots(request: Request) -> Response:
+    """The what-if by device and station."""
+    bench = workbench_of(request)
+    state, _ = state_of(request, ModelsPage)
+    found = bench.jobs.result("whatif", requests.what_if(bench.settings, state)[1])
+    rows = (
+        []
+        if found is None
+        else [_flat(row) for row in [*found["groups"], {"station": "all", "device": "all", **found["total"]}]]
+    )
+    return table_csv(rows, f"what-if-{state.model}")
+
+
+@router.post("/models/release")
+def release(request: Request, body: RequestBody) -> JSONResponse:
+    """Release a model to the line; refused without a what-if that says "better"."""
+    words = {name: str(body.get(name, "")).strip() for name in ("name", "since", "device", "station", "reason")}
+    record = models.release(workbench_of(request).settings, **words)
+    name = f"{record.model_name} version {record.model_version}"
+    return JSONResponse({"done": f"release {record.number}: {name} from {record.since:%Y-%m-%d}"})
+
+
+def _releases(bench: Workbench) -> list[dict[str, Any]]:
+    """The releases, the newest first, with whether each is in use today."""
+    records, now = releases(bench.archive), datetime.now(UTC)
+    return [
+        {
+            "record": one,
+            "scope": f"{one.device} on {one.station}".removeprefix(" on ").removesuffix(" on ") or "all",
+            "in_use": released(bench.archive, one.device, one.station, now) == one,
+        }
+        for one in records[::-1]
+    ]
+
+
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    """Old and new value of a figure in columns of their own."""
+    out: dict[str, Any] = {}
+    for key, value in row.items():
+        pair = isinstance(value, (list, tuple)) and len(value) == 2
+        out |= {f"{key}_old": value[0], f"{key}_new": value[1]} if pair else {key: value}
+    return out

@@ -1,0 +1,75 @@
+"""The index of the archive as the pages read it: looked at again when a run was added, else every few seconds.
+
+Looking at every file of ten thousand runs takes more than half a second, which no page may wait for at each click.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipelines.archive import Archive
+from pipelines.audit.index import AuditIndex, up_to_date
+from pipelines.audit.sql import ask
+
+if TYPE_CHECKING:
+    from pipelines.audit.sql import Answer
+
+FRESH_S = 5.0
+"""Age up to which an index is taken as it is; a finished stage of a known run shows after this time at the latest."""
+USABLE_S = 60.0
+"""Age up to which a page is answered from it while it is renewed in the background."""
+
+
+class RecentIndex:
+    """The index of one archive, shared by the handlers.
+
+    Parameters
+    ----------
+    address : of the archive
+    """
+
+    def __init__(self, address: str) -> None:
+        self._archive = Archive(address)
+        self._lock = threading.Lock()
+        self._known: AuditIndex | None = None
+        self._when, self._folder = 0.0, 0
+        self._renewing = threading.Event()
+
+    def ask(self, sql: str) -> Answer:
+        """The answer to a query over the archive."""
+        return ask(self._archive, sql, index=self.index())
+
+    def index(self) -> AuditIndex:
+        """The index with every run that was added up to now."""
+        with self._lock:
+            age, folder = time.monotonic() - self._when, self._stamp()
+            if self._known is None or folder != self._folder or age > USABLE_S:
+                return self._renew()
+            if age > FRESH_S and not self._renewing.is_set():
+                self._renewing.set()
+                threading.Thread(target=self._renew_behind, daemon=True).start()
+            return self._known
+
+    def _renew(self) -> AuditIndex:
+        folder, start = self._stamp(), time.monotonic()
+        found = up_to_date(self._archive)
+        self._known, self._when, self._folder = found, start, folder
+        return found
+
+    def _renew_behind(self) -> None:
+        try:
+            folder, start = self._stamp(), time.monotonic()
+            found = up_to_date(self._archive)
+            with self._lock:
+                if start > self._when:
+                    self._known, self._when, self._folder = found, start, folder
+        finally:
+            self._renewing.clear()
+
+    def _stamp(self) -> int:
+        """What changes when a run is added; an object store has no such mark."""
+        runs = self._archive.root / "runs"
+        return runs.stat().st_mtime_ns if isinstance(runs, Path) and runs.is_dir() else 0

@@ -1,0 +1,107 @@
+"""The check of a table against its contract: the table with the right types, or one message with row, value and need."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pandera.errors import SchemaError
+
+from schemas.columns import Seen, all_different
+from schemas.errors import DataRejected
+from schemas.tables import TABLES
+
+if TYPE_CHECKING:
+    from schemas.tables import Table
+
+
+def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
+    """The frame with its columns' types made right, or :class:`DataRejected`.
+
+    Parameters
+    ----------
+    name : a key of :data:`TABLES`.
+    where : what to call the table's source in a message; the table's name by default.
+    """
+    table = TABLES[name]
+    source = where or name
+    _refuse_missing_columns(table, frame, source)
+    if _plainly_right(table, frame):
+        return frame
+    _refuse_not_finite(table, frame, source)
+    _refuse_twice(table, frame, source)
+    try:
+        return table.schema.validate(frame)
+    except SchemaError as problem:
+        raise DataRejected(_explain(problem, frame, source)) from None
+
+
+def _plainly_right(table: Table, frame: pd.DataFrame) -> bool:
+    """Whether the frame is as its table asks, seen at one look at every column; what is not is looked at again to say why not."""
+    seen = {name: Seen.of(frame[name]) for name in {*table.columns, *table.finite, *table.key} & set(frame.columns)}
+    rows = frame["status"].to_numpy() == "ok" if table.only_ok else slice(None)
+    return (
+        all(seen[name].is_right(column) for name, column in table.columns.items())
+        and all(seen[name].is_finite(rows) for name in table.finite if name in seen)
+        and all_different([seen[name] for name in table.key])
+    )
+
+
+def _refuse_missing_columns(table: Table, frame: pd.DataFrame, source: str) -> None:
+    missing = [column for column in table.columns if column not in frame.columns]
+    if missing:
+        found = ", ".join(map(str, frame.columns)) or "none"
+        raise DataRejected(
+            f"{source}: column {', '.join(missing)} is missing, found {found}; add it, or map it to its name"
+        )
+
+
+def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
+    rows = frame.loc[frame["status"] == "ok"] if table.only_ok else frame
+    for column in table.finite:
+        if column not in rows.columns:
+            continue
+        own = rows[column]
+        plain = own.dtype == np.float64  # the rest is turned into numbers first, which takes longer than the look
+        values = own.to_numpy() if plain else np.asarray(pd.to_numeric(own, errors="coerce"), dtype=float)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            index = rows.index[bad[0]]
+            raise DataRejected(
+                f"{source}: {_row(rows, index)}, column {column}: found {rows[column].loc[index]}, a finite number is "
+                f"needed ({bad.size} such rows); measure again or leave the row out"
+            )
+
+
+def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
+    if not table.key:
+        return
+    twice = frame.duplicated(list(table.key))
+    if twice.any():
+        index = frame.index[int(np.flatnonzero(twice.to_numpy())[0])]
+        named = ", ".join(f"{column} {frame[column].loc[index]}" for column in table.key)
+        raise DataRejected(
+            f"{source}: row {index}: {named} is there twice, it may be there once; remove one of the two"
+        )
+
+
+def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
+    column = getattr(problem.schema, "name", None) or "?"
+    cases = problem.failure_cases
+    if isinstance(cases, pd.DataFrame) and len(cases) and "index" in cases and pd.notna(cases["index"].iloc[0]):
+        index, value = cases["index"].iloc[0], cases["failure_case"].iloc[0]
+        row = _row(frame, index)
+        return f"{source}: {row}, column {column}: found {value}, {_needed(problem)} is needed; correct the row"
+    return f"{source}: column {column}: {str(problem).splitlines()[0]}; correct the column"
+
+
+def _needed(problem: SchemaError) -> str:
+    """What a check asks for, without the library's way of saying it."""
+    words = str(problem.check).removeprefix("<Check ").removesuffix(">")
+    return words.split(": ", 1)[-1].replace("_", " ")
+
+
+def _row(frame: pd.DataFrame, index: Any) -> str:
+    unit = f" (unit {frame['unit'].loc[index]})" if "unit" in frame.columns else ""
+    return f"row {index}{unit}"
