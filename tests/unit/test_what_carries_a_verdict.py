@@ -52,10 +52,15 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
     share = f"({100.0 * first['share']:.0f} %)"
     print_diagnosis(document, source="dwells.parquet", model=None)
     text = " ".join(capsys.readouterr().out.split())
-    assert f"dwells that carry {' or '.join(group['effects'])}: {first['unit']} dwell {first['dwell']} {share}" in text
+    assert (
+        f"dwells with the largest influence on {' or '.join(group['effects'])}: {first['unit']} dwell {first['dwell']} {share}"
+        in text
+    )
     assert f"without these {without['dwells']} p" in text
     html = page.read_text(encoding="utf-8")
-    assert f"{first['unit']} {first['dwell']} {share}" in html.split("Dwells with the largest influence on the verdict")[1]
+    assert (
+        f"{first['unit']} {first['dwell']} {share}" in html.split("Dwells with the largest influence on the verdict")[1]
+    )
 
 
 def test_dwells_left_out_as_tails_are_listed_beside_a_verdict_of_adequate(tmp_path, capsys):
