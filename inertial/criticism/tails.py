@@ -128,4 +128,5 @@ def _table(place: int) -> tuple[Array, Array, Array]:
     upper = mass[half + 1 :]
     # to the middle of each cell
     distribution = 0.5 + 0.5 * mass[half] + np.concatenate([[0.0], np.cumsum(upper)]) - 0.5 * mass[half:]
-    return grid[half:], mass[half:] / _STEP, np.minimum(distribution, 1.0)
+    density = np.asarray(mass[half:] / _STEP, dtype=np.float64)
+    return np.asarray(grid[half:], dtype=np.float64), density, np.minimum(distribution, 1.0)
