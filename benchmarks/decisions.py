@@ -42,6 +42,7 @@ def _bump(rng: Any, units: int, scene: Any) -> Any:
 
 physics.PHYSICS["band"] = _bump
 STAIRS = tuple(float(t) for t in range(-10, 61, 7))
+AROUND = (25.0, 60.0, 40.0, 10.0, -10.0, 10.0, 30.0)
 WORLDS: dict[str, World] = {
     "null": NULLS["B30"],
     "null_K4": NULLS["K4"],
@@ -56,6 +57,13 @@ WORLDS: dict[str, World] = {
     "converter": NULLS["lsb5"],
     "converter_fine": replace(NULLS["lsb5"], lsb=0.5),
     "dwell": FAULTS["dwell_0.5mg"],
+    "null_t3_one_unit": NULLS["t3_one_unit"],
+    "dwell_one_unit": FAULTS["dwell_one_unit"],
+    "hysteresis_20": World(hidden=(("thermal_hysteresis", 20.0),), poses=8, soaks=AROUND),
+    "kink_20": World(hidden=(("thermal_kink", 20.0),), poses=8, soaks=STAIRS),
+    "warm_up_20": World(hidden=(("warm_up", 20.0),)),
+    "cubic_10_and_moved": World(hidden=(("third_order", 10.0),), fault="unit_moved", amount=0.2),
+    "cubic_10_and_pose": World(hidden=(("third_order", 10.0),), fault="wrong_pose", amount=0.02),
 }
 MATTERS: dict[str, tuple[str, ...]] = {
     "LESS_WALK": ("aging_linear_1", "null_K4"),
@@ -72,6 +80,9 @@ MATTERS: dict[str, tuple[str, ...]] = {
     "STEPS_UNEVEN": ("converter", "converter_fine", "null"),
     "STEPS_FOLLOW": ("converter", "converter_fine", "null"),
     "HEAVY": ("null_t3", "dwell"),
+    "TAILS": ("null_t3_one_unit", "dwell_one_unit"),
+    "TAILS_REACH": ("null_t3_one_unit", "dwell_one_unit"),
+    "REMAINDER": ("hysteresis_20", "kink_20", "warm_up_20", "cubic_10_and_moved", "cubic_10_and_pose"),
 }
 
 
@@ -99,9 +110,11 @@ def right(world: World, document: dict[str, Any], made: Any) -> bool:
         return bool(document["blocked_by"]) and all(f["fault"] == "quantised" for f in document["blocked_by"])
     if document["blocked_by"]:
         return False
-    if made.faults:
-        return len(named) == len(made.faults) and all(set(t.names) & {n for g in named for n in g} for t in made.faults)
     own = [name for name, _ in world.hidden]
+    if made.faults:
+        every = {n for g in named for n in g}
+        told = all(set(t.names) & every for t in made.faults) and set(own) <= every
+        return told and len(named) == len(made.faults) + len(own)
     known = [name for name in own if name != "band"]
     if "band" in own and document["unexplained"] is None:
         return False

@@ -10,7 +10,7 @@ from inertial.criticism.covariance import Noise, Shares
 from inertial.criticism.decisions import CERTAIN_BELOW, DRAWS, ENOUGH, LEAST_SHARE
 from inertial.criticism.drivers import Driver
 from inertial.criticism.field import Candidates
-from inertial.criticism.likelihood import shared_noise
+from inertial.criticism.likelihood import scatter_of_poses, shared_noise
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.shares import place_of, shares_at
@@ -37,14 +37,16 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
     """
     space = model.space
     common = shared_noise(model)
+    of_poses = max(common, scatter_of_poses(model))
     worst, looks, draws = 0.0, 0, _Draws(model, rng)
     for candidate in _everything(field, drivers):
         gain = space.gain(candidate)
         looks += gain.drop.size
         for place, (drop, rank) in enumerate(zip(gain.drop.tolist(), gain.rank.tolist(), strict=True)):
             found = log_p_value(space, drop, rank)
-            if found < worst and common > 1.0:
-                found = log_p_value(space, drop * _own_part(space, candidate, place, common), rank)
+            together = of_poses if candidate.shared else common
+            if found < worst and together > 1.0:
+                found = log_p_value(space, drop * _own_part(space, candidate, place, together), rank)
             worst = min(worst, found)
     charged = worst + np.log(max(looks, 1))
     certain = CERTAIN_BELOW**2 if draws.heavy else CERTAIN_BELOW

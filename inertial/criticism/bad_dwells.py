@@ -33,14 +33,19 @@ _LEAST_DOF = 6
 class BadDwell:
     """A dwell of one unit: its deviation from its neighbours in time and the model.
 
-    off : (axes,), g; deviations : standard deviations; tail : whether it is within the tails of the noise
+    off : (axes,), g; by_axis : (axes,), the same in standard deviations; tail : whether the noise of the run reaches as far
     """
 
     unit: int
     dwell: int
     off: Array
-    deviations: float
+    by_axis: Array
     tail: bool = False
+
+    @property
+    def deviations(self) -> float:
+        """Length of the deviation, standard deviations."""
+        return float(np.linalg.norm(self.by_axis))
 
 
 def without(lot: Lot, found: list[BadDwell]) -> Lot:
@@ -55,7 +60,7 @@ def bad_dwells(model: Model) -> list[BadDwell]:
     """The dwells that disagree with a model and its noise; the noise is estimated again without them."""
     if model.problem.lot.radial:
         return [
-            BadDwell(one.unit, dwell, np.array([off]), deviations)
+            BadDwell(one.unit, dwell, np.array([off]), np.array([deviations]))
             for one in bad_norms(model)
             for dwell, off, deviations in zip(one.dwells, one.off, one.deviations, strict=True)
         ]
@@ -81,10 +86,10 @@ def _round(model: Model, most: int) -> list[BadDwell]:
         best = looked.worst()
         if best is None:
             break
-        unit, dwell, deviations = best
-        if found and deviations < _ALIKE * found[0].deviations:
+        unit, dwell, by_axis = best
+        if found and float(np.linalg.norm(by_axis)) < _ALIKE * found[0].deviations:
             break
-        found.append(BadDwell(unit, dwell, looked.delete(unit, dwell), deviations))
+        found.append(BadDwell(unit, dwell, looked.delete(unit, dwell), by_axis))
     return found
 
 
@@ -116,11 +121,12 @@ class _Deletion:
         eye = space.covariance.whiten(np.eye(self.n)[None], space.noise.shares, np.array([block]))
         return space.project(eye / space.noise.scale[block], np.array([block]))[0]
 
-    def worst(self) -> tuple[int, int, float] | None:
-        """Unit and dwell that stand out most, and by how much; None if the deviation is within chance."""
+    def worst(self) -> tuple[int, int, Array] | None:
+        """Unit and dwell that stand out most, with their deviations (axes,); None where none does by more than chance."""
         known = self.there & (self.size > 1e-9 * self.size.max())
         drop = np.where(known, self.left**2 / np.where(known, self.size, 1.0), 0.0)
-        statistic = self._studentised(drop)
+        squares = self._studentised(drop)
+        statistic = squares.sum(axis=1)
         if self.units > 2:
             together = np.median(statistic, axis=0) > float(stats.chi2.isf(COMMON, self.axes))
             statistic = np.where(together, 0.0, statistic)
@@ -128,11 +134,11 @@ class _Deletion:
         dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
         freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())
         chance = float(stats.f.sf(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
-        found = int(unit), int(dwell), float(np.sqrt(statistic[unit, dwell]))
+        found = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
         return found if chance < BAD_DWELL and dof >= _LEAST_DOF else None
 
     def _studentised(self, drop: Array) -> Array:
-        """Squares of each dwell over a variance without it, (units, n)."""
+        """Squares of each dwell over a variance without it, (units, axes, n)."""
         if np.isfinite(self.prior):
             squares, dof = self.squares[:, None], self.dof[:, None]
             variance = np.maximum(squares - drop, 0.0) + self.centre[:, None]
@@ -141,7 +147,7 @@ class _Deletion:
             every = drop.reshape(self.units, self.axes, self.n).sum(axis=1)
             total, count = float(self.squares.sum()), float(self.dof.sum())
             variance = np.repeat((total - every) / max(count - self.axes, 1.0), self.axes, axis=0)
-        return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n).sum(axis=1)
+        return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n)
 
     def delete(self, unit: int, dwell: int) -> Array:
         """Take one dwell out; its deviation, (axes,), g."""

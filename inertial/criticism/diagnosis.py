@@ -1,7 +1,7 @@
 """The diagnosis of a lot: adequacy, drivers of the residual, classes of missing effects, the unexplained remainder."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -137,11 +137,25 @@ def _concluded(run: Run, search_: Search, rng: Generator) -> Diagnosis:
         ladder=found.ladder,
         handled=tuple(run.handled),
         removed=removed,
-        carried=every[0].carried if every else Carried(influence(base, None)),
+        carried=every[0].carried if every else _residuals(base, fields, None if sound or unjudged else rng),
         evidence=evidence(base, fields),
         unjudged=unjudged,
         without_removed=(None if unjudged else sound) if removed else None,
     )
+
+
+def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carried:
+    """The largest residuals where nothing is named, and the probability of the others; not that without a generator."""
+    dwells = influence(base, None)
+    if rng is None or not dwells:
+        return Carried(dwells)
+    lot = base.problem.lot
+    error = lot.error.copy()
+    for one in dwells:
+        error[one.unit, one.dwell] = np.inf
+    problem = Problem(replace(lot, error=error), slope=base.problem.slope)
+    model = Model(problem, base.terms, near=base.noise)
+    return Carried(dwells, adequacy(Candidates(problem, fields.effects), drivers_of(problem), model, rng))
 
 
 def _verdict(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:

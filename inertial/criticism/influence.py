@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.likelihood import along_mean, shared_noise, weighed
+from inertial.criticism.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import fall, freedom
 from inertial.criticism.problem import Lot, Problem
 
 Array = NDArray[np.float64]
 
-_MOST = 8
+_MOST, _MOST_DWELLS = 8, 3
 _CARRY = 0.5
 """Largest total share of the listed dwells; the others are many small ones."""
 
@@ -43,14 +43,28 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
     whole = float(np.sum(np.maximum(each, 0.0)))
     if whole <= 0.0:
         return ()
-    order = np.argsort(each, axis=None)[::-1][:_MOST]
+    if term is not None and of_station(term):
+        # what concerns all units is carried by a dwell in all of them: without it in one, the others say the same
+        return _whole_dwells(each / whole)
     found: list[Influence] = []
-    for place in order.tolist():
+    for place in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
         unit, dwell = divmod(place, model.problem.n)
         share = float(each[unit, dwell]) / whole
         if share <= 0.0 or sum(f.share for f in found) > _CARRY:
             break
         found.append(Influence(unit, dwell, share))
+    return tuple(found)
+
+
+def _whole_dwells(share: Array) -> tuple[Influence, ...]:
+    """The dwells (units, n) that carry most over all units together, each in every unit."""
+    total = share.sum(axis=0)
+    found: list[Influence] = []
+    for dwell in np.argsort(total)[::-1][:_MOST_DWELLS].tolist():
+        if total[dwell] <= 0.0 or sum(f.share for f in found) > _CARRY:
+            break
+        units = np.argsort(share[:, dwell])[::-1].tolist()
+        found += [Influence(unit, dwell, max(float(share[unit, dwell]), 0.0)) for unit in units]
     return tuple(found)
 
 
@@ -80,5 +94,7 @@ def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> fl
     rank = int(gain.rank[0])
     if rank == 0:
         return 0.0
-    common = along_mean(model, model.noise, term) * (1.0 - 1.0 / shared_noise(model.with_term(term)))
+    richer = model.with_term(term)
+    together = max(shared_noise(richer), scatter_of_poses(richer) if of_station(term) else 1.0)
+    common = along_mean(model, model.noise, term) * (1.0 - 1.0 / together)
     return weighed(float(fall(space, gain)[0]) * (1.0 - common), rank, freedom(term)).log_p

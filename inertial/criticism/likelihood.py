@@ -15,7 +15,7 @@ from scipy import stats
 from inertial.criticism import variance
 from inertial.criticism.covariance import Noise
 from inertial.criticism.decisions import TOGETHER
-from inertial.criticism.handling.base import Handling
+from inertial.criticism.handling.base import Handling, by_block, tilts
 from inertial.criticism.model import Model, Term
 from inertial.criticism.penalty import freedom, price
 from inertial.criticism.space import Space
@@ -24,6 +24,9 @@ from inertial.criticism.tail_areas import log_chi2_tail
 Array = NDArray[np.float64]
 
 _MEDIAN = float(stats.chi2.median(1))
+_FEWEST_POSES = 10
+_QUANTILES = (0.5, 0.75, 0.9)
+"""Of the poses, at which their scatter is compared with that of the noise: a table may be off in a part of its poses only."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,11 @@ def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
     dof = max(space.dof, 1)
     deviance = max(plain - full[best], 0.0) * max(dof - rank, 0) / dof
     along, nonlinear = along_mean(model, noises[best], term), freedom(term)
+    scatter = scatter_of_poses(richer) if of_station(term) else 1.0
 
     def divided(shared: float) -> Ratio:
-        found = weighed(deviance * (1.0 - along * (1.0 - 1.0 / shared)), rank, nonlinear, places)
+        by = max(shared, scatter)
+        found = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, places)
         return replace(found, shared=shared, again=divided)
 
     # by what the units share with the term inside: an effect common to all units is not noise
@@ -114,6 +119,39 @@ def shared_noise(model: Model) -> float:
     lost = space.dof / max(int(model.problem.covariance.count.sum()), 1)
     found = float(np.median(squares)) / _MEDIAN / max(lost, 0.1)
     return found if found > 1.0 + TOGETHER * 2.33 / np.sqrt(squares.size) else 1.0
+
+
+def of_station(term: Term) -> bool:
+    """Whether the coefficients of a term are those of the whole lot: of the station, or of what handling did to all units."""
+    return term.shared and "unit" not in term.keywords
+
+
+def scatter_of_poses(model: Model) -> float:
+    """Variance of the table's angles from dwell to dwell, as all units see it, over that of the units' own noise; one at least.
+
+    Of each dwell by itself the two angles are fitted that all units share. Where the table comes to rest within some
+    microradians, their chi-square is larger than the noise of the units makes it, in many dwells; the quantiles over the dwells
+    are not raised by one wrong pose. What is said of the station has to stand out of this scatter.
+    """
+    lot = model.problem.lot
+    units, n = lot.state.time.shape
+    if units < 2 or lot.radial or lot.state.outer is None or lot.state.inner is None:
+        return 1.0
+    there = np.flatnonzero(np.isfinite(lot.error).all(axis=-1).any(axis=0))
+    change = tilts(lot.state)
+    columns = by_block(np.broadcast_to(change, (units, n, 3, change.shape[-1])))
+    gain = model.space.gain_of_dwells(columns, there)
+    drop = gain.drop[gain.rank == 2]
+    if drop.size < _FEWEST_POSES:
+        return 1.0
+    largest = 1.0
+    for quantile in _QUANTILES:
+        expected = -2.0 * np.log1p(-quantile)
+        found = float(np.quantile(drop, quantile)) / expected
+        # standard error of a quantile of exponential values, over the quantile
+        error = 2.0 * np.sqrt(quantile / (1.0 - quantile) / drop.size) / expected
+        largest = max(largest, found if found > 1.0 + TOGETHER * error else 1.0)
+    return float(largest)
 
 
 def along_mean(model: Model, noise: Noise, term: Term) -> float:

@@ -40,11 +40,13 @@ class Term:
 
     values : of nonlinear parameters and constants; one value, or one per sensor axis
     first : how many of its columns are used; None for all
+    rest : whether its memory was at rest before the first dwell; its state then is unknown otherwise
     """
 
     effect: AnyEffect | Handling
     values: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
     first: int | None = None
+    rest: bool = False
 
     @property
     def shared(self) -> bool:
@@ -110,7 +112,9 @@ class Model:
         return columns if term.first is None else columns[..., : term.first]
 
     def _start(self, term: Term) -> Array:
-        """Columns of the unknown state of a term's memory before the first dwell."""
+        """Columns of the unknown state of a term's memory before the first dwell; none where it was at rest."""
+        if term.rest:
+            return np.zeros((self.problem.blocks, self.problem.n, 0))
         return self.problem.start(term.effect, term.keywords)
 
     def at(self, noise: Noise) -> Space:

@@ -25,9 +25,12 @@ _MEMBERS = 6
 _PICKS = 12
 _SIZES = (3, 6, 12)
 _REPEATS = (1, 2, 4)
-_ROUNDS = 4
+_ROUNDS, _TRIED = 4, 4
 _ALL = 0.999
 """Share of the aim that counts as complete."""
+
+_KEPT = 0.5
+"""Share of what an offer promises on the grid that must be there with every rival fitted."""
 
 Minutes = Callable[[Sequence[SequenceStep]], float]
 
@@ -195,16 +198,42 @@ class ProposalSearch:
             offers = self._weighed(chosen, now)
             if turn == 0:
                 whole = min((o for o in offers if o.worth >= _ALL), key=lambda o: o.minutes, default=None)
-            if not offers:
+            taken = self._kept(chosen, offers, now)
+            if taken is None:
                 break
-            best = max(offers, key=lambda o: o.rate)
-            chosen.append(best.course)
-            now = self._promised(chosen)  # on the grid alone the separation of wrong rivals is overestimated
+            chosen, now = [*chosen, taken[0].course], taken[1]
+        while chosen and now < _ALL and len(chosen) < 2 * _ROUNDS:
+            # the grid shows no difference any more: what parts them once parts them better twice
+            promised = self._promised([*chosen, chosen[0]])
+            within = self._minutes([*chosen, chosen[0]]) <= self.around.budget
+            if not within or promised - now < min(self.aim.least, 0.5 * (1.0 - now)):
+                break
+            chosen, now = [*chosen, chosen[0]], promised
         if whole is not None and (now < _ALL or self._minutes(chosen) > whole.minutes):
             promised = self._promised([whole.course])
             if promised >= min(now, _ALL):
                 chosen, now = [whole.course], promised
         return self._proposal(chosen, now) if chosen else None
+
+    def _kept(
+        self, chosen: Sequence[StepSequence], offers: Sequence[_Offer], now: float
+    ) -> tuple[_Offer, float] | None:
+        """The offer that brings most per minute of those that keep what they promise, with what is there after it.
+
+        On the grid alone the wrong rivals look further away than they are: an offer counts with every rival fitted, the best of
+        each kind in turn. Where none keeps half of its promise, that which brings most.
+        """
+        by_kind: dict[str, _Offer] = {}
+        for offer in sorted(offers, key=lambda o: -o.rate):
+            by_kind.setdefault(offer.course.kind, offer)
+        best: tuple[_Offer, float] | None = None
+        for offer in list(by_kind.values())[:_TRIED]:
+            promised = self._promised([*chosen, offer.course])
+            if promised - now >= _KEPT * (offer.worth - now):
+                return offer, promised
+            if best is None or promised > best[1]:
+                best = offer, promised
+        return best if best is not None and best[1] - now >= min(self.aim.least, 0.5 * (1.0 - now)) else None
 
     def _promised(self, chosen: Sequence[StepSequence]) -> float:
         """Share of the aim after sequences, with every rival fitted as in the diagnosis."""

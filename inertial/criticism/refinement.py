@@ -1,6 +1,7 @@
 """Nonlinear parameters of a term moved from the grid to the best fit."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +111,7 @@ def _varied(problem: Problem, term: Term, parameter: Nonlinear, values: Array) -
 
 
 def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:
-    return Term(term.effect, tuple({**term.keywords, parameter.name: value}.items()), term.first)
+    return replace(term, values=tuple({**term.keywords, parameter.name: value}.items()))
 
 
 def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:

@@ -1,7 +1,7 @@
 """The search for missing effects: forward with the noise estimated again, then backward over the chosen effects."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 _FINALISTS = 5  # finalists at each noise, for which the noise is estimated again
 _AGAIN = 3  # the same for the second examination of an effect
 _MOST = 6  # largest number of effects of one search
+_AS_MUCH = 1.0  # score by which further columns of an effect must be better than its leading column
 _REFINED, _SAME = 3, 0.05  # turns of refinement, and the change of a nonlinear parameter that ends them
 
 
@@ -73,7 +74,7 @@ def search(
     for _ in range(_MOST - len(chosen)):
         rivals = contest(field, model)
         ladder = ladder or tuple(rivals)
-        best = next((r for r in rivals if convincing(field, model, r) and not _remainder(model, r, chosen)), None)
+        best = next((r for r in rivals if convincing(field, model, r) and not is_remainder(model, r, chosen)), None)
         if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
         if isinstance(best.term.effect, Handling):
@@ -110,7 +111,7 @@ def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
         return False
     if -rival.cost < np.log(max(field.problem.count, 1)):
         return False
-    return _size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
+    return size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
 
 
 def size_of(model: Model, term: Term) -> float:
@@ -118,15 +119,19 @@ def size_of(model: Model, term: Term) -> float:
     return model.explained(term.candidate(model.problem), model.with_term(term).scatter())
 
 
-def _remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
-    """Whether a handling error explains no more than the remainder of effects of inexact shape."""
-    if not chosen or not isinstance(rival.term.effect, Handling):
+def is_remainder(model: Model, rival: Rival, chosen: Sequence[Term]) -> bool:
+    """Whether a handling error explains no more than the remainder of effects of inexact shape.
+
+    Effects without a nonlinear parameter or a memory have the shape that their equation gives, and leave nothing over.
+    """
+    inexact = [t for t in chosen if not isinstance(t.effect, Handling) and (t.effect.memory or t.effect.nonlinear)]
+    if not inexact or not isinstance(rival.term.effect, Handling):
         return False
-    largest = max(size_of(model.without_term(t), t) for t in chosen)
-    return _size_where_it_acts(model, rival.term) < REMAINDER * largest
+    largest = max(size_of(model.without_term(t), t) for t in inexact)
+    return size_where_it_acts(model, rival.term) < REMAINDER * largest
 
 
-def _size_where_it_acts(model: Model, term: Term) -> float:
+def size_where_it_acts(model: Model, term: Term) -> float:
     """The same over the dwells that the term changes: an error of one dwell is not diluted by the others."""
     size = size_of(model, term)
     if not isinstance(term.effect, Handling):
@@ -156,7 +161,9 @@ def scanned(field: Candidates, space: Space, leave: set[str]) -> list[tuple[Term
     for primary, gains in ((False, whole), (True, first)):
         for name, gain in gains.items():
             score, place = _best_of(field, space, name, gain)
-            if score > 0.0 and (name not in tried or score > tried[name][0]):
+            # fewer columns that explain as much come first
+            least = tried[name][0] - _AS_MUCH if name in tried else 0.0
+            if score > max(least, 0.0):
                 effect = field.of(name)
                 values = tuple(field.grids[name][place].items())
                 tried[name] = (score, Term(effect, values, effect.primary if primary else None))
@@ -196,8 +203,22 @@ def judge(field: Candidates, model: Model, term: Term) -> Rival:
     """A term added to a model, with the noise estimated again; no gain if a handling error cannot have its size."""
     if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
         return Rival(term, 0.0, 0, 0.0, 0.0)
-    found = likelihood_ratio(model, term, field.places(term.effect.id))
-    return _rival(term, found)
+    places = field.places(term.effect.id)
+    return min((_rival(t, likelihood_ratio(model, t, places)) for t in _begun(model, term)), key=lambda r: r.cost)
+
+
+def _begun(model: Model, term: Term) -> tuple[Term, ...]:
+    """A term, and where it remembers, the same with its memory at rest before the first dwell.
+
+    Devices are at rest when a run begins, as a rule. A coefficient for the state of every series would be paid for else, and an
+    effect without memory that leaves as little stands alone: a step between two soaks in place of hysteresis.
+    """
+    if isinstance(term.effect, Handling) or not term.effect.memory:
+        return (term,)
+    term = replace(term, rest=False)
+    if not model.problem.start(term.effect, term.keywords).shape[-1]:
+        return (term,)
+    return term, replace(term, rest=True)
 
 
 def _rival(term: Term, ratio: Ratio) -> Rival:

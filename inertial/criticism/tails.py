@@ -1,48 +1,132 @@
 """Tails of the noise: limit for bad dwells if large deviations are frequent.
 
-Whether tails are heavy is judged by the kurtosis of the deletion residuals of all dwells that were kept (Anscombe & Glynn,
-Biometrika 70 (1983) 227); whitened residuals would not do, because whitening spreads the deviation of one dwell over the
-following ones. Dwells left out do not count: bad dwells would look like tails. Beyond the values that were kept, heavy tails are
-assumed to decay as those of a t distribution with three degrees of freedom, P(|x| > z) ∝ z⁻³: few are heavier.
+The noise of a dwell is taken to be normal plus t of three degrees of freedom with an unknown share of the variance: few noises
+have heavier tails. The share has a distribution given the dwells that were kept, by the likelihood of their deletion residuals
+below the smallest value that was left out: this holds whether what was left out is the tail of the noise or not. Whitened
+residuals would not do, as whitening spreads the error of one dwell over those that follow. A dwell counts as tail of the noise
+where such noise reaches as far in one of the dwells of the run with more than a stated probability: by the length of its
+deviation, and by the product of the probabilities of its axes, as noise that is independent on three axes does not reach far on
+two of them at once.
+
+Whether a lot's tails are heavy is judged by the kurtosis of its residuals (Anscombe & Glynn, Biometrika 70 (1983) 227).
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from inertial.criticism.bad_dwells import BadDwell, deletion_residuals
-from inertial.criticism.decisions import BAD_DWELL, HEAVY
+from inertial.criticism.decisions import HEAVY, TAILS, TAILS_REACH
 from inertial.criticism.model import Model
 
 Array = NDArray[np.float64]
 
-_FROM = 3.0
-"""Standard deviations from which values count as tails."""
+_SHARES = (0.0, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
+"""Shares of the variance that heavy tails may have."""
 
-_POWER = 3.0
-"""Exponent of the decay of heavy tails."""
+_DOF = 3.0
+"""Degrees of freedom of the heavy part: P(|x| > z) falls off as z⁻³."""
+
+_SCALES = np.geomspace(0.7, 1.3, 25)
+"""Standard deviations of the noise over the RMS of the dwells that were kept."""
+
+_FURTHEST, _STEP = 60.0, 0.02
+"""Range and step of the tables, standard deviations."""
+
+_TAIL = 8.0
+"""Standard deviations beyond which only the heavy part counts."""
 
 _TELLS = 60
-"""Fewest values for a test of the tails."""
+"""Values below which tails are not distinguished from a normal distribution's."""
 
 
 def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
-    """Dwells that were left out of a model, each marked if it is within noise with the tails of the others.
+    """Dwells that were left out of a model, each marked where noise with the tails that the others allow reaches as far.
 
     Parameters
     ----------
     model : without these dwells
     """
-    values = deletion_residuals(model)
-    if not heavy(values):
+    values = np.abs(deletion_residuals(model))
+    if not removed or values.size < _TELLS:
         return list(removed)
-    beyond = max(int(np.count_nonzero(np.abs(values) > _FROM)), 1)
-    return [replace(d, tail=beyond * (_FROM / d.deviations) ** _POWER >= BAD_DWELL) for d in removed]
+    noise = _Noise.of(values, min(d.deviations for d in removed))
+    dwells = values.size / len(removed[0].by_axis)
+    return [replace(d, tail=noise.reaches(d.by_axis, dwells) >= TAILS_REACH) for d in removed]
 
 
 def heavy(values: Array) -> bool:
     """Whether values (m,) have heavier tails than a normal distribution."""
     return values.size >= _TELLS and float(stats.kurtosistest(values, alternative="greater").pvalue) < HEAVY
+
+
+@dataclass(frozen=True)
+class _Noise:
+    """Distribution of the share of heavy tails and of the scale of a noise.
+
+    weight : (shares, scales), their probability; scale : (scales,)
+    """
+
+    weight: Array
+    scale: Array
+
+    @staticmethod
+    def of(values: Array, below: float) -> "_Noise":
+        """The distribution, given absolute values (m,) of which only those ``below`` are known to be noise."""
+        inside = values[values < below]
+        scale = _SCALES * float(np.sqrt(np.mean(inside**2)))
+        log = np.empty((len(_SHARES), scale.size))
+        for k in range(len(_SHARES)):
+            grid, density, _ = _table(k)
+            for j, s in enumerate(scale.tolist()):
+                kept = 1.0 - float(_beyond(k, np.array([below / s]))[0])
+                each = np.log(np.maximum(np.interp(inside / s, grid, density), 1e-300))
+                log[k, j] = float(each.sum()) - inside.size * np.log(s * max(kept, 1e-12))
+        prior = np.where(np.array(_SHARES) > 0.0, TAILS / (len(_SHARES) - 1), 1.0 - TAILS)
+        weight = np.exp(log - log.max()) * prior[:, None]
+        return _Noise(weight / weight.sum(), scale)
+
+    def reaches(self, by_axis: Array, dwells: float) -> float:
+        """Probability that one of so many dwells is as far off, (axes,), in standard deviations."""
+        length, axes = float(np.linalg.norm(by_axis)), len(by_axis)
+        total = 0.0
+        for k in range(len(_SHARES)):
+            whole = axes * _beyond(k, length / self.scale)
+            each = np.stack([_beyond(k, abs(float(v)) / self.scale) for v in by_axis])
+            together = stats.gamma.sf(-np.log(np.maximum(each, 1e-300)).sum(axis=0), axes)
+            least = np.minimum(2.0 * dwells * np.minimum(whole, together), 1.0)
+            total += float(np.sum(self.weight[k] * least))
+        return total
+
+
+def _beyond(place: int, z: Array) -> Array:
+    """P(|x| > z) of a value of variance one, by the place of its share of heavy tails."""
+    share = _SHARES[place]
+    if share == 0.0:
+        return 2.0 * stats.norm.sf(z)
+    grid, _, distribution = _table(place)
+    near = 2.0 * (1.0 - np.interp(z, grid, distribution))
+    return np.where(z < _TAIL, near, 2.0 * stats.t.sf(z / np.sqrt(share / _DOF), _DOF))
+
+
+@cache
+def _table(place: int) -> tuple[Array, Array, Array]:
+    """Values from zero on, density and distribution of a normal part plus a heavy one, together of variance one."""
+    share, half = _SHARES[place], round(_FURTHEST / _STEP)
+    grid = _STEP * np.arange(-half, half + 1)
+    edges = np.append(grid - 0.5 * _STEP, grid[-1] + 0.5 * _STEP)
+    mass = np.diff(stats.norm.cdf(edges, scale=max(np.sqrt(1.0 - share), 1e-9)))
+    if share > 0.0:
+        tails = np.diff(stats.t.cdf(edges / np.sqrt(share / _DOF), _DOF))
+        size = 4 * grid.size
+        both = np.fft.irfft(np.fft.rfft(mass, size) * np.fft.rfft(tails, size), size)
+        mass = np.maximum(both[half : half + grid.size], 1e-300)
+    upper = mass[half + 1 :]
+    # to the middle of each cell
+    distribution = 0.5 + 0.5 * mass[half] + np.concatenate([[0.0], np.cumsum(upper)]) - 0.5 * mass[half:]
+    density = np.asarray(mass[half:] / _STEP, dtype=np.float64)
+    return np.asarray(grid[half:], dtype=np.float64), density, np.minimum(distribution, 1.0)

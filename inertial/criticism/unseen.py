@@ -1,18 +1,29 @@
 """Effects that a plan cannot show, at all or at some values of their nonlinear parameters."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.criticism.covariance import Noise
 from inertial.criticism.field import Candidates
+from inertial.criticism.handling.base import soaks
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Problem
 from inertial.design import grid_of
-from inertial.effects.base import AnyEffect
+from inertial.effects.base import AnyEffect, SensorEffect
 from inertial.planning.ranges import UnseenRange, unseen_ranges
+from inertial.state import History, State
 
+Array = NDArray[np.float64]
 InPart = tuple[tuple[str, tuple[UnseenRange, ...]], ...]
+
+_SCATTER = 5.0
+"""Standard deviations of the thermometer within which a reading is the temperature of its soak."""
+
+_TO_SD = 1.4826
+"""Standard deviation of normal values over their median absolute deviation."""
 
 
 def unseen(field: Candidates, base: Model, candidates: Sequence[AnyEffect]) -> tuple[tuple[str, ...], InPart]:
@@ -38,20 +49,56 @@ def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str,
     """Whether each effect with a memory is visible, by its place on the grid of its parameter.
 
     A memory has an unknown state before the first dwell: with rising soaks, a play narrower than their steps is equivalent to
-    this state and a bias. One unit is enough, as the plan is the same for all.
+    this state and a bias. One unit is enough, as the plan is the same for all. For a play the scatter of the thermometer is
+    removed first: a narrow play would follow it from reading to reading.
     """
     if base.problem.lot.radial:
         return {}
-    problem = Problem(base.problem.lot.units([0]))
-    alone = Model(problem, [t for t in base.terms if not t.shared and "unit" not in t.keywords])
-    noise = problem.covariance.white_noise()
+    lot = base.problem.lot.units([0])
+    terms = [t for t in base.terms if not t.shared and "unit" not in t.keywords]
+    plain, still = (Model(Problem(each), terms) for each in (lot, replace(lot, state=without_scatter(lot.state))))
     visible: dict[str, list[bool]] = {}
     for effect in field.effects:
-        parameters = effect.parameters(problem.lot.state)
+        parameters = effect.parameters(lot.state)
         if not effect.memory or effect.id in without or len(parameters) != 1 or parameters[0].choices:
             continue
-        visible[effect.id] = [_shown(alone, noise, effect, place) for place in grid_of(effect, problem.lot.state)]
+        grid = grid_of(effect, lot.state)
+        alone = still if _follows_order_only(effect, lot.state, grid[0]) else plain
+        noise = alone.problem.covariance.white_noise()
+        visible[effect.id] = [_shown(alone, noise, effect, place) for place in grid]
     return visible
+
+
+def _follows_order_only(effect: AnyEffect, state: State, place: dict[str, float]) -> bool:
+    """Whether a memory depends on the order of what it follows and not on time, as a play does and a lag does not."""
+    if not isinstance(effect, SensorEffect):
+        return False
+    once, slower = (
+        effect.columns(replace(state, time=factor * state.time, history=None, memory={}), 0, **place)
+        for factor in (1.0, 2.0)
+    )
+    return bool(np.allclose(once, slower))
+
+
+def without_scatter(state: State) -> State:
+    """A state of one unit whose readings are those of their soaks as far as the thermometer's scatter explains the difference."""
+    if state.temperature is None:
+        return state
+    number, read = soaks(state), state.temperature.reshape(-1)
+    inside = np.diff(number) == 0
+    if np.count_nonzero(inside) < 2:
+        return state
+    scatter = _TO_SD * float(np.median(np.abs(np.diff(read)[inside]))) / np.sqrt(2.0)
+    levels = np.array([np.median(read[number == k]) for k in np.unique(number)])
+
+    def level(values: Array) -> Array:
+        nearest = levels[np.argmin(np.abs(values[..., None] - levels), axis=-1)]
+        return np.where(np.abs(values - nearest) < _SCATTER * scatter, nearest, values)
+
+    history = state.history
+    if history is not None:
+        history = History(history.time, level(history.temperature))
+    return replace(state, temperature=level(state.temperature), history=history, memory={})
 
 
 def _shown(model: Model, noise: Noise, effect: AnyEffect, place: dict[str, float]) -> bool:

@@ -72,10 +72,13 @@ def _dwells(document: dict[str, Any]) -> None:
             soft_wrap=True,
         )
     if removed and removed["heavy_tails"]:
-        count = sum(d.get("tail", True) for d in removed["dwells"])
+        tails = [d for d in removed["dwells"] if d.get("tail", True)]
+        names = ", ".join(f"{d['unit']} dwell {d['dwell']} ({d['deviations']:.1f})" for d in tails[:5])
         out.print(
-            f"{count} dwells left out: the noise has heavier tails than a normal distribution",
+            f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
+            f"{' …' if len(tails) > 5 else ''}; the tails of the noise of this run may reach as far",
             style="dim",
+            markup=False,
             soft_wrap=True,
         )
     if document["adequate"]:
@@ -91,6 +94,9 @@ def _dwells(document: dict[str, Any]) -> None:
             out.print(text, style="dim", markup=False, soft_wrap=True)
     if not document["classes"] and document["influence"]:
         text = f"largest residuals, share of all: {_carried(document['influence'])}"
+        without = document.get("without_influence")
+        if without:
+            text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
         out.print(text, style="dim", markup=False, soft_wrap=True)
 
 

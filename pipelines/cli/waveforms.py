@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pipelines.export.waveforms import Channel
 
 PART = "Results"
-ORDER = 345
+ORDER = 347
 SUMMARY = "Write the waveforms of a record for other programs."
 EXAMPLES = (
     "tumbleline waveforms latest --record 7 --unit SN1 --format uff58 --output shock.uff",

@@ -155,6 +155,8 @@ def document(
             "where": [],
             "classes": [],
             "influence": [],
+            "without_influence": None,
+            "removed": None,
             "recommended": [],
             "unexplained": None,
             "unseen": [],

@@ -127,9 +127,7 @@ class RemovedDwell(TypedDict):
 class RemovedDwells(TypedDict):
     """The dwells left out."""
 
-    heavy_tails: Annotated[
-        bool, "the noise has heavier tails than a normal distribution, and explains some of the dwells"
-    ]
+    heavy_tails: Annotated[bool, "the tails of the noise may reach as far as some of the dwells"]
     dwells: list[RemovedDwell]
 
 
@@ -212,7 +210,12 @@ class DiagnosisDocument(TypedDict):
     reason: NotRequired[Annotated[str | None, "why it cannot be judged; null: it can"]]
     evidence: NotRequired[VerdictEvidence | None]
     leave_out: NotRequired[Annotated[LeaveOut | None, "null: no such dwell"]]
-    without_influence: NotRequired[WithoutInfluence | None]
+    without_influence: NotRequired[
+        Annotated[
+            WithoutInfluence | None,
+            "the verdict without the dwells of `influence`: on the first class; on the model where nothing is named",
+        ]
+    ]
     removed: NotRequired[RemovedDwells | None]
     warnings: NotRequired[list[str]]
     history: NotRequired[Annotated[str | None, "file of the temperature history that was read"]]

@@ -163,7 +163,9 @@ def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
 def test_what_faces_cannot_see_is_measured_where_it_is_asked_for(tmp_path: Path) -> None:
     hidden = {"kind": "pendulous_mass", "plan": "orthogonal24", "compliance": 80e-6}
     document = played(tmp_path, settings=Settings(unseen=True, budget=5.0), **hidden)
-    group = next(g for g in document["classes"] if g["effects"] == ["cross_coupling"])
+    # the table stands some microradians off in a part of its poses, and no pose is named for that
+    (group,) = document["classes"]
+    assert group["effects"] == ["cross_coupling"]
     assert group["p_value"] < 1e-20
     # without the three dwells that show it nothing determines it: no fold can judge it, so it is named and not recommended
     assert group["heldout_after_ug"] is None

@@ -10,10 +10,12 @@ import pytest
 from inertial import effects as catalogue
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.wrong_pose import WrongPose
+from inertial.criticism.likelihood import scatter_of_poses
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import terms_of
 from inertial.criticism.space import Gain
+from inertial.criticism.unseen import unseen
 from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
@@ -112,6 +114,36 @@ def test_a_thermometer_that_is_off_in_a_soak_is_one_parameter_of_the_lot():
     assert "0.5" in document["classes"][0]["evidence"]
     assert document["classes"][0]["evidence"].count("K off in soak") == 3
     assert document["recommended"] == []
+
+
+@pytest.mark.parametrize(("rest", "least", "most"), [(0.0, 1.0, 1.0), (20.0, 2.0, 8.0)])
+def test_what_is_said_of_the_station_stands_out_of_the_scatter_of_all_poses(rest, least, most):
+    made = make(World(soaks=(25.0,), repeats=2, rest=rest), SEED)
+    problem = Problem(lot_of(measured(made.dwells, made.history)))
+    model = Model(problem, terms_of(catalogue.get_all(BASE[:3]), problem))
+    # 20 µrad of rest beside 10 µg of the mean of eight units: about 1 + (20/10)² in variance
+    assert least <= scatter_of_poses(model) <= most
+
+
+@pytest.mark.parametrize("history", [True, False])
+def test_the_scatter_of_a_thermometer_shows_no_narrow_hysteresis(history):
+    made, rng = make(World(units=1, poses=12), SEED), np.random.default_rng(3)
+    tables = [made.dwells.copy(), made.history.copy()]
+    for table in tables:
+        table["unit_C"] += 0.1 * rng.standard_normal(len(table))
+    problem = Problem(lot_of(measured(tables[0], tables[1] if history else None)))
+    base = Model(problem, terms_of(catalogue.get_all(BASE), problem))
+    effect = catalogue.get("thermal_hysteresis")
+    (_, ranges), *_ = unseen(Candidates(problem, [effect]), base, [effect])[1]
+    # soaks that only climb by 35 K hide a play that is narrower
+    assert ranges[0].low == 1.0
+    assert 15.0 < ranges[0].high < 35.0
+
+
+def test_a_step_between_soaks_does_not_stand_alone_before_hysteresis():
+    soaks = (25.0, 60.0, -10.0, 20.0)
+    document = said(World(units=4, poses=6, soaks=soaks, hidden=(("thermal_hysteresis", 4.0),)), SEED)
+    assert any({"thermal_hysteresis", "step_change"} <= set(group) for group in names(document))
 
 
 def test_heavy_tails_name_nothing_and_the_dwells_left_out_are_listed():
