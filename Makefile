@@ -71,9 +71,8 @@ $(VENV)/.bench: requirements-bench.lock pyproject.toml | $(VENV)/bin/python
 	$(call install,requirements-bench.lock)
 	@touch $(VENV)/.run $(VENV)/.dev
 
-$(VENV)/.docs: pyproject.toml $(VENV)/.run
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation --editable '.[build,docs]'
-	@touch $@
+$(VENV)/.docs: requirements-docs.lock pyproject.toml | $(VENV)/bin/python
+	$(call install,requirements-docs.lock)
 
 # a validator of another maker, in an environment of its own: it asks for older libraries than the product has
 $(CRATE)/.done: requirements-crate.lock | $(VENV)/bin/python
@@ -85,6 +84,7 @@ locks:  ## resolve the locks anew (needs uv)
 	uv pip compile pyproject.toml --extra build --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-run.lock
 	uv pip compile pyproject.toml --extra build --extra dev --extra pdf --extra recordings --extra signatures --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-dev.lock
 	uv pip compile pyproject.toml --extra build --extra dev --extra pdf --extra recordings --extra signatures --extra bench --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-bench.lock
+	uv pip compile pyproject.toml --extra build --extra docs --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-docs.lock
 	echo 'roc-validator>=0.13' | uv pip compile - --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-crate.lock
 
 clean:  ## take away what was made here, but no archive: it holds measurements

@@ -78,7 +78,7 @@ class Rules(Strict):
     def tolerance_of(self, device: str, family: str) -> float:
         """The tolerance of a family of parameters of a kind of device; infinite without one."""
         entry = self._kind(device).tolerance.get(family) or self.tolerance.get(family)
-        return entry.max if entry is not None and entry.max is not None else float("inf")
+        return entry.max if entry is not None else float("inf")
 
     def is_standard(self, serial: str) -> bool:
         """Whether a unit is a check standard of the stations."""
