@@ -32,7 +32,7 @@ TAG = re.compile(r"(busy|latest_start_min|missed|crashed)=(\w+)")
 
 @dataclass(frozen=True)
 class Policy:
-    """Policy of a deployment; the defaults are those of a station that nobody watches."""
+    """Policy of a deployment; the defaults are for a station without an operator."""
 
     busy: Busy = "wait"
     latest_start_min: int = 15

@@ -43,7 +43,7 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
     revoked = [unit for unit in found if _revoked(unit)]
     if revoked and (serials or not allowed):
         raise WrongUse(
-            f"program: unit {revoked[0].unit}: {revoked[0].certified}, a calibration that was not revoked is needed; measure it again"
+            f"program: unit {revoked[0].unit}: {revoked[0].certified}, a valid calibration is needed; measure the unit again"
         )
     return [(slots[unit.unit], unit) for unit in allowed]
 

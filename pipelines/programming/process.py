@@ -118,7 +118,7 @@ class Programmer:
             one.step_counts = one.memory.offset_step if self.choice.with_offsets else 0
             if self.choice.with_offsets and not one.step_counts:
                 raise WrongUse(
-                    f"program: unit {one.serial} has no offset registers, those of an ADXL355 are needed; leave --offset-registers out"
+                    f"program: unit {one.serial} has no offset registers, they are needed; leave --offset-registers out"
                 )
 
     def _each(self, outcomes: Sequence[Outcome], step: str, act: Callable[[Outcome], None]) -> None:
