@@ -22,7 +22,7 @@ def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
     RecipeInvalid
         A key is wrong, or gravity contradicts --local-g.
     WrongUse
-        The day of the measurement is not given: nobody could tell which references were due.
+        The day of the measurement is not given, which is needed to check whether references were due.
     """
     found = read_references(path)
     where = f"references {path.name}"

@@ -91,7 +91,7 @@ class World:
             sim.local_gravity_m_s2 / STANDARD_G,
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
-        self.flash = [Flash() for _ in self.serials]  # by unit, wherever it sits
+        self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
         self.bench = Bench(
             self.preset,
             self._truths,
