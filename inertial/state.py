@@ -13,7 +13,7 @@ from inertial.errors import MissingInput
 Array = NDArray[np.float64]
 
 _DIMENSIONS = {"force": 3, "felt": 3, "slot": 1}
-"""Of the arrays that a lot of units has; two for all others."""
+"""Number of dimensions of the arrays of a lot of units; two for all others."""
 
 T_REFERENCE = 25.0
 """Reference temperature in °C: θ = T − 25 °C."""

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 LONGEST_FILE = 4 * 2**20  # bytes of a file that is written by hand
 
 
-LONGEST_REASON = 400  # characters of what a check says
+LONGEST_REASON = 400  # characters of the reason that a check gives
 
 
-DEEPEST = 16  # tables and lists inside one another; the deepest of our files has five
+DEEPEST = 16  # levels of nested tables and lists; the deepest of our files has five
 
 
 def read_text(path: Path, what: str, form: str = "TOML") -> str:

@@ -1,4 +1,4 @@
-"""What is stated of the references of an import, held against its mapping before anything is read."""
+"""The statement of the references of an import, compared with its mapping before anything is read."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _refuse_day(day: str, where: str) -> None:
     try:
         parsed = date.fromisoformat(day)
     except ValueError:
-        return  # the mapping says what is wrong with it
+        return  # the check of the mapping reports it
     if parsed > datetime.now(tz=UTC).date():
         raise WrongUse(
             f"{where}: --measured {day} lies in the future, the day of the measurement is needed; correct it"

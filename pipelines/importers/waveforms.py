@@ -1,4 +1,4 @@
-"""Dynamic tests that were recorded elsewhere: waveforms of unit and reference, reduced and judged as those of a station are."""
+"""Import of dynamic tests: waveforms of unit and reference, reduced and judged in the same way as those of a station."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, 
     given = layout.units.get(meaning, "")
     if not (given or stated):
         raise DataRejected(
-            f"{where}: column '{shown(column)}' has no unit, one is needed; add --units {meaning}=… as the sensor's sheet says"
+            f"{where}: column '{shown(column)}' has no unit, one is needed; add --units {meaning}=… from the sensor's data sheet"
         )
     if given and stated and given != stated:
         raise WrongUse(

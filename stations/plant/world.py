@@ -165,7 +165,7 @@ class World:
         return (self.now_us - self._switched_us) * 1e-6 if self.powered else 0.0
 
     def program_memory(self, unit: int, copy: int) -> None:
-        """Programs the buffer of a unit into one of its copies; the supply may fail meanwhile, if a fault says so."""
+        """Programs the buffer of a unit into one of its copies; the supply may fail during it, if a fault is set."""
         flash = self.flash[unit]
         flash.program(copy, self.now_us)
         if flash.lose_power_s is not None:
