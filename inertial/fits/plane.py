@@ -1,9 +1,9 @@
 """A sensor turned about one of its axes: bias, scale and misalignment of the two axes in the plane.
 
 The forces lie in a plane, f = (fᵢ, fⱼ) along the two axes in it. Outputs of the axes in the plane give their bias and their
-response to both; the axis across the plane gives its bias, which includes the tilt of the axis of rotation (1 mrad is 1 mg),
-and two couplings, but no scale (IEEE Std 1293). Where the poses are not known, |f| = g is an ellipse in the two outputs; a rotation in
-the plane is then no error, so that i stays along the sensor's own i axis.
+response to both; the axis across the plane gives its bias, which includes the tilt of the axis of rotation (1 mrad is 1 mg), and
+two couplings, but no scale (IEEE Std 1293). Where the poses are not known, |f| = g is an ellipse in the two outputs; a rotation
+in the plane is then no error, so that i stays along the sensor's own i axis.
 """
 
 from collections.abc import Sequence
