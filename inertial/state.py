@@ -40,7 +40,7 @@ class State:
     temperature : (..., n), °C, the sensor's own
     chamber : (..., n), °C
     since_power, since_move : (..., n), s
-    power_off : (..., n), s without power right before the dwell; 0 where the devices stayed on, None where nobody switched
+    power_off : (..., n), s without power right before the dwell; 0 where the devices stayed on, None where it was never off
     supply : (..., n), V
     vibration : (..., n), g rms
     outer, inner : (..., n), rad, table angles

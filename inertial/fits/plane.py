@@ -170,8 +170,8 @@ class _Series:
     rest: Array
 
     @classmethod
-    def of(cls, columns: Array, wanted: Array, whiten: Array) -> "_Series":
-        white, target = whiten @ columns, whiten @ wanted
+    def of(cls, columns: Array, series: Array, whiten: Array) -> "_Series":
+        white, target = whiten @ columns, whiten @ series
         size = np.linalg.norm(white, axis=0)
         size = np.where(size > 0.0, size, 1.0)
         value = np.linalg.lstsq(white / size, target, rcond=None)[0] / size
@@ -179,14 +179,14 @@ class _Series:
         dof = len(target) - columns.shape[1]
         inverse = np.linalg.pinv((white / size).T @ (white / size)) / np.outer(size, size)
         error = student(dof) * np.sqrt(float(rest @ rest) / dof * np.maximum(np.diagonal(inverse), 0.0))
-        return cls(value, error, wanted - columns @ value, whiten, white, rest)
+        return cls(value, error, series - columns @ value, whiten, white, rest)
 
 
-def _solved(columns: Array, wanted: Array, direction: Array, time: Array, error: Array) -> _Series:
+def _solved(columns: Array, series: Array, direction: Array, time: Array, error: Array) -> _Series:
     """A linear fit of a series with the wander that its residuals show."""
-    first = np.linalg.lstsq(columns / error[:, None], wanted / error, rcond=None)[0]
-    noise = norm_noise(wanted - columns @ first, columns, direction, time, error)
-    return _Series.of(columns, wanted, noise.whiten)
+    first = np.linalg.lstsq(columns / error[:, None], series / error, rcond=None)[0]
+    noise = norm_noise(series - columns @ first, columns, direction, time, error)
+    return _Series.of(columns, series, noise.whiten)
 
 
 def _harmonics(series: _Series, angle: Array, orders: Sequence[int]) -> float:

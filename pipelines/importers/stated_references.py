@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 GRAVITY_SIGMAS = 3.0
 
 
-def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
+def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     """The statement of a file; local gravity is taken from it into the mapping where that has none.
 
     Raises
@@ -26,7 +26,7 @@ def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
     """
     found = read_references(path)
     where = f"references {path.name}"
-    _refuse_day(str(wanted.get("measured", "")), where)
+    _refuse_day(str(content.get("measured", "")), where)
     gravity = found.uncertainty.gravity
     if gravity is None:
         raise RecipeInvalid(
@@ -34,7 +34,7 @@ def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
             "state it as surveyed, or latitude_deg and height_m with source = 'formula'",
             key="uncertainty.gravity",
         )
-    given = wanted.setdefault("local_gravity_m_s2", gravity.value)
+    given = content.setdefault("local_gravity_m_s2", gravity.value)
     apart = float(given) / gravity.value - 1.0
     u = gravity.relative().u
     if abs(apart) > GRAVITY_SIGMAS * u:
