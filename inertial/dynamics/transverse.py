@@ -64,7 +64,9 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
         raise NotIdentified(msg)
     rows = np.column_stack([first, second, np.ones(n)]) / error[:, None]
     if np.linalg.cond(rows * error.mean()) > 100.0:
-        msg = "transverse sensitivity: the angles do not separate two directions and a constant; turn through a circle"
+        msg = (
+            "transverse sensitivity: the angles do not separate two directions and a constant; turn over a whole circle"
+        )
         raise NotIdentified(msg)
     covariance = np.linalg.inv(rows.T @ rows)
     c = covariance @ (rows.T @ (output / error))

@@ -71,10 +71,10 @@ class Programmer:
             for slot, unit in units
         ]
         self._check(outcomes)
-        step = "archive what was there"
+        step = "archive the memory"
         try:
             for step, act in (
-                ("archive what was there", self._archive), ("write", self._write), ("read back", self._read_back),
+                ("archive the memory", self._archive), ("write", self._write), ("read back", self._read_back),
             ):  # fmt: skip
                 self._each(outcomes, step, act)
             if any(one.open for one in outcomes):
