@@ -203,7 +203,7 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
     while not _answers(port):
         if process.poll() is not None or time.monotonic() > end:
             raise StationTimeout(
-                f"orchestrator: its server does not answer after {STARTUP_S} s (status {process.poll()}); look into "
+                f"orchestrator: its server does not answer after {STARTUP_S} s (status {process.poll()}); read "
                 f"{home / 'server.log'}, or run with --direct"
             )
         time.sleep(POLL_S)

@@ -6,7 +6,7 @@
       busy: wait             # or skip: a scheduled run is cancelled while another run has the station
       latest_start_min: 15   # a scheduled run that could not start until then is missed
       missed: cancel         # or latest: of the missed runs of a deployment the newest is run once
-      crashed: close         # or continue: a run whose process died goes on from its checkpoint
+      crashed: close         # or continue: a run whose process died continues from its checkpoint
 """
 
 from __future__ import annotations
