@@ -52,9 +52,9 @@ def command(
 ) -> None:
     """Write the coefficients of a run into the memory of its devices, which are in the slots of the run.
 
-    For each unit: archive the content of the memory, write the older of its two copies, read it back, power cycle, read it back,
-    and verify in two poses. The unit's certificate ends before the first write and is renewed after the
-    verification. If a step fails, the unit is not certified, and the previously valid copy is unchanged. Exit status 1: a unit failed.
+    For each unit: archive the content of the memory, write the older of its two copies, read it back, power cycle, read it
+    back, and verify in two poses. The unit's certificate ends before the first write and is renewed after the verification.
+    If a step fails, the unit is not certified, and the previously valid copy is unchanged. Exit status 1: a unit failed.
     """
     from pipelines.archive import Archive
     from pipelines.programming.job import chosen_units, document, program_run, station_of
