@@ -59,8 +59,8 @@ def _effects() -> str:
     lines += [
         "The model of a sweep is a sensitivity times effects; the diagnosis names those that are missing, and those that"
     ]
-    lines += ["the points do not tell apart.", ""]
-    lines += ["| effect | factor | meaning | measurement that tells it from others |", "|---|---|---|---|"]
+    lines += ["the points do not separate.", ""]
+    lines += ["| effect | factor | meaning | measurement that separates it from others |", "|---|---|---|---|"]
     lines += [
         f"| `{one.id}` | {one.equation} | {(type(one).__doc__ or '').strip()} | {one.breaker} |"
         for one in EFFECTS.values()
@@ -73,7 +73,7 @@ def _effects() -> str:
 
 
 def _row_head() -> str:
-    return "| effect | term | meaning | measurement that tells it from others |\n|---|---|---|---|"
+    return "| effect | term | meaning | measurement that separates it from others |\n|---|---|---|---|"
 
 
 def _effect_row(name: str, one: Any) -> str:

@@ -311,7 +311,7 @@ class _Solved:
     Parameters
     ----------
     rows : (n, k), derivatives of the residuals; left : (n,), residuals
-    whiten : (n, n) or (n,), of the noise; least : variance that what is left whitened has at the least
+    whiten : (n, n) or (n,), of the noise; least : smallest variance of the whitened residuals
     """
 
     def __init__(self, rows: Array, left: Array, weight: float, whiten: Array, least: float = 0.0) -> None:
@@ -332,7 +332,7 @@ class _Solved:
         return found / np.outer(self.size, self.size)
 
     def _level(self, dof: int) -> float:
-        """Variance of what is left whitened."""
+        """Variance of the whitened residuals."""
         return max(self.chi2 / dof, self.least)
 
     def of_record(

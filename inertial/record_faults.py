@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 _MOST_DISTINCT = 200_000
 _BLOCK = 64  # samples over which the share of equal neighbours is measured
 _COARSE = 0.97
-"""Share of equal neighbours from which on a quiet axis and one that stands still cannot be told apart."""
+"""Share of equal neighbours from which on a quiet axis cannot be distinguished from a constant one."""
 _CHANCE = 1e-6
 """Probability, over the whole record, of a run of equal samples that chance makes."""
 _SHORTEST_RUN = 12

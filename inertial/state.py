@@ -13,7 +13,7 @@ from inertial.errors import MissingInput
 Array = NDArray[np.float64]
 
 _DIMENSIONS = {"force": 3, "felt": 3, "slot": 1}
-"""Of the arrays that a lot of units has; two for all others."""
+"""Number of dimensions of the arrays of a lot of units; two for all others."""
 
 T_REFERENCE = 25.0
 """Reference temperature in °C: θ = T − 25 °C."""
@@ -40,7 +40,7 @@ class State:
     temperature : (..., n), °C, the sensor's own
     chamber : (..., n), °C
     since_power, since_move : (..., n), s
-    power_off : (..., n), s without power right before the dwell; 0 where the devices stayed on, None where nobody switched
+    power_off : (..., n), s without power right before the dwell; 0 where the devices stayed on, None where it was never off
     supply : (..., n), V
     vibration : (..., n), g rms
     outer, inner : (..., n), rad, table angles

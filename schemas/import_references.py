@@ -1,4 +1,4 @@
-"""A statement of the references of measurements made elsewhere: what ``import --references FILE`` reads.
+"""A statement of the references of imported measurements: the file of ``import --references FILE``.
 
 The tables ``[[reference]]`` and ``[uncertainty]`` are those of a station's file, ``[stability]`` and ``[certificate]`` those of a
 recipe; the whole is kept with the import, and a run that is made from it states no more.

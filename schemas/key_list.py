@@ -65,7 +65,7 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
 
 
 def meaning(model: type[BaseModel], name: str) -> str:
-    """The meaning of a key; empty where nobody has written it down."""
+    """The meaning of a key; empty where ``key_texts.toml`` has none."""
     texts = _texts()
     for base in model.__mro__:
         for section in (f"{base.__name__}:{base.__module__}", base.__name__):
@@ -99,8 +99,8 @@ def _value(annotation: Any) -> str:
     if origin in SHAPES:
         return f"list of {len(parts)}" if origin is tuple else SHAPES[origin]
     if parts:  # Annotated, or a union with None
-        told = [_value(part) for part in parts if isinstance(part, type) or get_args(part)]
-        return " or ".join(dict.fromkeys(text for text in told if text))
+        texts = [_value(part) for part in parts if isinstance(part, type) or get_args(part)]
+        return " or ".join(dict.fromkeys(text for text in texts if text))
     return PLAIN.get(annotation, "" if annotation is NoneType else getattr(annotation, "__name__", "text"))
 
 

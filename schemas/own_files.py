@@ -1,8 +1,8 @@
 """Files of the user beside the built-in ones, by name: recipes, limits, stations, profiles and presets.
 
 A name is searched in the folder of its kind in the working folder (``recipes/NAME.toml``), and then in that of the user
-(``$XDG_CONFIG_HOME/tumbleline/recipes/NAME.toml``; XDG Base Directory Specification 0.8, by default ``~/.config``). A name means
-one file: a file with the name of a built-in one is refused, because two people would mean different content by it.
+(``$XDG_CONFIG_HOME/tumbleline/recipes/NAME.toml``; XDG Base Directory Specification 0.8, by default ``~/.config``). A file with
+the name of a built-in one is refused, because the name would have different contents for different users.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None
     Raises
     ------
     RecipeInvalid
-        The name is that of a built-in file, too.
+        A built-in file has the same name.
     """
     if not name or Path(name).name != name or name.startswith("."):
         return None
@@ -69,7 +69,7 @@ def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None
 
 
 def contents(named: Iterable[tuple[Kind, str]]) -> dict[str, str]:
-    """SHA-256 of the user's files among those named, by ``kind/name``; built-in ones are part of the product's version."""
+    """SHA-256 of the named files that are the user's, by ``kind/name``; built-in files belong to the product's version."""
     found = {(kind, name): own_file(kind, name) for kind, name in named}
     return {
         f"{kind}/{name}": sha256(path.read_bytes()).hexdigest()

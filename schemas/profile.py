@@ -1,7 +1,7 @@
 """Register-map profiles: what every register of a device is called, where it is, and how its words are read.
 
 A profile is TOML; the client and the simulated station read the same file, so a wrong address shows against hardware
-only. ``verified`` says whether anybody has held it against the device.
+only. ``verified`` states whether it was compared with the device.
 """
 
 from __future__ import annotations

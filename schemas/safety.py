@@ -10,7 +10,7 @@ from schemas.bounds import Celsius, Degrees, Number, Positive, Rate, Seconds, Wa
 from schemas.strict import Strict
 
 Bounds = tuple[Number, Number]
-SAFE_WITHIN_S = 60.0  # by then a station that nobody drives is in its safe state, and its lease is free
+SAFE_WITHIN_S = 60.0  # by then a station without a live run is in its safe state, and its lease is free
 
 
 class Suspenders(Strict):

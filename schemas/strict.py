@@ -1,4 +1,4 @@
-"""The base of every part of a file that somebody writes by hand."""
+"""The base of every part of a file that is written by hand."""
 
 from __future__ import annotations
 

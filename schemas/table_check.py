@@ -1,4 +1,4 @@
-"""The check of a table against its contract: the table with the right types, or one message with row, value and need."""
+"""The check of a table against its contract: the table with the right types, or one message with row, value and requirement."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
-    """The frame with its columns' types made right, or :class:`DataRejected`.
+    """The frame with its columns converted to the right types, or :class:`DataRejected`.
 
     Parameters
     ----------
     name : a key of :data:`TABLES`.
-    where : what to call the table's source in a message; the table's name by default.
+    where : name of the table's source in a message; the table's name by default.
     """
     table = TABLES[name]
     source = where or name
@@ -38,7 +38,7 @@ def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
 
 
 def _plainly_right(table: Table, frame: pd.DataFrame) -> bool:
-    """Whether the frame is as its table asks, seen at one look at every column; what is not is looked at again to say why not."""
+    """Whether the frame meets its contract, by one pass over every column; a frame that does not is examined again in detail."""
     seen = {name: Seen.of(frame[name]) for name in {*table.columns, *table.finite, *table.key} & set(frame.columns)}
     rows = frame["status"].to_numpy() == "ok" if table.only_ok else slice(None)
     return (
@@ -63,7 +63,7 @@ def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
         if column not in rows.columns:
             continue
         own = rows[column]
-        plain = own.dtype == np.float64  # the rest is turned into numbers first, which takes longer than the look
+        plain = own.dtype == np.float64  # others are converted first, which is slower
         values = own.to_numpy() if plain else np.asarray(pd.to_numeric(own, errors="coerce"), dtype=float)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
@@ -97,7 +97,7 @@ def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
 
 
 def _needed(problem: SchemaError) -> str:
-    """What a check asks for, without the library's way of saying it."""
+    """The requirement of a check, without the library's notation."""
     words = str(problem.check).removeprefix("<Check ").removesuffix(">")
     return words.split(": ", 1)[-1].replace("_", " ")
 

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
-LONGEST_FILE = 4 * 2**20  # bytes of a file that somebody writes by hand
+LONGEST_FILE = 4 * 2**20  # bytes of a file that is written by hand
 
 
-LONGEST_REASON = 400  # characters of what a check says
+LONGEST_REASON = 400  # characters of the reason that a check gives
 
 
-DEEPEST = 16  # tables and lists inside one another; the deepest of our files has five
+DEEPEST = 16  # levels of nested tables and lists; the deepest of our files has five
 
 
 def read_text(path: Path, what: str, form: str = "TOML") -> str:
@@ -72,7 +72,7 @@ def _depth(content: Any) -> int:
 def explain(problem: ValidationError, source: str, model: type[BaseModel]) -> RecipeInvalid:
     """The first problem of a file as one message: key, value, what is needed, close matches.
 
-    An unknown key is told first: it is mostly the cause of the missing one.
+    An unknown key is reported first: it is mostly the cause of the missing one.
     """
     details = sorted(problem.errors(include_url=False), key=lambda d: d["type"] != "extra_forbidden")
     first = details[0]

@@ -55,7 +55,7 @@ def open_station(
     lot : the units in it; a simulated station makes their devices
     resume : ``Station.state()`` of an earlier session: a simulated station goes on exactly there; hardware is where it is
     hidden : physics beyond the station's file, for simulated stations
-    run : what the leases are taken for, as others are told
+    run : purpose of the leases, as messages to other runs state it
     roles : equipment that the run needs besides table, chamber and reader
     """
     if config.kind == "simulated":

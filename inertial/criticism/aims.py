@@ -43,7 +43,7 @@ class Objective(Protocol):
         ...
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
-        """Share, 0 … 1, of the aim that is reached after these steps; ``fine`` for a promise, not for a search."""
+        """Share, 0 … 1, of the aim that is reached after these steps; ``fine`` for the stated gain, not for the search."""
         ...
 
     def picks(

@@ -65,7 +65,7 @@ For handling errors the size in the changed dwells counts.
 """
 
 REMAINDER = 0.1
-"""Share of the largest effect of inexact shape below which what handling does beside it counts as what the effect leaves over.
+"""Share of the largest effect of inexact shape below which a handling error beside it counts as the remainder of the effect.
 
 Only of effects with a nonlinear parameter or a memory: a polynomial of the force has the shape of its equation and leaves no
 remainder. `python benchmarks/remainders.py`, 2 runs of 10 worlds: no remainder at 20 times the noise; a unit that moved by

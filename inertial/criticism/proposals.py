@@ -30,7 +30,7 @@ _ALL = 0.999
 """Share of the aim that counts as complete."""
 
 _KEPT = 0.5
-"""Share of what an offer promises on the grid that must be there with every rival fitted."""
+"""Share of an offer's gain on the grid that must remain when every rival is fitted."""
 
 Minutes = Callable[[Sequence[SequenceStep]], float]
 
@@ -218,10 +218,10 @@ class ProposalSearch:
     def _kept(
         self, chosen: Sequence[StepSequence], offers: Sequence[_Offer], now: float
     ) -> tuple[_Offer, float] | None:
-        """The offer that brings most per minute of those that keep what they promise, with what is there after it.
+        """The offer with the largest gain per minute whose gain remains when every rival is fitted, and the share after it.
 
-        On the grid alone the wrong rivals look further away than they are: an offer counts with every rival fitted, the best of
-        each kind in turn. Where none keeps half of its promise, that which brings most.
+        On the grid alone the wrong rivals seem more distant than they are: an offer is judged with every rival fitted, the best
+        of each kind in turn. Where none keeps half of its gain, the offer with the largest gain is taken.
         """
         by_kind: dict[str, _Offer] = {}
         for offer in sorted(offers, key=lambda o: -o.rate):

@@ -1,4 +1,4 @@
-"""Logarithms of tail areas from the special functions: by classes of distributions a thousand calls take half a second."""
+"""Logarithms of tail probabilities by scipy.special; a thousand calls of scipy.stats take half a second."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,6 @@ def log_f_tail(ratio: Array | float, first: float, second: float) -> Array:
 
 
 def log_chi2_tail(value: Array | float, dof: float) -> Array:
-    """The same of chi-square."""
+    """Natural logarithm of the probability that chi-square exceeds a value; the value's shape."""
     with np.errstate(divide="ignore"):
         return np.log(special.chdtrc(dof, np.maximum(value, 0.0)))

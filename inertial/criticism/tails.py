@@ -1,14 +1,14 @@
-"""Tails of the noise: limit for bad dwells if large deviations are frequent.
+"""Tails of the noise: the limit for bad dwells where large deviations are frequent.
 
-The noise of a dwell is taken to be normal plus t of three degrees of freedom with an unknown share of the variance: few noises
-have heavier tails. The share has a distribution given the dwells that were kept, by the likelihood of their deletion residuals
-below the smallest value that was left out: this holds whether what was left out is the tail of the noise or not. Whitened
-residuals would not do, as whitening spreads the error of one dwell over those that follow. A dwell counts as tail of the noise
-where such noise reaches as far in one of the dwells of the run with more than a stated probability: by the length of its
-deviation, and by the product of the probabilities of its axes, as noise that is independent on three axes does not reach far on
-two of them at once.
+The noise of a dwell is modelled as a normal part plus a Student t part of three degrees of freedom, which has an unknown share of
+the variance; few noises have heavier tails. The posterior distribution of the share uses the likelihood of the deletion residuals
+of the kept dwells, truncated at the smallest value that was left out: it holds whether or not the dwells left out belong to the
+tail of the noise. Whitened residuals cannot be used, because whitening spreads the error of one dwell over the dwells after it.
+A dwell counts as tail of the noise where such noise gives a deviation as large in one of the dwells of the run with more than a
+stated probability. The size of a deviation is its length, and the product of the probabilities of its axes: noise that is
+independent on three axes is seldom large on two of them at once.
 
-Whether a lot's tails are heavy is judged by the kurtosis of its residuals (Anscombe & Glynn, Biometrika 70 (1983) 227).
+Whether the tails of a lot are heavy is judged by the kurtosis of its residuals (Anscombe & Glynn, Biometrika 70 (1983) 227).
 """
 
 from collections.abc import Sequence
@@ -40,19 +40,19 @@ _FURTHEST, _STEP = 60.0, 0.02
 _TAIL = 8.0
 """Standard deviations beyond which only the heavy part counts."""
 
-_TELLS = 60
-"""Values below which tails are not distinguished from a normal distribution's."""
+_FEWEST = 60
+"""Number of values needed to distinguish tails from those of a normal distribution."""
 
 
 def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
-    """Dwells that were left out of a model, each marked where noise with the tails that the others allow reaches as far.
+    """Dwells that were left out of a model, each marked where the tails of the noise of the other dwells explain its deviation.
 
     Parameters
     ----------
     model : without these dwells
     """
     values = np.abs(deletion_residuals(model))
-    if not removed or values.size < _TELLS:
+    if not removed or values.size < _FEWEST:
         return list(removed)
     noise = _Noise.of(values, min(d.deviations for d in removed))
     dwells = values.size / len(removed[0].by_axis)
@@ -61,7 +61,7 @@ def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
 
 def heavy(values: Array) -> bool:
     """Whether values (m,) have heavier tails than a normal distribution."""
-    return values.size >= _TELLS and float(stats.kurtosistest(values, alternative="greater").pvalue) < HEAVY
+    return values.size >= _FEWEST and float(stats.kurtosistest(values, alternative="greater").pvalue) < HEAVY
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class _Noise:
         return _Noise(weight / weight.sum(), scale)
 
     def reaches(self, by_axis: Array, dwells: float) -> float:
-        """Probability that one of so many dwells is as far off, (axes,), in standard deviations."""
+        """Probability that one of ``dwells`` dwells deviates as much as ``by_axis`` (axes,), standard deviations."""
         length, axes = float(np.linalg.norm(by_axis)), len(by_axis)
         total = 0.0
         for k in range(len(_SHARES)):
@@ -104,7 +104,7 @@ class _Noise:
 
 
 def _beyond(place: int, z: Array) -> Array:
-    """P(|x| > z) of a value of variance one, by the place of its share of heavy tails."""
+    """P(|x| > z) of a value of variance one; ``place`` is the index of the share of its heavy tails."""
     share = _SHARES[place]
     if share == 0.0:
         return 2.0 * stats.norm.sf(z)
@@ -126,7 +126,7 @@ def _table(place: int) -> tuple[Array, Array, Array]:
         both = np.fft.irfft(np.fft.rfft(mass, size) * np.fft.rfft(tails, size), size)
         mass = np.maximum(both[half : half + grid.size], 1e-300)
     upper = mass[half + 1 :]
-    # to the middle of each cell
+    # distribution up to the middle of each cell
     distribution = 0.5 + 0.5 * mass[half] + np.concatenate([[0.0], np.cumsum(upper)]) - 0.5 * mass[half:]
     density = np.asarray(mass[half:] / _STEP, dtype=np.float64)
     return np.asarray(grid[half:], dtype=np.float64), density, np.minimum(distribution, 1.0)

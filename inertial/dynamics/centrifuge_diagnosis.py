@@ -1,4 +1,4 @@
-"""Whether a polynomial of a centrifuge test is good enough, which effects are missing, and what to measure next."""
+"""Diagnosis of a centrifuge test: whether its polynomial is adequate, missing effects, and next measurements."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ class SpinDiagnosis:
 
     adequate : None where it cannot be judged, with ``reason``
     fit : of the judged model; extended : with one effect of each class, the same where none is named
-    classes : effects that mend the model, one class after the other
+    classes : effects that make the model adequate, one class after the other
     error_g, extended_g : rms residual
     left_out : rms weighted residual of left-out points before and after; near 1 for a right model
-    next_steps : the measurements that tell the effects of the classes apart
+    next_steps : the measurements that separate the effects of the classes
     """
 
     adequate: bool | None
@@ -100,7 +100,7 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
 
 
 def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence[str] = DEFAULT) -> SpinDiagnosis:
-    """The verdict on bias, scale and ``effects``, with the classes of effects that mend the model."""
+    """The verdict on bias, scale and ``effects``, with the classes of effects that make the model adequate."""
     seen = [name for name, one in EFFECTS.items() if one.seen(points)]
     judged = [name for name in effects if name in seen]
     base = fit_spins(points, output, error, judged)

@@ -1,4 +1,4 @@
-"""Which effects a model lacks: forward selection in classes of effects that the data do not tell apart."""
+"""Effects that a model lacks: forward selection in classes of effects that the data do not separate."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ AnyFit = TypeVar("AnyFit", bound=Fitted)
 
 
 class IncompleteEffect(Exception):
-    """A module without exactly one effect of its own name: its author repairs the module."""
+    """A module without exactly one effect of its own name; its author must correct it."""
 
 
 def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str, Found]:
@@ -69,7 +69,7 @@ def p_value(fit: Fitted) -> float:
 def missing_classes(
     base: AnyFit, effects: Sequence[str], candidates: Sequence[str], fit_of: Callable[[list[str]], AnyFit]
 ) -> tuple[tuple[EffectClass, ...], AnyFit]:
-    """Classes of effects that mend an inadequate model, one after the other, and the fit with the best of each.
+    """Classes of effects that make a model adequate, one after the other, and the fit with the best of each.
 
     An effect is named only where the model is inadequate and the effect improves it with a p-value below 10⁻³, times the
     number of candidates.
@@ -110,6 +110,6 @@ def _next_class(
     if not real:
         return None
     top = fits[real[0]]
-    width = CLASS_WIDTH * max(1.0, top.chi_square / max(top.dof, 1))  # what another effect leaves blurs the comparison
+    width = CLASS_WIDTH * max(1.0, top.chi_square / max(top.dof, 1))  # further missing effects blur the comparison
     same = tuple(name for name in real if score(fits[name]) - score(top) < width)
     return EffectClass(same, added_p(top), top.chi_square, top.dof), top

@@ -1,4 +1,4 @@
-"""Whether the comparison of a shock is good enough: waveform of the unit against the reference's, and what is missing."""
+"""Diagnosis of a shock comparison, the unit's waveform against the reference's: adequacy and missing effects."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
 
 
 def diagnose_shock(record: ShockRecord, effects: Sequence[str] = DEFAULT) -> ShockDiagnosis:
-    """The verdict on a comparison with ``effects``, with the classes of effects that mend it."""
+    """The verdict on a comparison with ``effects``, with the classes of effects that make it adequate."""
     base = fit_shock(record, effects)
     if base.dof < FEWEST_DOF:
         reason = f"{base.dof} degrees of freedom, at least {FEWEST_DOF} are needed; record faster"
@@ -152,7 +152,7 @@ def diagnose_shock(record: ShockRecord, effects: Sequence[str] = DEFAULT) -> Sho
 
 
 def predicted(record: ShockRecord, fit: ShockFit) -> float:
-    """Rms residual of shocks that the fit has not seen, in % of the peak: sensitivity and effects applied to the reference."""
+    """Rms residual of shocks that were not fitted, in % of the peak: sensitivity and effects applied to the reference."""
     parameters = [(name, p) for name in fit.effects for p in EFFECTS[name].parameters(record.duration_s)]
     x = np.array([np.log(fit.parameters[p.name][0]) if p.log else fit.parameters[p.name][0] for _, p in parameters])
     c = np.array([fit.sensitivity, *(value for value, _ in fit.coefficients.values())])
@@ -268,7 +268,7 @@ def _where(record: ShockRecord, fit: ShockFit) -> tuple[str, float]:
 
 
 def _left_out(record: ShockRecord, effects: Sequence[str]) -> float:
-    """Rms weighted residual of samples that a fit has not seen, every fifth left out in turn."""
+    """Rms weighted residual of samples that were not fitted, every fifth left out in turn."""
     total, count = 0.0, 0
     for fold in range(FOLDS):
         out = [np.arange(len(one.unit)) % FOLDS == fold for one in record.shocks]

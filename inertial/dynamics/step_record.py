@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ALIGNMENTS = 3
 FEWEST = 7  # points of a local fit
-RISE_POINTS = 6.0  # samples within the rise time that a time base needs: it then resolves a tenth of 1/f_n
+RISE_POINTS = 6.0  # samples within the rise time that are needed to resolve a tenth of 1/f_n
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class StepFigures:
 
     @property
     def settling_identified(self) -> bool:
-        """Whether the settling time does not depend on which side of the band's edge an extremum is."""
+        """Whether the settling time is the same for an extremum on either side of the band's edge."""
         return self.settling_high_s - self.settling_low_s <= 12.0 * self.settling_error_s
 
 

@@ -21,7 +21,7 @@ ADEQUATE_P = 0.005
 ADDED_P = 1e-3
 """Largest p-value of an added effect, times the number of candidates."""
 CLASS_WIDTH = 9.0
-"""Effects whose fits differ by less than this in χ² (with a parameter's price) are not told apart: three standard deviations."""
+"""Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
 MOST_ADDED = 3
 FOLDS = 5
 FEWEST_DOF = 6
@@ -29,7 +29,7 @@ FEWEST_DOF = 6
 
 @dataclass(frozen=True)
 class EffectClass:
-    """Effects that these points do not tell apart, the best first; ``chi_square`` and ``dof`` of the best one's fit."""
+    """Effects that these points do not separate, the best first; ``chi_square`` and ``dof`` of the best one's fit."""
 
     effects: tuple[str, ...]
     p_value: float
@@ -105,7 +105,7 @@ def diagnose_transfer(
 
 
 def _next_class(points: Points, best: TransferFit, current: Sequence[str]) -> tuple[EffectClass, TransferFit] | None:
-    """The effects that mend most of what is left, and the fit with the best of them; None where none is significant."""
+    """The effects that reduce the residual most, and the fit with the best of them; None where none is significant."""
     candidates = [name for name, one in EFFECTS.items() if name not in current and one.seen(points.conditions)]
     known = {p.name: float(v) for p, v in zip(best.parameters, best.values, strict=True)}
     fits: dict[str, TransferFit] = {}

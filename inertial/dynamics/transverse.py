@@ -22,7 +22,7 @@ class Transverse:
     Attributes
     ----------
     value, error : share of the sensitivity on the axis, and its standard uncertainty
-    low, high : 95 % interval; low is 0 where the transverse sensitivity does not stand out of its uncertainty
+    low, high : 95 % interval; low is 0 where the transverse sensitivity is not significant
     direction_deg, direction_error_deg : from the first transverse axis towards the second; the error is 180 where it is unknown
     offset : constant over the angle: motion of the exciter along the sensitive axis
     chi_square, dof, p_value : of the residuals against the uncertainties of the points
@@ -56,7 +56,7 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
     Raises
     ------
     NotIdentified
-        Fewer than six angles, or angles that do not tell the three unknowns apart.
+        Fewer than six angles, or angles that do not separate the three unknowns.
     """
     n = len(output)
     if n < FEWEST:
@@ -64,7 +64,9 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
         raise NotIdentified(msg)
     rows = np.column_stack([first, second, np.ones(n)]) / error[:, None]
     if np.linalg.cond(rows * error.mean()) > 100.0:
-        msg = "transverse sensitivity: the angles do not tell two directions and a constant apart; turn over a whole circle"
+        msg = (
+            "transverse sensitivity: the angles do not separate two directions and a constant; turn over a whole circle"
+        )
         raise NotIdentified(msg)
     covariance = np.linalg.inv(rows.T @ rows)
     c = covariance @ (rows.T @ (output / error))

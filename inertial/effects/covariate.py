@@ -12,7 +12,7 @@ COVARIATE_PREFIX = "covariate:"
 
 _KNOTS = np.linspace(-1.0, 1.0, 6)
 _FEW = 8
-"""Below this many distinct values a curve is not told from a line."""
+"""Below this many distinct values a curve cannot be distinguished from a line."""
 
 
 class Covariate(SensorEffect):

@@ -1,4 +1,4 @@
-"""An effect written as formulas in a model file: columns that somebody believes in, tried like every other effect."""
+"""An effect written as formulas in a model file, a user's hypothesis: tried like every other effect."""
 
 from collections.abc import Sequence
 from typing import ClassVar

@@ -32,7 +32,7 @@ class Solved:
     """Coefficients at given shares of wander.
 
     theta : (..., 3, p); inverse : (..., 3, p, p), their covariance over the variance
-    gain : (..., 3, p, n), what every value of a series adds to the coefficients
+    gain : (..., 3, p, n), derivative of the coefficients by every value of a series
     shared : (q,); shared_inverse : (q, q), likewise
     squares : (..., 3), whitened sums of squares; variance : of the white part; deviance : −2 log restricted likelihood
     """

@@ -1,9 +1,9 @@
-"""A sensor turned about one of its axes: bias, scale and misalignment of the two axes in the plane, and what stays open.
+"""A sensor turned about one of its axes: bias, scale and misalignment of the two axes in the plane.
 
 The forces lie in a plane, f = (fᵢ, fⱼ) along the two axes in it. Outputs of the axes in the plane give their bias and their
-response to both; the axis across the plane gives its bias, which holds the tilt of the axis of rotation (1 mrad is 1 mg), and two
-couplings, but no scale (IEEE Std 1293). Where the poses are not known, |f| = g is an ellipse in the two outputs; a rotation in
-the plane is then no error, so that i stays along the sensor's own i axis.
+response to both; the axis across the plane gives its bias, which includes the tilt of the axis of rotation (1 mrad is 1 mg), and
+two couplings, but no scale (IEEE Std 1293). Where the poses are not known, |f| = g is an ellipse in the two outputs; a rotation
+in the plane is then no error, so that i stays along the sensor's own i axis.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ ALONG = 0.98
 """Cosine from which on the normal of a plane is an axis of the sensor."""
 
 QUIET = 0.05
-"""Range of an output, over the largest, below which it does not answer to gravity."""
+"""Range of an output, over the largest, below which it does not respond to gravity."""
 
 FEWEST_DOF = 15
 _LEAST, _TURNED = 4, 0.8
@@ -170,8 +170,8 @@ class _Series:
     rest: Array
 
     @classmethod
-    def of(cls, columns: Array, wanted: Array, whiten: Array) -> "_Series":
-        white, target = whiten @ columns, whiten @ wanted
+    def of(cls, columns: Array, series: Array, whiten: Array) -> "_Series":
+        white, target = whiten @ columns, whiten @ series
         size = np.linalg.norm(white, axis=0)
         size = np.where(size > 0.0, size, 1.0)
         value = np.linalg.lstsq(white / size, target, rcond=None)[0] / size
@@ -179,18 +179,18 @@ class _Series:
         dof = len(target) - columns.shape[1]
         inverse = np.linalg.pinv((white / size).T @ (white / size)) / np.outer(size, size)
         error = student(dof) * np.sqrt(float(rest @ rest) / dof * np.maximum(np.diagonal(inverse), 0.0))
-        return cls(value, error, wanted - columns @ value, whiten, white, rest)
+        return cls(value, error, series - columns @ value, whiten, white, rest)
 
 
-def _solved(columns: Array, wanted: Array, direction: Array, time: Array, error: Array) -> _Series:
-    """A linear series with the wander that its residuals show."""
-    first = np.linalg.lstsq(columns / error[:, None], wanted / error, rcond=None)[0]
-    noise = norm_noise(wanted - columns @ first, columns, direction, time, error)
-    return _Series.of(columns, wanted, noise.whiten)
+def _solved(columns: Array, series: Array, direction: Array, time: Array, error: Array) -> _Series:
+    """A linear fit of a series with the wander that its residuals show."""
+    first = np.linalg.lstsq(columns / error[:, None], series / error, rcond=None)[0]
+    noise = norm_noise(series - columns @ first, columns, direction, time, error)
+    return _Series.of(columns, series, noise.whiten)
 
 
 def _harmonics(series: _Series, angle: Array, orders: Sequence[int]) -> float:
-    """Probability of what sines and cosines of the angle take off, under noise alone; nan below two degrees of freedom."""
+    """Probability, under noise alone, of the reduction by sines and cosines of the angle; nan below two degrees of freedom."""
     waves = np.column_stack([wave(order * angle) for order in orders for wave in (np.cos, np.sin)])
     dof = len(angle) - series.white.shape[1] - waves.shape[1]
     if dof < 2:
@@ -251,7 +251,7 @@ def _ellipse(flat: Array, norm: float) -> Array:
 
 
 def _descended(flat: Array, theta: Array, norm: float, whiten: Array) -> Array:
-    """Gauss–Newton, each step halved until it does not harm."""
+    """Gauss–Newton, each step halved until it does not increase the residual."""
 
     def cost(at: Array) -> float:
         return float(np.sum((whiten @ _state(flat, at, norm)[2]) ** 2))

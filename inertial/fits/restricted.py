@@ -1,7 +1,7 @@
 """Restricted likelihood of a lot's series under white noise and two kinds of wander, on a whole grid of strengths at once.
 
 The covariance is W + t·K₂ + s·K₁. Columns that all blocks have in common (the poses are those of the table) are taken out once,
-by contrasts R with R·H = 0 and R·W·Rᵀ = 1, turned so that R·K₂·Rᵀ = Λ: what is left of every block is smaller. For one
+by contrasts R with R·H = 0 and R·W·Rᵀ = 1, turned so that R·K₂·Rᵀ = Λ: the remaining block is smaller. For one
 share t the vectors of D·R·K₁·Rᵀ·D with D = (1 + t·Λ)^(−1/2) make all shares s diagonal: the whitened products of all
 columns are Σ xᵢ·xⱼ/(1 + s·λ), one matrix product for all shares and blocks. What elimination leaves of the bordered matrix
 (H z)ᵀV⁻¹(H z) is ln|HᵀV⁻¹H| and the whitened sum of squares.

@@ -65,7 +65,7 @@ class WanderFit:
     walk_shown: bool
     """Whether the record shows the walk: no flicker alone explains it as well."""
     gain: Array
-    """(..., 3, p, n): what every output of the n dwells that were fitted adds to the coefficients."""
+    """(..., 3, p, n): derivative of the coefficients by every output of the n fitted dwells."""
     widened: float
     """Factor of the errors of the coefficients where the noise is known from few degrees of freedom; one elsewhere."""
 

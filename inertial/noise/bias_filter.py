@@ -1,7 +1,7 @@
 """Tracking of the bias of three axes: a Kalman filter that is updated only where the specific force is known.
 
-Specific force and bias add in the output, so nothing but a known force tells them apart. In between the bias drifts, and its
-standard deviation grows as the model of its noise says.
+Specific force and bias add in the output, so the bias can be estimated only where the force is known. Between updates the bias
+drifts, and its standard deviation grows according to the noise model.
 """
 
 from dataclasses import dataclass, field
@@ -17,14 +17,14 @@ Array = NDArray[np.float64]
 
 AXES = 3
 GATE_SIGMA = 5.0
-_FEWEST = 8  # updates, below which nothing is said of their consistency
+_FEWEST = 8  # updates that are needed to judge their consistency
 
 
 @dataclass
 class BiasFilter:
     """Bias of three axes as processes db/dt = −b/T + w and a walk; the state of an axis is its k processes and the walk.
 
-    A step of Δt keeps φ = e^(−Δt/T) of a process and adds the variance s²(1 − φ²); the walk keeps all and adds K²Δt. The constant
+    A step of Δt multiplies a process by φ = e^(−Δt/T) and adds the variance s²(1 − φ²); it adds K²Δt to the walk. The constant
     part of the bias, that of the last switch-on, is the walk's value at the beginning.
     """
 
@@ -55,7 +55,7 @@ class BiasFilter:
         return self._sum @ self._p @ self._sum.T
 
     def predict(self, seconds: float) -> None:
-        """Lets time pass; exact for any step."""
+        """Propagates state and covariance over a time step; exact for a step of any length."""
         if seconds <= 0.0:
             return
         model = self.model
@@ -66,7 +66,7 @@ class BiasFilter:
         self._p = phi[:, None] * self._p * phi + np.diag(grown.ravel())
 
     def known_force(self, difference: Array, seconds: float) -> None:
-        """Updates with corrected output less true force (3,), g, each a mean over ``seconds``."""
+        """Updates with corrected output minus true force (3,), g, each a mean over ``seconds``."""
         for axis in range(AXES):
             self._update(self._sum[axis], float(difference[axis]), float(self.model.white[axis] ** 2) / seconds, axis)
 
@@ -78,7 +78,7 @@ class BiasFilter:
         length = float(np.linalg.norm(force))
         along = force / length
         variance = float(along**2 @ self.model.white**2) / seconds
-        # force still holds the bias, so that its length less the magnitude is the bias along it
+        # force still contains the bias: its length minus the magnitude is the bias along it
         self._update(along @ self._sum, length - magnitude, variance, AXES)
 
     def _update(self, row: Array, measured: float, variance: float, channel: int) -> None:
@@ -99,11 +99,11 @@ class BiasFilter:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Innovations of a filter against what it expects of them.
+    """Consistency of the innovations of a filter with the covariance that it states.
 
-    nis : mean of their squares, each over its variance; low, high : its bounds at 95 %, χ²(n)/n
-    lag_1 : their correlation with the one before on the same channel; white where its size is below ``lag_1_bound``
-    stated : what the innovations say of the stated uncertainty; None where there are too few
+    nis : mean of their squares, each divided by its variance; low, high : its 95 % bounds, χ²(n)/n
+    lag_1 : correlation of successive innovations of a channel; white where its magnitude is below ``lag_1_bound``
+    stated : verdict on the stated uncertainty; None where there are too few innovations
     """
 
     count: int
@@ -128,7 +128,7 @@ def consistency(innovations: list[tuple[int, float]]) -> Consistency:
     nis = float(np.mean(values**2))
     lag = float(pairs.sum() / np.sum(values**2)) if pairs.size else 0.0
     bound = 1.96 / np.sqrt(max(pairs.size, 1))
-    within = low <= nis <= high  # beyond its bounds the size decides, inside them the whiteness
+    within = low <= nis <= high  # outside its bounds the NIS decides, inside them the correlation
     small, large = nis > high or (within and lag > bound), nis < low or (within and lag < -bound)
     return Consistency(
         n, nis, low, high, lag, float(bound), "too small" if small else "too large" if large else "consistent"
@@ -139,7 +139,7 @@ def consistency(innovations: list[tuple[int, float]]) -> Consistency:
 class Track:
     """Bias (n, 3) in g after each step, its covariance (n, 3, 3) in g², and which steps updated it (n,).
 
-    expected, expected_covariance : the same before the update of the step, as a filter that runs beside the device has it
+    expected, expected_covariance : the same before the update of the step, as known to a filter in real time
     """
 
     bias: Array

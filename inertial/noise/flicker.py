@@ -20,7 +20,7 @@ FASTEST_WITHIN = 0.01
 """Fastest time constant of wander within dwells over their duration: what is faster is averaged out."""
 
 SLOWEST_DIAGNOSED = 4.0
-"""Slowest time constant over the length of the record where drifts are to be told from wander."""
+"""Slowest time constant over the length of the record where drifts are to be separated from wander."""
 
 SLOWEST_FITTED = 1.0
 """The same where coefficients are fitted: what is slower than the record is, for the record, the bias itself."""

@@ -1,4 +1,4 @@
-"""Bias as a sum of first-order Gauss–Markov processes db/dt = −b/T + w: white, flicker and walk noise in a filter's form."""
+"""Bias as a sum of first-order Gauss–Markov processes db/dt = −b/T + w, the form in which a Kalman filter uses its noise."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ FLICKER_VARIANCE = 2.0 * np.log(2.0) / np.pi
 """Allan variance of flicker noise with B = 1: IEEE Std 952-1997, C.1.1.3."""
 
 _SERIES = 1e-3  # of τ/T, below which the closed form loses its digits
-_POINTS = 121  # of the range over which the sum is made flat
+_POINTS = 121  # averaging times at which the sum is fitted
 _INSETS = np.linspace(-0.2, 0.9, 45)  # decades by which the extreme time constants lie inside the range
 _FEW_DECADES = 2.0
 
@@ -50,10 +50,10 @@ class FlickerTerms:
 
 
 def flicker_terms(shortest_s: float, longest_s: float, count: int | None = None) -> FlickerTerms:
-    """Processes that stand for flicker noise between two averaging times.
+    """Processes that approximate flicker noise between two averaging times.
 
-    Time constants are evenly spaced in log τ, weights are non-negative least squares on the relative Allan variance. Three terms
-    hold three decades to 9 %, four to 2 %.
+    Time constants are evenly spaced in log τ; the weights are a non-negative least-squares fit to the relative Allan variance.
+    Over three decades, three terms are within 9 %, four within 2 %.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def flicker_terms(shortest_s: float, longest_s: float, count: int | None = None)
 
 
 def _flat(model: Array) -> Array:
-    """Non-negative weights (k,) that bring ``model @ weights`` (t,) near one; the worst points weigh more in each round."""
+    """Non-negative weights (k,) with ``model @ weights`` (t,) near one; each round gives the worst points more weight."""
     emphasis = np.ones(len(model))
     weights = nnls(model, emphasis)[0]
     for _ in range(6):
@@ -104,7 +104,7 @@ class BiasModel:
 
     white : (3,), N of IEEE Std 952, g/√Hz (two-sided: the mean over Δt has the variance N²/Δt)
     sd : (3, k), standard deviations of the Gauss–Markov processes; correlation_s : (k,), s
-    walk : (3,), K, g/√s, of a bias that walks freely
+    walk : (3,), K, g/√s, of the random walk of the bias
     turn_on : (3,), standard deviation of the bias at the beginning, besides its processes
     """
 

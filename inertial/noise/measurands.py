@@ -50,7 +50,7 @@ def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array
 
 
 def walk_mean(time: Array, since: float, start: float, length: float) -> tuple[Array, float]:
-    """Of a random walk of K = 1, zero at ``since``: covariance (n,) with its mean over a window, and that mean's variance.
+    """Covariance (n,) of a random walk with its mean over a window, and that mean's variance; K = 1, zero at ``since``.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def walk_mean(time: Array, since: float, start: float, length: float) -> tuple[A
 
 
 def flicker_mean(time: Array, constants: Array, start: float, length: float) -> tuple[Array, float]:
-    """The same of a sum of Ornstein–Uhlenbeck processes, equal and of variance one together, for times inside the window.
+    """The same for a sum of Ornstein–Uhlenbeck processes of equal variance, in total one, at times inside the window.
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ def flicker_mean(time: Array, constants: Array, start: float, length: float) -> 
 
 
 def against_mean(variance: Array, gain: Array, kind: tuple[Array, float]) -> Array:
-    """Change of a coefficient's variance where not zero but the mean of the wander over a window is what it should show.
+    """Change of a coefficient's variance where its true value includes the mean of the wander over a window.
 
-    The coefficient is wrong by gᵀ·v of the wander v; against the mean m it is wrong by gᵀ·v − m, whose variance is that of gᵀ·v
-    less 2·gᵀ·cov(v, m) − var(m). A fit follows the wander of its record.
+    The wander v adds the error gᵀ·v to the coefficient; relative to the mean m the error is gᵀ·v − m, whose variance is that of
+    gᵀ·v plus var(m) − 2·gᵀ·cov(v, m). A fit follows the wander of its record.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def of_a_day(
     slowest: float = 1.0,
     widened: float = 1.0,
 ) -> Array:
-    """Standard uncertainty of a bias as the mean of the day after its record, as far as 1/f goes; the shape of ``record``.
+    """Standard uncertainty of a bias as the mean of the day after its record, from 1/f noise; the shape of ``record``.
 
     Flicker between the record and that day is added to the error of the record's mean.
 

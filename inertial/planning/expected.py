@@ -72,7 +72,7 @@ def expected_errors(effects: Sequence[str], state: State, covariance: Array, *, 
 
 
 def expected_gain(effects: Sequence[str], state: State, covariance: Array) -> Array:
-    """What every dwell of a plan adds to the coefficients of its fit, (3, p, n): (Hᵀ·C⁻¹·H)⁻¹·Hᵀ·C⁻¹ of the sensor's effects.
+    """Derivative of the coefficients of a plan's fit by every dwell, (3, p, n): (Hᵀ·C⁻¹·H)⁻¹·Hᵀ·C⁻¹ of the sensor's effects.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""A fit by the norm of gravity as a linear map: what errors of the outputs make of its coefficients.
+"""A fit by the norm of gravity as a linear map from errors of the outputs to errors of its coefficients.
 
 The residual of a dwell is ρ = |f| − g, its derivative by a coefficient of axis i is −(uᵀK⁻¹)ᵢ·column with the direction u of the
-force. Outputs that are wrong by δy raise it by uᵀK⁻¹·δy, and the coefficients by −(RᵀV⁻¹R)⁻¹RᵀV⁻¹·uᵀK⁻¹·δy. An error of
-direction, such as a table that is not level, is across u and does nothing.
+force. Errors δy of the outputs change it by uᵀK⁻¹·δy, and the coefficients by −(RᵀV⁻¹R)⁻¹RᵀV⁻¹·uᵀK⁻¹·δy. An error of direction,
+such as a table that is not level, is across u and has no effect.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
-"""A copy of an archive on another disk or in an object store, taken while runs go on; and the way back.
+"""Copy of an archive to another disk or an object store, also during runs, and its restoration.
 
-Files of an archive are written once, so a further copy adds what is new. The chain is read first and copied last: every file that
-an entry of the copy names was copied before it. What the chain does not name yet (a lot that is being measured) is copied as it
-stands and completed by the next copy. Derived files (``index/``) are left out; they are made again.
+Files of an archive are written once, so a repeated copy adds only new files. The chain is read first and copied last: every file
+that an entry of the copy names was copied before it. Files that the chain does not name yet (a lot that is being measured) are
+copied in their present state and completed by the next copy. Derived files (``index/``) are left out; they are made again.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Copied:
 
 
 def copy_archive(source: Archive, target: Archive) -> Copied:
-    """Copy what the target does not have yet.
+    """Copy the files that the target does not have yet.
 
     Parameters
     ----------

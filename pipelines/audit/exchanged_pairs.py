@@ -53,10 +53,10 @@ def exchanged_pairs(
 def _fits(calibrations: Calibrations, row: int, past: int, bound: Array) -> bool:
     change = np.abs(calibrations.values[row] - calibrations.values[past])
     expanded = COVERAGE * np.hypot(calibrations.errors[row], calibrations.errors[past])
-    told = np.isfinite(change) & np.isfinite(
+    known = np.isfinite(change) & np.isfinite(
         bound
     )  # parameters outside the model are NaN and are ignored; without any parameter nothing fits
-    return bool(told.any() and np.all(change[told] <= (bound + expanded)[told]))
+    return bool(known.any() and np.all(change[known] <= (bound + expanded)[known]))
 
 
 def _distance(calibrations: Calibrations, row: int, past: int, bound: Array) -> float:

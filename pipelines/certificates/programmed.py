@@ -1,4 +1,4 @@
-"""Journal of the writing of coefficients into devices: for each unit what was begun, and how it ended.
+"""Journal of the writing of coefficients into devices: for each unit the begun operations and their results.
 
 ``programming/<aa>/<hash of the serial>/<sequence>.json``, created once each and named in the chain of the archive. An entry
 ``begun`` is written before the first write to the device, so that a process that was killed leaves a beginning without an end:
@@ -68,7 +68,7 @@ def add(root: Place, serial: str, event: Event, content: Mapping[str, Any]) -> d
 
 
 def unproved(root: Place, serial: str) -> str:
-    """Why the memory of a unit is not proved; empty where it is, or was never written."""
+    """Reason why the memory of a unit is not verified; empty where it is, or where it was never written."""
     known = programming(root, serial)
     if not known or known[-1]["event"] == "proved":
         return ""
@@ -79,7 +79,7 @@ def unproved(root: Place, serial: str) -> str:
 
 
 def refuse_unproved(root: Place, serial: str) -> None:
-    """Refuse a unit whose memory may hold something else than its coefficients."""
+    """Refuse a unit whose memory may contain other coefficients than its own."""
     why = unproved(root, serial)
     if why:
         raise WrongUse(

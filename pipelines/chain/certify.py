@@ -1,4 +1,4 @@
-"""Certifying a run: its units that passed get a validity in the ledger; those that did not are told with the reason."""
+"""Certifying a run: its units that passed get a validity in the ledger; those that did not are listed with the reason."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def certify(  # noqa: PLR0913 - each is an option of the command
     seen = {proposal.serial: len(ledger.events(proposal.serial)) for proposal in proposals}
     refuse_unsound(run, public_keys() if keys is None else keys)
     refuse_period(run, first, last)
-    # one at a time from here on: of two that certify one serial at the same moment the second is told of the first
+    # one at a time from here on: of two who certify one serial at the same moment the second is refused, and learns of the first
     with alone(ledger.root / FOLDER, wait=True):
         for proposal in proposals:
             refuse_two_at_once(ledger, run, proposal.serial)

@@ -109,11 +109,11 @@ def backup(
         Path | None,
         typer.Option("--database", metavar="DIR", help="Also copy the database of the orchestrator into this folder."),
     ] = None,
-    keep: Annotated[int, typer.Option("--keep", min=1, help="Copies of the database that are kept.")] = 14,
+    keep: Annotated[int, typer.Option("--keep", min=1, help="Number of copies of the database to keep.")] = 14,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Copy the archive to another disk or store while runs go on; a further copy adds what is new.
+    """Copy the archive to another disk or store, also during runs; a repeated copy adds only what is new.
 
     The database of the orchestrator is that of PREFECT_SERVER_DATABASE_CONNECTION_URL (PostgreSQL), else prefect.db in
     PREFECT_HOME. It holds the history of runs only; the archive does not need it.
@@ -151,7 +151,7 @@ def restore(
 ) -> None:
     """Copy an archive back into an empty folder and verify it; exit 1 where the verification has findings.
 
-    Stop server and workers before. The key that signs the archive is not part of a copy: keep it elsewhere.
+    Stop the server and the workers first. The key that signs the archive is not part of a copy: keep it elsewhere.
     """
     from pipelines.archive import Archive
     from pipelines.archive.backup import copy_archive

@@ -30,6 +30,6 @@ class WordConsole(Console):
 
 
 def _copied(text: str, width: int) -> bool:
-    """Whether a line of the text is copied as a whole: it is a command, or has a word without room."""
+    """Whether a line of the text must stay whole: it is a command, or has a word that is longer than the line."""
     lines = text.splitlines() or [""]
     return any(line.lstrip().startswith(COMMAND) or max(map(len, line.split()), default=0) > width for line in lines)

@@ -78,7 +78,7 @@ def command(
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 
     The bias is tracked where the specific force is known (--force, or columns force_x, force_y, force_z) or the unit is at rest
-    (--at-rest); between updates its standard deviation grows as the noise of the unit says. Exit status 1: the updates
+    (--at-rest); between updates its standard deviation grows according to the unit's noise. Exit status 1: the updates
     contradict the stated noise.
     """
     from pipelines.archive import Archive
@@ -115,7 +115,7 @@ def _tracking(
     *,
     at_rest: bool,
 ) -> Tracking | None:
-    """How the bias is tracked; None where nothing is known of the force."""
+    """How the bias is tracked; None where the force is known at no sample."""
     import numpy as np
 
     from pipelines.export.corrected import Tracking
@@ -215,7 +215,7 @@ def _document(recording: Recording, fit: FitOfUnit, done: Corrected, output: Pat
 
 
 def _many(rejected: int, used: int) -> bool:
-    """More than a hundredth of the updates beyond five sigma."""
+    """Whether more than 1 % of the updates were rejected, beyond five standard deviations."""
     return rejected > 1 + 0.01 * used
 
 

@@ -1,4 +1,4 @@
-"""``tumbleline keys``: the keys and names that recipes, limits, stations, --fault and demo know."""
+"""``tumbleline keys``: the keys and names that recipes, limits, stations, --fault and demo accept."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def command(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """List what a recipe, limits or station file may contain, what --fault and demo know, and the names of files.
+    """List what a recipe, limits or station file may contain, what --fault and demo accept, and the names of files.
 
     The same lists are on the page docs/reference/keys.md.
     """
@@ -52,7 +52,7 @@ def command(
 
 
 def _print(rows: list[dict[str, str]]) -> None:
-    """Rows in two columns, a table for each table of a file: the name, and all that is known of it."""
+    """Rows in two columns, name and meaning, with one table for each table of the file."""
     for table in dict.fromkeys(row.get("table", "") for row in rows):
         own = [row for row in rows if row.get("table", "") == table]
         head = next(name for name in own[0] if name != "table")
@@ -60,7 +60,7 @@ def _print(rows: list[dict[str, str]]) -> None:
 
 
 def _text(row: dict[str, str], head: str) -> str:
-    """The meaning of a row first, and then its other values by their heads."""
+    """The meaning of a row, followed by its other values with their column names."""
     meaning = row.get("meaning", "")
     more = [f"{name}: {value}" for name, value in row.items() if value and name not in {head, "table", "meaning"}]
     return f"{meaning} {'; '.join(more)}".strip()
@@ -130,4 +130,4 @@ SUBJECTS: dict[str, tuple[str, Callable[[], list[dict[str, str]]]]] = {
     "demo": ("hidden effects of 'tumbleline demo --effect NAME'", _hidden),
     "names": ("recipes, limits, stations, profiles and presets, built in and of your own", _names),
 }
-"""The lists by what the command calls them: content and rows."""
+"""The lists by subject: description and rows."""

@@ -30,7 +30,7 @@ def command(
         list[str] | None,
         typer.Option("--queue", metavar="NAME", help="A queue that must have a worker online; may be repeated."),
     ] = None,
-    days: Annotated[int, typer.Option("--days", min=1, max=3650, help="Runs of so many days are counted.")] = 30,
+    days: Annotated[int, typer.Option("--days", min=1, max=3650, help="Number of days whose runs are counted.")] = 30,
     free_gb: Annotated[
         float, typer.Option("--free-gb", min=0.0, metavar="GB", help="Free space that the archive needs.")
     ] = 1.0,
@@ -42,20 +42,20 @@ def command(
         typer.Option("--audits", metavar="DIR", help="Folder of audit documents whose findings are alerts too."),
     ] = None,
     host: Annotated[
-        str, typer.Option("--host", metavar="ADDRESS", help="Where it listens, with --serve.")
+        str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on, with --serve.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port, with --serve; 0: a free one.")] = PORT,
     *,
     metrics: Annotated[
-        bool, typer.Option("--metrics", help="Print the numbers in the format of Prometheus, and end.")
+        bool, typer.Option("--metrics", help="Print the numbers in the format of Prometheus, and exit.")
     ] = False,
     serve: Annotated[bool, typer.Option("--serve", help="Serve /metrics, /healthz and /livez until stopped.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Say whether the line needs a person; exit 1 if it does.
+    """Report whether the line is healthy; exit status 1 if it is not.
 
-    Read are the archive, the orchestrator of PREFECT_API_URL, and the leases of the stations of this computer. Nothing is
-    changed. No serial number is among the numbers.
+    The command reads the archive, the orchestrator of PREFECT_API_URL, and the leases of the stations of this computer. It
+    changes nothing. Its numbers contain no serial number.
     """
     import os
 

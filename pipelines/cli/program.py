@@ -1,4 +1,4 @@
-"""``tumbleline program``: write the coefficients of a run into its devices, and prove that they are there."""
+"""``tumbleline program``: write the coefficients of a run into its devices, and verify them there."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PART = "Certificates, trace, audit"
 ORDER = 417
-SUMMARY = "Write coefficients into the memory of the devices, and prove it."
+SUMMARY = "Write coefficients into the memory of the devices, and verify them."
 EXAMPLES = (
     "tumbleline program latest --units SN1,SN2",
     "tumbleline program latest --station line-1.toml --form q24 --yes",
@@ -40,21 +40,21 @@ def command(
     ] = "",
     form: Annotated[str, typer.Option("--form", metavar="float32|q24", help="Form of the coefficients.")] = "float32",
     tolerance: Annotated[
-        float, typer.Option("--tolerance", metavar="UG", min=1.0, help="Largest error in the two poses, µg.")
+        float, typer.Option("--tolerance", metavar="UG", min=1.0, help="Largest allowed error in the two poses, µg.")
     ] = 3000.0,
     archive: ArchiveOption = None,
     *,
     offset_registers: Annotated[
         bool, typer.Option("--offset-registers", help="Also write the offset registers of an ADXL355.")
     ] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Write without a question.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Write without confirmation.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write the coefficients of a run into the memory of its devices, which are in the slots of the run.
 
-    For each unit: archive what the memory holds, write the older of its two copies, read it back, power cycle, read it back, and
-    verify in two poses. A certificate ends before the first write; when all is proved, it is given again. A step that fails
-    leaves the unit not certified and the copy that was valid before untouched. Exit status 1: a unit failed.
+    For each unit: archive the content of the memory, write the older of its two copies, read it back, power cycle, read it
+    back, and verify in two poses. The unit's certificate ends before the first write and is renewed after the verification.
+    If a step fails, the unit is not certified, and the previously valid copy is unchanged. Exit status 1: a unit failed.
     """
     from pipelines.archive import Archive
     from pipelines.programming.job import chosen_units, document, program_run, station_of

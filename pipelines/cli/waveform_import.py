@@ -28,13 +28,13 @@ def import_and_print(
     stated : columns and units as the options have them, rate in Hz, group
     """
     from pipelines.importers.mapping import pairs
-    from pipelines.importers.waveforms import Asked, import_waveforms
+    from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 
     if not unit:
         raise WrongUse("import: no serial number, the recordings of a test need one; add --unit SN")
     columns, units, rate, group = stated
-    asked = Asked(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
-    found = import_waveforms(paths, procedure, part, unit, asked, archive)
+    layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
+    found = import_waveforms(paths, procedure, part, unit, layout, archive)
     if as_json:
         print_json(dict(found))
     else:

@@ -1,4 +1,4 @@
-"""``tumbleline waveforms``: the samples of a record of a test procedure as a file of another program."""
+"""``tumbleline waveforms``: write the samples of a record of a test procedure in a format of other programs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def command(
     run: RunArgument = "latest",
     record: Annotated[int, typer.Option("--record", metavar="N", help="Number of the record, from 0.")] = 0,
     unit: Annotated[
-        str, typer.Option("--unit", metavar="SN", help="Serial number; the first unit of the record.")
+        str, typer.Option("--unit", metavar="SN", help="Serial number; default: the first unit of the record.")
     ] = "",
     form: Annotated[str, typer.Option("--format", help=f"{_NAMES}.")] = "csv",
     output: Annotated[
@@ -40,7 +40,7 @@ def command(
 ) -> None:
     """Write the channels of a unit and of the reference sensor with unit and sample interval.
 
-    A format with one clock gets a file for each clock: ``…_units`` and ``…_reference``.
+    A format that holds only one clock gets one file for each clock: ``…_units`` and ``…_reference``.
     """
     from pipelines.archive import Archive
     from pipelines.export.waveforms import WRITERS, write_waveforms

@@ -280,7 +280,7 @@ class ComparisonDocument(TypedDict):
     nonlinear: NotRequired[Annotated[dict[str, Any], "estimated parameters by effect"]]
     station: NotRequired[list[StationParameter]]
     fresh_by_pose: NotRequired[list[PoseComparison]]
-    heldout: NotRequired[Annotated[dict[str, float], "cross-validated error by what is left out, µg"]]
+    heldout: NotRequired[Annotated[dict[str, float], "cross-validated error by kind of dwells left out, µg"]]
     warnings: NotRequired[list[str]]
     progress: NotRequired[Annotated[Confirmation | None, "null without a version to compare with"]]
 

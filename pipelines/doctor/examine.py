@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pipelines.doctor.documents import CheckDocument, DoctorDocument
 
 LEAST_FREE_GB = 1.0
-"""Free space that an archive needs, GB, where nobody says otherwise."""
+"""Free space that an archive needs, GB, by default."""
 
 
 def examine(archive: str | None = None, station: Path | None = None, free_gb: float = LEAST_FREE_GB) -> DoctorDocument:

@@ -112,7 +112,7 @@ def _that_hold(declared: Iterable[str], extras: frozenset[str]) -> list[Requirem
 
 
 def _pinned() -> Check:
-    """Versions that are not those of the lock: they may work, and nobody has tested them."""
+    """Versions that are not those of the lock: they may work, but they are not tested."""
     path = shipped(LOCK)
     if path is None:
         return Check(

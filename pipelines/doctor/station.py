@@ -1,4 +1,4 @@
-"""A station, looked at without a lease: its devices answer, nobody drives it, and it was left safe. Nothing is moved."""
+"""Check of a station without a lease: its devices answer, no run drives it, and it was left safe. Nothing is moved."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ LONGEST_STEPS = 200_000
 class FitOfUnit:
     """Coefficients of one unit.
 
-    coefficients : (3, p); covariance : (3p, 3p), of x before y before z; budget : whether it holds the stated references too
+    coefficients : (3, p); covariance : (3p, 3p), x before y before z; budget : whether it includes the stated references
     """
 
     run: str
@@ -56,8 +56,8 @@ class FitOfUnit:
 class Tracking:
     """How the bias is tracked.
 
-    force : (3,), g, where the recording states none for a sample; None: the force is not known
-    magnitude : g, of the force of a unit at rest; None: rest is not looked for
+    force : (3,), g, for the samples whose force the recording does not state; None: not known
+    magnitude : g, of the force on a unit at rest; None: the recording is not searched for rest
     turn_on_ug : standard deviation of the bias from one switch-on to the next
     step_s : time between updates
     """
@@ -88,7 +88,7 @@ class Corrected:
 
 
 def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUnit:
-    """The fitted coefficients of one unit, under the rules of the export: one that failed or was revoked is refused.
+    """The fitted coefficients of one unit; as in an export, a unit that failed or was revoked is refused.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
     missing = [name for name in ("coefficients", "covariance") if name not in run.tables()]
     if missing:
         raise WrongUse(
-            f"run {run.id}: it has no {' and no '.join(missing)}, a fitted run is needed; give its 'tumbleline run' again"
+            f"run {run.id}: it has no {' and no '.join(missing)}, a fitted run is needed; repeat its 'tumbleline run'"
         )
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     if not unit and len(calibration.units) > 1:
@@ -138,12 +138,12 @@ def _budget(run: Run, unit: str, size: int) -> Array | None:
 
 
 def corrected(recording: Recording, fit: FitOfUnit, tracking: Tracking | None) -> Corrected:
-    """The specific force of a recording, its covariance and, if wanted, the bias.
+    """The specific force of a recording, its covariance and, where ``tracking`` is given, the bias.
 
     Raises
     ------
     DataRejected
-        The model needs a quantity that the recording does not have, or there is nothing to update the bias with.
+        The model needs a quantity that the recording does not have, or the force is known nowhere.
     """
     own = (fit.effects, recording.state)
     force = correct(*own, recording.output, fit.coefficients, fit.nonlinear)
@@ -176,8 +176,8 @@ def _tracked(recording: Recording, fit: FitOfUnit, tracking: Tracking, plain: Co
     known, magnitude = _references(recording, tracking, plain.force, per, rate)
     if not (np.all(np.isfinite(known), axis=1) | np.isfinite(magnitude)).any():
         raise DataRejected(
-            f"{recording.name}: nowhere is the force known or the unit at rest, so nothing tells its bias from the force; give "
-            "--force, columns force_x, force_y, force_z, or record it at rest"
+            f"{recording.name}: the force is known nowhere and the unit is never at rest, one of them is needed to track the "
+            "bias; give --force, columns force_x, force_y, force_z, or record the unit at rest"
         )
     flicker = flicker_terms(per / rate, max(1000.0 * per / rate, float(time[-1] - time[0])))
     terms = {symbol: values / MICRO for symbol, values in noise.value.items()}

@@ -10,7 +10,7 @@
     10      uint16    0
     12      uint32    sequence number: of two valid copies the larger one counts
     16      char[64]  serial number, filled with 0
-    80      uint32    number of the certificate behind the serial number; 0 without one
+    80      uint32    number of the certificate (3 of SN1/3); 0 without one
     84      uint32    date, yyyymmdd
     88      float32   lowest, then highest measured temperature, °C
     96      float64   output per g by which Q24 divides the output; 0 for float32
@@ -50,7 +50,7 @@ _BIAS = 3 * ORDER
 
 @dataclass(frozen=True)
 class Block:
-    """A block.
+    """The content of one copy of the memory.
 
     scale : output per g of the form Q24; 0 for float32
     bias : (4, 3), matrix : (4, 3, 3), as they are stored: float32, or integers in units of 2⁻²⁴
@@ -91,17 +91,17 @@ def block_of(
 
     Parameters
     ----------
-    offsets : steps of the offset registers, which the coefficients take into account; step : counts of one
+    offsets : steps of the offset registers, which the coefficients take into account; step : counts per step
 
     Raises
     ------
     WrongUse
-        The model has an effect that the block cannot hold, or a serial number is too long.
+        The model has an effect that the block cannot hold, or the serial number is too long.
     """
     if unit.left_out:
         raise WrongUse(
-            f"program: effect {', '.join(unit.left_out)} has no place in the device's block, which knows bias, scale, "
-            "misalignment and their temperature; fit a model without it"
+            f"program: effect {', '.join(unit.left_out)} cannot be stored in the device's block, which holds bias, scale, "
+            "misalignment and their temperature terms; fit a model without it"
         )
     if len(unit.unit.encode()) > 64:
         raise WrongUse(

@@ -1,4 +1,4 @@
-"""What a format cannot hold, in µg: the error of the corrected output at 1 g over the temperatures that were measured."""
+"""Terms that a format cannot hold, each with the error of the corrected output, µg, at 1 g over the measured temperatures."""
 
 from __future__ import annotations
 
@@ -68,6 +68,6 @@ def _without(unit: UnitCalibration, part: str, nominal: float) -> UnitCalibratio
 
 
 def comment_lines(parts: Sequence[tuple[str, float]], total_ug: float) -> list[str]:
-    """Lines of a comment: what is not in the file, and the error that remains, µg."""
+    """Lines of a comment: the terms that are not in the file, and the remaining error, µg."""
     lines = [f"not in this file: {part}, up to {size:.3g} µg" for part, size in parts]
     return [*lines, f"largest error of this file against the full calibration, at 1 g: {total_ug:.3g} µg"]

@@ -48,7 +48,7 @@ def scales(unit: UnitCalibration, nominal: float) -> Array:
 
 
 def number(value: float) -> str:
-    """A number as an autopilot's float32 holds it, with the fewest digits that give it back."""
+    """A number as float32, with the fewest digits that identify it."""
     return np.format_float_positional(np.float32(value), unique=True, trim="0")
 
 
@@ -60,7 +60,7 @@ def rounded(values: Array) -> Array:
 def heading(
     unit: UnitCalibration, run: str, nominal: float, applied: Applied, *, thermal: bool, where: str
 ) -> list[str]:
-    """Comment lines of a unit's file: what it is for, its certificate, and what it does not hold, in µg."""
+    """Comment lines of a unit's file: its purpose, its certificate, and the terms that it does not hold, µg."""
     low, high = unit.temperatures
     parts: Sequence[str] = (ACROSS, ACROSS_T, SCALE_T) if thermal else (ACROSS, ACROSS_T, SCALE_T, BIAS_T)
     lines = [

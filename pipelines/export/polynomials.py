@@ -57,7 +57,7 @@ class UnitCalibration:
 
     @property
     def certified(self) -> str:
-        """What is said of the certificate, in a line."""
+        """State of the certificate, in one line."""
         return "not certified" if self.certificate is None else self.certificate.words()
 
     def correct(self, output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
@@ -75,8 +75,8 @@ def unit_calibrations(
 
     Parameters
     ----------
-    failed : hand out units that failed their limits too; units whose data were refused have none.
-    revoked : hand out units whose calibration was revoked, too.
+    failed : include units that failed their limits; units whose data were refused have no calibration
+    revoked : include units whose calibration was revoked
     """
     if "grades" not in run.tables():
         return _ungraded(run, serials)
@@ -86,7 +86,7 @@ def unit_calibrations(
     chosen = [u for u in (serials or tuple(grades.index)) if grades.loc[u, "outcome"] in allowed]
     if not chosen:
         raise WrongUse(
-            f"export: no unit of run {run.id} passed, at least one is needed; --failed hands out failed ones too"
+            f"export: no unit of run {run.id} passed, at least one is needed; --failed exports failed ones too"
         )
     certificates = stated(run, chosen)
     if not revoked:
@@ -114,7 +114,7 @@ def _ungraded(run: Run, serials: tuple[str, ...]) -> list[UnitCalibration]:
     """Calibrations of an import that was fitted without limits; a captured run without grades is not finished."""
     if run.about.get("capture"):
         raise WrongUse(
-            f"export: run {run.id} has no grades, they are needed; it is not finished: give its 'tumbleline run' again"
+            f"export: run {run.id} has no grades, they are needed; it is not finished: repeat its 'tumbleline run'"
         )
     if axis := run.about.get("plane_across"):
         raise WrongUse(
@@ -159,7 +159,7 @@ def _temperatures(dwells: pd.DataFrame, unit: str) -> tuple[float, float]:
 
 
 def revoked_units(run: Run) -> dict[str, Stated]:
-    """Units of a run whose calibration was revoked: they are left out, unless they are asked for."""
+    """Units of a run whose calibration was revoked; they are exported only on request."""
     if "grades" not in run.tables():
         return {}
     found = stated(run, tuple(run.table("grades")["unit"]))
@@ -171,8 +171,8 @@ def _not_revoked(run: Run, chosen: list[str], certificates: Mapping[str, Stated]
     gone = [unit for unit in chosen if unit in certificates and certificates[unit].state == "revoked"]
     if gone and (named or len(gone) == len(chosen)):
         raise WrongUse(
-            f"export: the calibration of unit {gone[0]} in run {run.id} was revoked ({certificates[gone[0]].reason}), one that "
-            "was not is needed; measure the unit again, or hand the old coefficients out all the same with --revoked"
+            f"export: the calibration of unit {gone[0]} in run {run.id} was revoked ({certificates[gone[0]].reason}), a "
+            "valid one is needed; measure the unit again, or export the old coefficients with --revoked"
         )
     return [unit for unit in chosen if unit not in gone]
 
@@ -187,7 +187,7 @@ def _refuse(grades: pd.DataFrame, serials: tuple[str, ...], *, failed: bool) -> 
                 f"export: the data of unit {unit} were refused ({reasons}), so it has no coefficients; measure it again"
             )
         if outcome == "fail" and not failed:
-            raise WrongUse(f"export: unit {unit} failed ({reasons}); --failed hands its coefficients out nevertheless")
+            raise WrongUse(f"export: unit {unit} failed ({reasons}); --failed exports its coefficients")
 
 
 def _one(

@@ -1,4 +1,4 @@
-"""A recording of raw output as the science sees it: times, outputs, conditions and, where it is known, the true force."""
+"""A recording of raw output as arrays: times, outputs, conditions and, where it is known, the true force."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Recording:
     time : (n,), s; output : (n, 3), output unit
     state : conditions of the samples; its force is zero
     known : (n, 3), g, the true force; NaN where it is not known
-    name : of the file, for messages
+    name : file name, for messages
     """
 
     time: Array
@@ -54,7 +54,7 @@ def read_recording(path: Path, columns: Sequence[str], *, time: str = "", rate_h
     Raises
     ------
     DataRejected
-        A column is missing, a value is not finite, or the time does not run forward.
+        A column is missing, a value is not finite, or the time does not always increase.
     """
     table, _ = files.read(path)
     table = table.set_axis([str(name) for name in table.columns], axis=1)
@@ -72,8 +72,8 @@ def read_recording(path: Path, columns: Sequence[str], *, time: str = "", rate_h
     moments = np.arange(n) / rate_hz if rate_hz is not None else _finite(table, time or TIME, where)
     if n < 2 or not np.all(np.diff(moments) > 0.0):
         raise DataRejected(
-            f"{where}: {n} samples whose time does not always run forward, two or more in order are needed; sort the "
-            "file, or cut it where its clock begins anew"
+            f"{where}: {n} samples whose time does not always increase, two or more in order are needed; sort the "
+            "file, or cut it where its clock restarts"
         )
     known = np.full((n, 3), np.nan)
     if set(FORCE_COLUMNS) <= set(there):

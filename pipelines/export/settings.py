@@ -1,4 +1,4 @@
-"""What an export depends on besides the calibration: the receiver's conventions, which no calibration run knows."""
+"""Settings of an export that a calibration run does not contain: conventions of the receiver."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
     Raises
     ------
     WrongUse
-        A number is not one, a unit is not exported or two units have one identification.
+        An identification is not a number, a unit is not exported, or two units have the same identification.
     """
     if not text.strip():
         return {}
@@ -83,8 +83,8 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
         found[unit] = _number(number.strip() if equals else part)
     if len(set(found.values())) < len(found):
         raise WrongUse(
-            f"--device-id: found '{shown(text)}', a different number for each unit is needed; an autopilot tells sensors "
-            "apart by it; correct it"
+            f"--device-id: found '{shown(text)}', a different number for each unit is needed; an autopilot "
+            "identifies its sensors by it; correct it"
         )
     return found
 
@@ -96,7 +96,7 @@ def _number(text: str) -> int:
         number = 0
     if not 0 < number <= HIGHEST_ID:
         raise WrongUse(
-            f"--device-id: found '{shown(text)}', a whole number from 1 to {HIGHEST_ID} is needed, such as the autopilot's "
-            "parameter of the sensor shows it; correct it"
+            f"--device-id: found '{shown(text)}', a whole number from 1 to {HIGHEST_ID} is needed, as in the "
+            "autopilot's parameter of the sensor; correct it"
         )
     return number

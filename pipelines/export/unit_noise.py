@@ -59,7 +59,7 @@ def noise_of_units(run: Run) -> dict[str, UnitNoise]:
 
 
 def required_noise(noise: UnitNoise | None, unit: str, run: str, form: str) -> UnitNoise:
-    """The noise of a unit, refused where it is not known."""
+    """The noise of a unit; refused where the run does not state it."""
     if noise is None or not all(np.all(np.isfinite(noise.value[s])) for s in ("N", "K")):
         raise WrongUse(
             f"export: run {run} has no noise terms of unit {unit}, format {form} needs them; run a recipe with static_record_s "

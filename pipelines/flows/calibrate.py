@@ -95,7 +95,7 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
     *,
     prompts: bool = False,
 ) -> str | State[Any]:
-    """Measure and calibrate a lot; return the id of its run in the archive, or the state of a run that came too late.
+    """Measure and calibrate a lot; return the id of its run in the archive, or the state of a run that starts too late.
 
     Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With
     ``prompts`` the flow run pauses for the operator: to load, to correct a fault, to unload. ``archive`` has no
@@ -133,7 +133,7 @@ def requested(
 
 
 def late_start() -> str:
-    """Why a run of a schedule may not start any more; empty where it may.
+    """Reason why a scheduled run may no longer start; empty where it may.
 
     The worker cancels such runs (:mod:`pipelines.flows.queue_rules`). One that started in between, for instance when a suspended
     computer resumed, ends here, before anything moves.

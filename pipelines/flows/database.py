@@ -1,4 +1,4 @@
-"""A copy of the orchestrator's database while its server runs, and the way back: SQLite, or PostgreSQL with its own programs."""
+"""Copy and restoration of the orchestrator's database: SQLite while its server runs, or PostgreSQL with its own programs."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def restore_database(copy: Path, target: str) -> None:
         The copy or a needed program is missing, it is no sound database, or the server still uses the database.
     """
     if not copy.is_file():
-        raise WrongUse(f"restore: {copy} is not there, a copy of the database is needed; name one")
+        raise WrongUse(f"restore: {copy} is not there, a copy of the database is needed; name it with --database")
     if target.startswith(POSTGRES):
         options = ["--clean", "--if-exists", "--no-owner", "--single-transaction", "--exit-on-error"]
         _run(["pg_restore", *options, *_address(target), str(copy)], target)
@@ -92,9 +92,7 @@ def restore_database(copy: Path, target: str) -> None:
 def _copy_sqlite(source: Path, target: Path) -> None:
     """Copy with SQLite's own backup, which includes what lies in the write-ahead log."""
     if not source.is_file():
-        raise WrongUse(
-            f"backup: {source} is not there, the database of a server is needed; name it with --orchestrator"
-        )
+        raise WrongUse(f"backup: {source} is not there, the database of a server is needed; set PREFECT_HOME")
     try:
         with (
             closing(sqlite3.connect(f"file:{source}?mode=ro", uri=True)) as before,
@@ -115,7 +113,7 @@ def _refuse_unsound(path: Path) -> None:
     except sqlite3.Error as problem:
         state = str(problem)
     if state != "ok":
-        raise WrongUse(f"backup: {path} is no sound database ({state}), a whole one is needed; use another copy")
+        raise WrongUse(f"backup: {path} is no sound database ({state}), an intact one is needed; use another copy")
 
 
 def _address(url: str) -> list[str]:

@@ -1,7 +1,7 @@
-"""Runs without a heartbeat are closed as crashed by the server, where no process beside the station is left to do so.
+"""The server closes runs without a heartbeat as crashed, where no process at the station can do so.
 
-A flow sends a heartbeat every ``HEARTBEAT_S`` (the least that Prefect allows). An automation of the server marks a run as crashed
-that has sent none for ``SILENCE_S`` and has reached no final state: its computer has no power, or its network is down.
+A flow sends a heartbeat every ``HEARTBEAT_S`` (the shortest period that Prefect allows). An automation of the server marks a run
+as crashed that has sent none for ``SILENCE_S`` and has no final state: its computer has no power, or its network is down.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def have_automation() -> None:
 
 
 def keep(automation: AutomationCore) -> None:
-    """Make an automation, or renew the one of its name; others of the name are removed."""
+    """Make an automation, or update the existing one of the same name; further ones of the name are removed."""
     with get_client(sync_client=True) as client:
         same = [found.id for found in client.read_automations_by_name(automation.name)]
         if not same:

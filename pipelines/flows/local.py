@@ -87,7 +87,7 @@ def reached(archive: Archive, meanwhile: Callable[[], None] = lambda: None) -> G
 
 @contextmanager
 def own_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
-    """A block in which this process is a client of a server of our own; nothing of it is left afterwards."""
+    """A block in which this process is a client of a server of our own; the environment is restored afterwards."""
     with local_server(home, meanwhile) as found, with_environment(found):
         from prefect.settings import temporary_settings
 
@@ -106,7 +106,7 @@ def reach_named() -> None:
 
 
 def _home(archive: Archive) -> Path:
-    """Where the server of an archive keeps what it needs: in its folder, or with the user where that is an object store."""
+    """Folder of the server of an archive: in the archive, or in the user's cache where the archive is an object store."""
     if isinstance(archive.root, Path):
         return archive.root.resolve() / "orchestrator"
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -138,7 +138,7 @@ def _run(
 
 @contextmanager
 def local_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[dict[str, str], None, None]:
-    """The environment of a server that runs for as long as this block, shared with others who want it."""
+    """The environment of a server that runs at least as long as this block; several processes can share it."""
     _refuse_foreign(home)
     private_folder(home)
     private_folder(home / CLIENTS)
@@ -155,7 +155,7 @@ def local_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Ge
 
 
 def environment_of(archive: Archive) -> dict[str, str]:
-    """The environment of the server that runs beside an archive; nothing where none does."""
+    """The environment of the server that runs beside an archive; empty where none runs."""
     home = _home(archive)
     found = _running(home)
     return settings(home, *found) if found else {}
@@ -165,7 +165,7 @@ def _refuse_foreign(home: Path) -> None:
     """Refuse the folder of another user's server: its key is that user's alone."""
     if home.exists() and os.getuid() not in {home.stat().st_uid, 0}:
         raise ArchiveUnusable(
-            f"orchestrator: {home} belongs to another user (id {home.stat().st_uid}), whose server nobody else may use; name an "
+            f"orchestrator: {home} belongs to another user (id {home.stat().st_uid}), whose server is private; name an "
             "orchestrator of the line in PREFECT_API_URL, or run with --direct"
         )
 
@@ -203,7 +203,7 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
     while not _answers(port):
         if process.poll() is not None or time.monotonic() > end:
             raise StationTimeout(
-                f"orchestrator: its server does not answer after {STARTUP_S} s (status {process.poll()}); look into "
+                f"orchestrator: its server does not answer after {STARTUP_S} s (status {process.poll()}); read "
                 f"{home / 'server.log'}, or run with --direct"
             )
         time.sleep(POLL_S)
@@ -213,7 +213,7 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
 
 
 def _private_file(path: Path, how: int) -> int:
-    """A file opened for writing that nobody else may read."""
+    """A file opened for writing that only this user may read."""
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | how, PRIVATE)
     os.fchmod(handle, PRIVATE)  # one of an older version is there with another mode
     return handle

@@ -6,7 +6,7 @@
       busy: wait             # or skip: a scheduled run is cancelled while another run has the station
       latest_start_min: 15   # a scheduled run that could not start until then is missed
       missed: cancel         # or latest: of the missed runs of a deployment the newest is run once
-      crashed: close         # or continue: a run whose process died goes on from its checkpoint
+      crashed: close         # or continue: a run whose process died continues from its checkpoint
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TAG = re.compile(r"(busy|latest_start_min|missed|crashed)=(\w+)")
 
 @dataclass(frozen=True)
 class Policy:
-    """Policy of a deployment; the defaults are those of a station that nobody watches."""
+    """Policy of a deployment; the defaults are for a station without an operator."""
 
     busy: Busy = "wait"
     latest_start_min: int = 15

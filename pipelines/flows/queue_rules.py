@@ -32,7 +32,7 @@ GRACE = timedelta(seconds=5)
 
 ATTEMPTS = 3
 CONTINUED_WITHIN = timedelta(hours=2)
-"""A crash that lies further back is left to a person: the lot may have been unloaded."""
+"""A run that crashed earlier is not continued automatically: the lot may have been unloaded."""
 
 MISSED = "missed: its start was at {when}, and it could not start within {limit:.0f} min; policy missed={missed}"
 SKIPPED = "skipped: at {when} the station was busy with run {other}; policy busy=skip"
@@ -40,7 +40,7 @@ CONTINUED = "continues from its checkpoint after a crash, attempt {attempt} of {
 
 
 SETTLED = timedelta(seconds=30)
-"""Until then the worker of Prefect may hold the place of a crashed run; it ends if the same run is given to it meanwhile."""
+"""Time after a crash in which the worker of Prefect may still hold the run's slot; it exits if it receives the run again."""
 
 
 def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: timedelta = SETTLED) -> list[str]:
@@ -79,7 +79,7 @@ def _repeat(pool: str, queues: Sequence[str], ended: threading.Event) -> None:
                 for text in apply_rules(pool, queue):
                     tell(f"{queue}: {text}", event="rule_applied", queue=queue)
             if fault:
-                tell("orchestrator: it answers again, the rules of the queues are applied")
+                tell("orchestrator: the server answers again, the rules of the queues are applied")
             fault = ""
         except Exception as problem:  # noqa: BLE001 - without the server the worker waits; the rules wait with it
             if not fault:
@@ -89,7 +89,7 @@ def _repeat(pool: str, queues: Sequence[str], ended: threading.Event) -> None:
 
 
 def _cancel_missed(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
-    """Cancel scheduled runs that are later than their policy allows, but the newest of a deployment with ``missed=latest``."""
+    """Cancel scheduled runs that are later than their policy allows, except the newest where it says ``missed=latest``."""
     late: dict[object, list[FlowRun]] = defaultdict(list)
     for run in _due(client, pool, queue, now):
         if now - _start(run) > policy_of_tags(run.tags).latest_start:
@@ -142,7 +142,7 @@ def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: dat
 
 
 def _due(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[FlowRun]:
-    """Runs of a schedule that should have started and have not, in the order of their start; orders of persons never."""
+    """Runs of a schedule that should have started and have not, in the order of their start; none that a person started."""
     runs = runs_of_queue(client, pool, queue, (StateType.SCHEDULED,))
     return [run for run in runs if run.auto_scheduled and run.run_count == 0 and _start(run) <= now]
 

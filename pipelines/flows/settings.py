@@ -64,7 +64,7 @@ def closed(key: str, allowed: Sequence[str]) -> dict[str, str]:
 
 
 def kept() -> dict[str, str]:
-    """Environment of the server of a line: how long its history is kept, and what a restart must not lose.
+    """Environment of the server of a line: retention of its history, and settings that must survive a restart.
 
     The history is not needed for traceability, which is in the archive. Events are by far the largest part of it.
     """

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FEWEST_FITTED = 12
-"""Dwells of a unit that are left for the fit at the least; what a model needs beyond that its fit says itself."""
+"""Smallest number of dwells of a unit for the fit; the fit of a model with more coefficients states a larger one."""
 _SEED = 140
 
 

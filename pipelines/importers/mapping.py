@@ -131,8 +131,8 @@ class Mapping(BaseModel):
             raise ValueError(f"{', '.join(missing)} not mapped; x, y and z are needed")
         for name in value:
             if name in RESERVED and name not in KNOWN:
-                said = next((said for said, column in MEANINGS.items() if column == name), "")
-                hint = f"map it as '{said}'" if said else "choose another name for the covariate"
+                meaning = next((meaning for meaning, column in MEANINGS.items() if column == name), "")
+                hint = f"map it as '{meaning}'" if meaning else "choose another name for the covariate"
                 raise ValueError(f"'{shown(name)}' is the name of a column that an import writes itself; {hint}")
             if not (name.isprintable() and 0 < len(name) <= LONGEST_NAME):
                 raise ValueError(

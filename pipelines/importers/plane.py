@@ -1,4 +1,4 @@
-"""A recording turned about one axis of the sensor: bias, scale and misalignment of the axes in the plane, and what stays open."""
+"""A recording turned about one axis of the sensor: bias, scale and misalignment of the axes in the plane."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _errors(dwells: pd.DataFrame, output: Array) -> Array:
 
 
 def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
-    """Whether the model describes the dwells, by harmonics of the angle beside it; None where they cannot tell."""
+    """Whether the model describes the dwells, by harmonics of the angle beside it; None where this cannot be judged."""
     if found.rms > GROSS:
         return (
             False,
@@ -134,7 +134,7 @@ def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
 
 
 def _opened(found: PlaneFit, *, known: bool) -> list[str]:
-    """What a turn about one axis does not show."""
+    """Quantities that a turn about one axis does not determine."""
     y = AXES[found.across]
     i, j = (AXES[k] for k in found.inside)
     parts = [

@@ -1,4 +1,4 @@
-"""What is stated of the references of an import, held against its mapping before anything is read."""
+"""The statement of the references of an import, compared with its mapping before anything is read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 GRAVITY_SIGMAS = 3.0
 
 
-def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
+def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     """The statement of a file; local gravity is taken from it into the mapping where that has none.
 
     Raises
@@ -22,11 +22,11 @@ def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
     RecipeInvalid
         A key is wrong, or gravity contradicts --local-g.
     WrongUse
-        The day of the measurement is not given: nobody could tell which references were due.
+        The day of the measurement is not given, which is needed to check whether references were due.
     """
     found = read_references(path)
     where = f"references {path.name}"
-    _refuse_day(str(wanted.get("measured", "")), where)
+    _refuse_day(str(content.get("measured", "")), where)
     gravity = found.uncertainty.gravity
     if gravity is None:
         raise RecipeInvalid(
@@ -34,7 +34,7 @@ def stated_references(path: Path, wanted: dict[str, Any]) -> ImportReferences:
             "state it as surveyed, or latitude_deg and height_m with source = 'formula'",
             key="uncertainty.gravity",
         )
-    given = wanted.setdefault("local_gravity_m_s2", gravity.value)
+    given = content.setdefault("local_gravity_m_s2", gravity.value)
     apart = float(given) / gravity.value - 1.0
     u = gravity.relative().u
     if abs(apart) > GRAVITY_SIGMAS * u:
@@ -54,7 +54,7 @@ def _refuse_day(day: str, where: str) -> None:
     try:
         parsed = date.fromisoformat(day)
     except ValueError:
-        return  # the mapping says what is wrong with it
+        return  # the check of the mapping reports it
     if parsed > datetime.now(tz=UTC).date():
         raise WrongUse(
             f"{where}: --measured {day} lies in the future, the day of the measurement is needed; correct it"

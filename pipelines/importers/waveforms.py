@@ -1,4 +1,4 @@
-"""Dynamic tests that were recorded elsewhere: waveforms of unit and reference, reduced and judged as those of a station are."""
+"""Import of dynamic tests: waveforms of unit and reference, reduced and judged in the same way as those of a station."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ UNEVEN = 0.01
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What the command states: columns by meaning, units by meaning, rate in Hz, group of channels (or two: units, reference)."""
+class RecordingLayout:
+    """Layout of the recordings: columns and units by meaning, rate in Hz, group of channels (or two: units, reference)."""
 
     columns: Mapping[str, str]
     units: Mapping[str, str]
@@ -50,7 +50,12 @@ class Asked:
 
 
 def import_waveforms(
-    paths: Sequence[Path], procedure: str, part: Path | None, unit: str, asked: Asked, archive: str | None = None
+    paths: Sequence[Path],
+    procedure: str,
+    part: Path | None,
+    unit: str,
+    layout: RecordingLayout,
+    archive: str | None = None,
 ) -> WaveformImport:
     """Figures and findings of a procedure from the recordings of one unit, one file a record; kept as a run of the archive.
 
@@ -71,7 +76,7 @@ def import_waveforms(
     records: list[ProcedureRecord] = []
     sources: list[files.SourceFile] = []
     for number, path in enumerate(paths):
-        unit_record, reference, text, source = _recording(path, asked, own, one)
+        unit_record, reference, text, source = _recording(path, layout, own, one)
         out_unit = out_unit or text
         if text != out_unit:
             raise DataRejected(f"{path.name}: output in {text}, {out_unit} in the files before; import them apart")
@@ -92,7 +97,7 @@ def import_waveforms(
     device = Device({}, {}, full_scale, out_unit)
     try:
         points = one.reduce(own, records, device)
-        mapped = [axis for axis in AXES if axis in asked.columns]
+        mapped = [axis for axis in AXES if axis in layout.columns]
         points = points[points["axis"].isin(mapped)].reset_index(drop=True)
         outcome = one.evaluate(own, points, device)
     except InertialError as problem:
@@ -142,48 +147,48 @@ def _part(procedure: str, path: Path | None) -> tuple[Any, dict[str, Any], float
 
 
 def _recording(
-    path: Path, asked: Asked, part: Any, procedure: Procedure
+    path: Path, layout: RecordingLayout, part: Any, procedure: Procedure
 ) -> tuple[UnitRecord, UnitRecord, str, files.SourceFile]:
     """The unit and the reference of one file, the unit of the output, and the source."""
-    first, _, second = (piece.strip() for piece in asked.group.partition(","))
+    first, _, second = (piece.strip() for piece in layout.group.partition(","))
     content, source = files.read_content(path, first)
     other = files.read_content(path, second)[0] if second else content
-    outputs = {axis: asked.columns[axis] for axis in AXES if axis in asked.columns}
-    if not outputs or "reference" not in asked.columns:
+    outputs = {axis: layout.columns[axis] for axis in AXES if axis in layout.columns}
+    if not outputs or "reference" not in layout.columns:
         there = ", ".join(shown(str(name)) for name in content.table.columns)
         raise WrongUse(
             f"import: reference and at least one of x, y, z are needed for {path.name} (its columns: {there}); add --map "
             "reference=…,z=…"
         )
-    text = _unit(content, asked, "output", next(iter(outputs.values())), path.name)
+    text = _unit(content, layout, "output", next(iter(outputs.values())), path.name)
     known = VOLT if procedure.reference_unit == "V" else ACCELERATION
-    reference_unit = _unit(other, asked, "reference", asked.columns["reference"], path.name)
+    reference_unit = _unit(other, layout, "reference", layout.columns["reference"], path.name)
     if reference_unit not in known:
         raise DataRejected(
             f"{path.name}: reference in '{shown(reference_unit)}', one of {', '.join(known)} is needed; state it with "
             "--units reference=…"
         )
-    time = _clock(content, asked, path.name)
+    time = _clock(content, layout, path.name)
     wide = np.zeros((len(time), 3))
     for axis, column in outputs.items():
         wide[:, AXES.index(axis)] = _values(content, column, path.name)
-    drive_time = _clock(other, asked, path.name)
+    drive_time = _clock(other, layout, path.name)
     drive = np.zeros((len(drive_time), 3))
     place = AXES.index(part.axis) if hasattr(part, "axis") else 0
-    drive[:, place] = known[reference_unit] * _values(other, asked.columns["reference"], path.name)
+    drive[:, place] = known[reference_unit] * _values(other, layout.columns["reference"], path.name)
     for k, axis in enumerate(AXES):
-        if f"reference_{axis}" in asked.columns:
-            drive[:, k] = known[reference_unit] * _values(other, asked.columns[f"reference_{axis}"], path.name)
+        if f"reference_{axis}" in layout.columns:
+            drive[:, k] = known[reference_unit] * _values(other, layout.columns[f"reference_{axis}"], path.name)
     return UnitRecord(time, wide), UnitRecord(drive_time, drive), text, source
 
 
-def _unit(content: Content, asked: Asked, meaning: str, column: str, where: str) -> str:
+def _unit(content: Content, layout: RecordingLayout, meaning: str, column: str, where: str) -> str:
     """Unit of a channel: as stated by the command, else by the file; one that neither states is refused."""
     stated = content.units.get(column, "") or unit_in(column)
-    given = asked.units.get(meaning, "")
+    given = layout.units.get(meaning, "")
     if not (given or stated):
         raise DataRejected(
-            f"{where}: column '{shown(column)}' has no unit, one is needed; add --units {meaning}=… as the sensor's sheet says"
+            f"{where}: column '{shown(column)}' has no unit, one is needed; add --units {meaning}=… from the sensor's data sheet"
         )
     if given and stated and given != stated:
         raise WrongUse(
@@ -192,17 +197,17 @@ def _unit(content: Content, asked: Asked, meaning: str, column: str, where: str)
     return given or stated
 
 
-def _clock(content: Content, asked: Asked, where: str) -> np.ndarray:
+def _clock(content: Content, layout: RecordingLayout, where: str) -> np.ndarray:
     """Times in s from 0: by a time column, the file's interval, or --rate; a file without any is refused."""
     n = len(content.table)
-    column = asked.columns.get("time") or next(
+    column = layout.columns.get("time") or next(
         (name for name in content.table.columns if name.partition("[")[0].strip().lower() in {"time", "x_value"}), ""
     )
     interval = content.interval_s
-    if asked.rate_hz:
-        interval = 1.0 / asked.rate_hz
+    if layout.rate_hz:
+        interval = 1.0 / layout.rate_hz
     elif interval is None and column:
-        unit = asked.units.get("time") or content.units.get(column, "") or unit_in(column)
+        unit = layout.units.get("time") or content.units.get(column, "") or unit_in(column)
         if unit not in TIMES:
             raise DataRejected(
                 f"{where}: column '{shown(column)}' has no unit of time, one of {', '.join(TIMES)} is needed; add --units time=…"

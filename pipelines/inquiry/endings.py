@@ -1,4 +1,4 @@
-"""Why an inquiry ends."""
+"""Reasons for the end of an inquiry."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_FOLLOW_UP: frozenset[End] = frozenset({"blocked", "not_judged"})
 
 @dataclass(frozen=True)
 class Ending:
-    """Why the inquiry ends."""
+    """Reason for the end of an inquiry."""
 
     end: End
     text: str
@@ -43,7 +43,7 @@ def ending_of(joint: JointDiagnosis) -> Ending | None:
 
 
 def _all_identified(document: dict[str, Any]) -> str:
-    """Every class has one effect; the ones that no dwells left out can judge are not recommended yet."""
+    """Every class has one effect; effects that cannot be judged by dwells left out are not recommended yet."""
     groups = document["classes"]
     text = f"every class contains one effect: {', '.join(g['effects'][0] for g in groups)}"
     unjudged = [g["effects"][0] for g in groups if g.get("scope") != "data" and g.get("heldout_after_ug", 0.0) is None]
@@ -53,7 +53,7 @@ def _all_identified(document: dict[str, Any]) -> str:
 
 
 def no_follow_up(joint: JointDiagnosis) -> str:
-    """Why there is no follow-up: no measurement of the station separates a class, or none is certain enough."""
+    """Reason for no follow-up: no measurement of the station separates a class, or none is certain enough."""
     if any(joint.following.twins):
         return f"no measurement on this station discriminates between {ambiguous_classes(joint)}"
     return (

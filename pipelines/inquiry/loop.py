@@ -38,7 +38,7 @@ class Approval(Protocol):
     """Approval of extra station time."""
 
     def __call__(self, inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
-        """``go`` measures the follow-up, ``stop`` declines it, ``nobody`` reports that nobody is available to approve it."""
+        """``go`` measures the follow-up, ``stop`` declines it, ``nobody`` reports that no person is available to approve it."""
         ...
 
 

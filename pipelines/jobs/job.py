@@ -89,7 +89,7 @@ class Job:
         content = {"recipe": measured, "lot": self.lot.model_dump(), "station": station, **after, **own}
         return digest(content)[:16]
 
-    @cached_property  # as they are when the job is made, also where somebody edits one during the run
+    @cached_property  # read when the job is made: later edits of a file do not change the run
     def own_files(self) -> dict[str, str]:
         """SHA-256 of the user's profiles and preset that the station and the lot name: they decide what is measured."""
         devices = self.station.devices

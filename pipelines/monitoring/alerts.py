@@ -1,7 +1,7 @@
 """Alerts to a web hook: runs that crashed, failed, were missed or are late, stations not left safe, findings of the audit.
 
-Each alert is posted until the receiver accepts it, and never again: its id is noted in the state folder, atomically and on disk,
-after it was accepted. A process that is killed in between posts an alert twice, with the same id.
+Each alert is posted until the receiver accepts it, and not after that: its id is then written to the state folder, atomically and
+synchronised to the disk. A process that is killed between these two steps posts the alert twice, with the same id.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from pipelines.monitoring.snapshot import Snapshot
 
 TIMEOUT_S = 10.0
-NOTED = "alerts.json"
-REMEMBERED = 5000
+ACCEPTED_FILE = "alerts.json"
+MOST_IDS = 5000
 AUDIT_AGE = timedelta(days=10)
-"""The findings of an older audit are not sent: they were, or nobody receives alerts of it."""
+"""Findings of an older audit are not posted."""
 
 KINDS = {"CRASHED": "crashed", "FAILED": "failed", "CANCELLED": "missed"}
 
 
 def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
-    """All alerts that the numbers and the newest audit give; the same ones as before among them.
+    """All alerts from the numbers and the newest audit, including those that were posted before.
 
     Parameters
     ----------
@@ -45,26 +45,26 @@ def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
 
 
 class Poster:
-    """Posts alerts that were not accepted yet.
+    """Posts the alerts that the receiver has not accepted yet.
 
     Parameters
     ----------
     address : of the web hook, http or https
-    folder : where the ids of accepted alerts are noted
+    folder : state folder, which holds the ids of accepted alerts
 
     Raises
     ------
     WrongUse
-        The address is of another kind.
+        The address begins with neither ``http://`` nor ``https://``.
     """
 
     def __init__(self, address: str, folder: Path) -> None:
         if not address.startswith(("http://", "https://")):
             raise WrongUse(f"alerts: web hook '{address}', an address such as https://host/path is needed; correct it")
-        self._address, self._place = address, folder / NOTED
+        self._address, self._place = address, folder / ACCEPTED_FILE
 
     def post(self, alerts: list[Alert]) -> tuple[int, str]:
-        """Number of alerts that were accepted now, and the first error; the rest is posted with the next call."""
+        """Number of alerts accepted in this call, and the first error; the next call posts the remaining alerts."""
         accepted = self._accepted()
         count = 0
         for alert in alerts:
@@ -77,7 +77,7 @@ class Poster:
                     problem.close()
                 return count, f"alerts: the web hook does not accept an alert ({problem}); it is posted again"
             accepted[alert["id"]] = time.time()
-            newest = sorted(accepted.items(), key=lambda item: item[1])[-REMEMBERED:]
+            newest = sorted(accepted.items(), key=lambda item: item[1])[-MOST_IDS:]
             publish(self._place, json_bytes(dict(newest)))
             count += 1
         return count, ""
@@ -120,7 +120,7 @@ def _of_stations(snapshot: Snapshot) -> Iterator[Alert]:
 
 
 def _of_audit(folder: Path, now: datetime) -> Iterator[Alert]:
-    """The findings of the newest document; a finding that stays is sent once."""
+    """Findings of the newest audit document; a finding that appears in several audits is posted once."""
     newest = max(folder.glob("audit-*.json"), key=lambda path: path.name, default=None)
     if newest is None or now - datetime.fromtimestamp(newest.stat().st_mtime, UTC) > AUDIT_AGE:
         return

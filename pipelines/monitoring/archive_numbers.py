@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from pipelines.archive.listing import RunInfo
 
 DUE_DAYS = (0, 30)
-"""A certificate counts as due when it ends within so many days."""
+"""Periods, days: a certificate is due where it ends within the period."""
 
-IMPORTED = "(import)"  # in place of the station of a run that measured nothing
+IMPORTED = "(import)"  # station label of an imported run
 
 
 class RunTime(NamedTuple):
-    """What a finished run took: time on the station's clock, s; pauses and their duration, s; repeated dwells; opened door."""
+    """A finished run: time on the station's clock, s; pauses and their duration, s; repeated dwells; door openings."""
 
     station_s: float = 0.0
     pauses: int = 0
@@ -54,11 +54,11 @@ class LineNumbers:
 
 @dataclass
 class ArchiveNumbers:
-    """Everything that the archive says.
+    """Numbers of an archive.
 
     lag_s : age of the oldest finished run that is not in the chain yet, s; 0 without one
     free_bytes : free space on its disk; None for an object store
-    due : number of units whose certificate ends within so many days, by these days
+    due : number of units whose certificate ends within a period, by the period in days
     """
 
     lines: dict[tuple[str, str], LineNumbers] = field(default_factory=dict[tuple[str, str], LineNumbers])
@@ -70,7 +70,7 @@ class ArchiveNumbers:
 
 
 class ArchiveReader:
-    """Reads the numbers of an archive again and again; a finished run is read once."""
+    """Reads the numbers of an archive repeatedly; each finished run is read only once."""
 
     def __init__(self, archive: Archive, window_d: int) -> None:
         self.archive, self.window_d = archive, window_d
@@ -105,19 +105,19 @@ class ArchiveReader:
         line.last = started if line.last is None else max(line.last, started)
         if info.id not in self._times:
             self._times[info.id] = self._time_of(info.id)
-        took = self._times[info.id]
-        line.station_s += took.station_s
-        line.pauses += took.pauses
-        line.paused_s += took.paused_s
-        line.repeated += took.repeated
-        line.door += took.door
+        times = self._times[info.id]
+        line.station_s += times.station_s
+        line.pauses += times.pauses
+        line.paused_s += times.paused_s
+        line.repeated += times.repeated
+        line.door += times.door
 
     def _time_of(self, run_id: str) -> RunTime:
         run = self.archive.run(run_id)
         try:
             dwells = run.table("dwells") if "dwells" in run.tables() else None
             found = interruptions(run)
-        except TumblelineError:  # 'tumbleline verify' says what is wrong with its files
+        except TumblelineError:  # 'tumbleline verify' reports the faults of its files
             return RunTime()
         station_s = float(dwells["time_s"].max()) if dwells is not None and len(dwells) else 0.0
         if found is None:
@@ -147,5 +147,5 @@ class ArchiveReader:
 
 
 def _day_after(days: int) -> str:
-    """The day so many days after today, by the calendar of certificates."""
+    """The date ``days`` after today, by the calendar of certificates."""
     return (datetime.fromisoformat(today()) + timedelta(days=days)).date().isoformat()

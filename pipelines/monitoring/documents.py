@@ -8,7 +8,7 @@ from typing_extensions import TypedDict
 
 
 class HealthDocument(TypedDict):
-    """``monitor --json``: whether the line needs a person; also the answer of ``/healthz``."""
+    """``monitor --json``: whether the line is healthy; also the answer of ``/healthz``."""
 
     ok: Annotated[bool, "no problem"]
     when: Annotated[str, "ISO date and time, UTC"]

@@ -21,7 +21,7 @@ LINE = ("station", "recipe")
 
 
 class _Collector:
-    """What Prometheus' library asks for the numbers."""
+    """Collector for the Prometheus client library."""
 
     def __init__(self, snapshot: Snapshot) -> None:
         self._snapshot = snapshot
@@ -51,8 +51,8 @@ def text(snapshot: Snapshot) -> bytes:
 
 
 def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFamily]:
-    yield _one("window_days", "Runs that started in the last days are counted", float(window_d))
-    runs = _family("runs", "Runs that measured", (*LINE, "state"))
+    yield _one("window_days", "Number of days whose runs are counted", float(window_d))
+    runs = _family("runs", "Measurement runs", (*LINE, "state"))
     units = _family("units", "Graded units", (*LINE, "outcome"))
     share = _family("yield_ratio", "Share of the graded units that passed", LINE)
     last = _family("last_run_timestamp_seconds", "Start of the newest finished run", LINE)
@@ -61,7 +61,7 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
         "pauses": _family("pauses", "Pauses for a condition of the station", LINE),
         "paused_seconds": _family("paused_seconds", "Duration of the pauses", LINE),
         "repeated_dwells": _family("repeated_dwells", "Dwells that were discarded and measured again", LINE),
-        "door_openings": _family("door_openings", "Openings of the door of the chamber in a run", LINE),
+        "door_openings": _family("door_openings", "Openings of the chamber door during runs", LINE),
     }
     for key, line in sorted(numbers.lines.items()):
         runs.add_metric([*key, "finished"], line.finished)
@@ -80,8 +80,8 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
     yield _one("archive_lag_seconds", "Age of the oldest finished run that is not in the hash chain", numbers.lag_s)
     if numbers.free_bytes is not None:
         yield _one("archive_free_bytes", "Free space on the disk of the archive", float(numbers.free_bytes))
-    yield _one("units_certified", "Units that have had a certificate", float(numbers.certified))
-    due = _family("units_due", "Units whose last certificate ends within so many days", ("within_days",))
+    yield _one("units_certified", "Units with at least one certificate, valid or not", float(numbers.certified))
+    due = _family("units_due", "Units whose last certificate ends within the stated days", ("within_days",))
     for within, count in numbers.due.items():
         due.add_metric([str(within)], count)
     yield due
@@ -90,7 +90,7 @@ def _archive(numbers: ArchiveNumbers, window_d: int) -> Iterator[GaugeMetricFami
 def _queues(numbers: QueueNumbers, now: datetime) -> Iterator[GaugeMetricFamily]:
     runs = _family("queue_runs", "Flow runs that are due, running or paused", ("queue", "state"))
     late = _family("queue_late_seconds", "Time since the oldest late run of a free queue was due", ("queue",))
-    paused = _family("queue_paused", "1 where the queue gives out no runs", ("queue",))
+    paused = _family("queue_paused", "1 where the queue is paused", ("queue",))
     ended = _family(
         "queue_ended_runs", "Flow runs of the last day that crashed, failed or were missed", ("queue", "state")
     )

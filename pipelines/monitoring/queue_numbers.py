@@ -1,4 +1,4 @@
-"""Numbers of the orchestrator: runs in the queues, late and recently crashed runs, workers. Over its HTTP interface alone."""
+"""Numbers of the orchestrator, read over its HTTP interface: runs in the queues, late and recently crashed runs, workers."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from schemas.errors import LinkLost
 
 ADDRESS = "PREFECT_API_URL"
 TIMEOUT_S = 10.0
-MANY = 200  # largest page of the server
+PAGE_SIZE = 200  # largest that the server allows
 OPEN = ("SCHEDULED", "PENDING", "RUNNING", "PAUSED", "CANCELLING")
 FAILED = ("CRASHED", "FAILED")
 MISSED = ("missed:", "skipped:")  # beginnings of the messages of pipelines.flows.queue_rules
 LATE = timedelta(minutes=5)
-"""A run that is due for longer counts as late; a worker asks for work every ten seconds."""
+"""A run that has been due for longer is late; a worker requests work every ten seconds."""
 
 RECENT = timedelta(days=1)
 
 
 @dataclass(frozen=True)
 class OpenRun:
-    """A flow run; ``since`` is the time of its start where it began or ended, else the time at which it is due."""
+    """A flow run; ``since`` is its start time, or the time at which it is due where it has not started."""
 
     id: str
     name: str
@@ -41,7 +41,7 @@ class OpenRun:
 
 @dataclass
 class QueueNumbers:
-    """Everything that the orchestrator says.
+    """Numbers of the orchestrator.
 
     open : due, running and paused runs · ended : runs of the last day that crashed, failed, or were missed
     queues : names, and whether each is paused · workers : names, and whether each is online
@@ -53,14 +53,14 @@ class QueueNumbers:
     workers: dict[str, bool] = field(default_factory=dict[str, bool])
 
     def late(self, now: datetime) -> list[OpenRun]:
-        """Runs that are due for longer than five minutes while nothing else of their queue runs."""
+        """Runs that have been due for more than five minutes while no other run of their queue is active."""
         busy = {run.queue for run in self.open if run.state in {"PENDING", "RUNNING", "PAUSED"}}
         due = [run for run in self.open if run.state == "SCHEDULED" and now - run.since > LATE]
         return [run for run in due if run.queue not in busy]
 
 
 def configured() -> bool:
-    """Whether this process knows an orchestrator."""
+    """Whether PREFECT_API_URL names an orchestrator."""
     return bool(os.environ.get(ADDRESS))
 
 
@@ -82,17 +82,17 @@ def read_queues(now: datetime | None = None) -> QueueNumbers:
     numbers = QueueNumbers(open=[_run(one) for one in _runs(due)])
     ended = [_run(one) for one in (*_runs(failed), *_runs(cancelled))]
     numbers.ended = [run for run in ended if run.state in FAILED or run.message.startswith(MISSED)]
-    for pool in _ask("work_pools/filter", {"limit": MANY}):
+    for pool in _ask("work_pools/filter", {"limit": PAGE_SIZE}):
         name = pool["name"]
-        for queue in _ask(f"work_pools/{name}/queues/filter", {"limit": MANY}):
+        for queue in _ask(f"work_pools/{name}/queues/filter", {"limit": PAGE_SIZE}):
             numbers.queues[queue["name"]] = bool(queue["is_paused"])
-        for worker in _ask(f"work_pools/{name}/workers/filter", {"limit": MANY}):
+        for worker in _ask(f"work_pools/{name}/workers/filter", {"limit": PAGE_SIZE}):
             numbers.workers[worker["name"]] = worker["status"] == "ONLINE"
     return numbers
 
 
-def _runs(wanted: dict[str, Any]) -> list[dict[str, Any]]:
-    return _ask("flow_runs/filter", {"flow_runs": wanted, "sort": "EXPECTED_START_TIME_DESC", "limit": MANY})
+def _runs(criteria: dict[str, Any]) -> list[dict[str, Any]]:
+    return _ask("flow_runs/filter", {"flow_runs": criteria, "sort": "EXPECTED_START_TIME_DESC", "limit": PAGE_SIZE})
 
 
 def _run(content: dict[str, Any]) -> OpenRun:

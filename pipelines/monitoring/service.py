@@ -29,7 +29,7 @@ UNHEALTHY = 503
 
 
 def application(monitor: Monitor) -> Starlette:
-    """The application; its numbers hold no serial number, and nothing can be changed through it."""
+    """The application; its numbers contain no serial number, and no request changes anything."""
 
     def metrics(request: Request) -> Response:
         del request
@@ -57,7 +57,7 @@ def alerting(monitor: Monitor, poster: Poster, audits: Path | None, every_s: flo
         while True:
             try:
                 count, fault = poster.post(alerts_of(monitor.snapshot(), audits))
-            except OSError as problem:  # the note could not be written: the alert is posted again
+            except OSError as problem:  # the id could not be written: the alert is posted again
                 count, fault = 0, f"alerts: {problem}"
             if count:
                 tell(f"alerts: {count} posted", event="alerts_posted", count=count)

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from pipelines.monitoring.documents import HealthDocument
 
 KEEP_S = 10.0
-"""A snapshot is used again for so long: several scrapers cost one reading."""
+"""Time for which a snapshot is reused, s: several scrapers cause one reading."""
 
 LAG_S = 3600.0
-"""A finished run that is not in the chain for longer is a fault; its writer was killed, or still works."""
+"""Longest time, s, between the start of a finished run and its entry in the hash chain; a killed writer leaves it out."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Snapshot:
 
     @property
     def problems(self) -> list[str]:
-        """What a person has to look after; empty where the line is healthy."""
+        """Problems that need a person; empty where the line is healthy."""
         out = [f"{source}: {fault}" for source, fault in self.faults.items() if fault]
         if self.archive is not None:
             out += self._of_archive(self.archive)
@@ -69,7 +69,7 @@ class Snapshot:
         out: list[str] = []
         if numbers.free_bytes is not None and numbers.free_bytes < self.least_free_bytes:
             found, needed = numbers.free_bytes / 1e9, self.least_free_bytes / 1e9
-            out.append(f"archive: {found:.1f} GB are free, at least {needed:g} GB are needed; make room on its disk")
+            out.append(f"archive: {found:.1f} GB are free, at least {needed:g} GB are needed; free space on its disk")
         if numbers.lag_s > LAG_S:
             text = f"archive: {numbers.unsealed} finished runs are not in the hash chain, the oldest for"
             out.append(f"{text} {numbers.lag_s / 3600.0:.1f} h; run 'tumbleline archive clean'")
@@ -96,7 +96,7 @@ class Monitor:
 
     Parameters
     ----------
-    window_d : runs of the last days are counted
+    window_d : number of days whose runs are counted
     free_gb : free space that the archive needs, GB
     expected : queues that must have a worker online
     """
@@ -114,9 +114,9 @@ class Monitor:
         with self._lock:
             if self._last is not None and time.monotonic() - self._last[0] < KEEP_S:
                 return self._last[1]
-            taken = self._take()
-            self._last = (time.monotonic(), taken)
-            return taken
+            snapshot = self._take()
+            self._last = (time.monotonic(), snapshot)
+            return snapshot
 
     def _take(self) -> Snapshot:
         faults: dict[str, str] = {}

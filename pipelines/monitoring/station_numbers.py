@@ -1,4 +1,4 @@
-"""Numbers of the stations of this computer: who drives them, which was not left safe, and what their watchdogs did."""
+"""Numbers of the stations of this computer: those that a run drives, those not left safe, and events of their watchdogs."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 @dataclass
 class StationNumbers:
-    """Everything that the state folder says.
+    """Numbers from the state folder.
 
-    driven : stations with a live run · unsafe : stations that nobody drives and nobody reported safe, with the last run
+    driven : stations with a live run · unsafe : stations without a live run and not reported safe, with the last run
     events : number of events in the log, by station and event
     """
 

@@ -239,7 +239,7 @@ def diagnosis_text(part: CentrifugePart, found: SpinDiagnosis) -> list[tuple[str
     for one in found.classes:
         name = one.effects[0]
         value, error = found.extended.of(name)
-        rivals = f"; the points do not tell it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
+        rivals = f"; the points do not separate it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
         size = f"{value:.4g} ± {2.0 * error:.2g} {EFFECTS[name].unit} (k = 2)"
         out.append(("missing effect", f"{name}: {size}, p = {one.p_value:.2g}{rivals}"))
     if found.classes:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-DRAWN = 400  # points of a waveform that are kept for the picture
+DRAWN = 400  # points of a waveform in the picture
 PER_PULSE = 40  # samples of the compared waveforms in a duration of the pulse
 MOST_SAMPLES = 10_000  # of a compared waveform: they number its points
 LEAD, TAIL = 1.5, 6.0  # durations before and after the pulse that are compared
@@ -94,7 +94,7 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
     out = [("comparison of the waveforms", text)]
     for one in found.classes:
         best, *others = one.effects
-        rivals = f"; the shocks do not tell it from {', '.join(others)}" if others else ""
+        rivals = f"; the shocks do not separate it from {', '.join(others)}" if others else ""
         out.append(("missing effect", f"{best}: {_size(found, best, settings)}, p = {one.p_value:.2g}{rivals}"))
     if found.classes:
         text = (

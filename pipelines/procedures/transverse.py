@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from schemas.station import StationConfig
 
 FEWEST_ANGLES = 8
-SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise for the clock
+SILENT = 8.0  # standard uncertainties by which a tone must exceed the noise to give the clock
 FIGURE = "transverse_sensitivity_percent"
 
 
@@ -184,7 +184,7 @@ def fitted(rows: pd.DataFrame) -> Transverse:
 def _tones(
     part: TransversePart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Tones (3,) of the reference and of the unit in g, their standard uncertainties (3,), and whether the unit answers.
+    """Tones (3,) of the reference and of the unit in g, their standard uncertainties (3,), and whether the unit responds.
 
     The frequency on the clock of the device is that of its strongest channel.
     """
@@ -247,7 +247,7 @@ def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
     axis = AXES.index(part.axis)
     first, second = AXES[(axis + 1) % 3], AXES[(axis + 2) % 3]
     if found.direction_error_deg >= 180.0:
-        text = "the transverse sensitivity does not stand out of its uncertainty; raise level_g, or record longer"
+        text = "the transverse sensitivity is not significant against its uncertainty; raise level_g, or record longer"
         out = [("direction not determined", text)]
     else:
         text = (

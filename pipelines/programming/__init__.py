@@ -1,1 +1,1 @@
-"""Writing of coefficients into the memory of devices, and the proof that they are there."""
+"""Writing of coefficients into the memory of devices, and their verification there."""

@@ -33,12 +33,12 @@ class InPose:
 
 
 def require_moved(one: Outcome, plain: Array, moved: Array, tolerance_ug: float) -> None:
-    """The output has moved by what the offset registers add."""
+    """Refuses a device whose output did not change by the value of its offset registers."""
     if one.block is None:
         return
     scale = float(np.mean(np.diag(one.unit.response[0])))
-    wanted = one.step_counts * np.array(one.block.offsets) / scale
-    off = float(np.max(np.abs((moved - plain) / scale - wanted))) * MICRO
+    expected = one.step_counts * np.array(one.block.offsets) / scale
+    off = float(np.max(np.abs((moved - plain) / scale - expected))) * MICRO
     if not off <= tolerance_ug:
         raise StationRefused(
             f"{one.memory.name}: the output moved by {off:.0f} µg more or less than the offset registers add, "
@@ -47,7 +47,7 @@ def require_moved(one: Outcome, plain: Array, moved: Array, tolerance_ug: float)
 
 
 def require_in_pose(one: Outcome, at: InPose, tolerance_ug: float) -> None:
-    """What the device holds, applied to its output, gives the force, and what the archive's coefficients give."""
+    """Refuses coefficients in the device that do not give the force, or do not agree with those of the archive."""
     pose, force, output, temperature = at.pose, at.force, at.output, at.temperature
     held = unpack(one.memory.read(one.copy))
     if held is None:
@@ -56,7 +56,7 @@ def require_in_pose(one: Outcome, at: InPose, tolerance_ug: float) -> None:
     if not low - TEMPERATURE_SLACK_K <= temperature <= high + TEMPERATURE_SLACK_K:
         raise StationRefused(
             f"{one.memory.name}: {temperature:.1f} °C, {low:.1f} to {high:.1f} °C is needed to verify the coefficients; "
-            "bring the chamber there, and give the command again"
+            "bring the chamber to such a temperature, and repeat the command"
         )
     found = held.correct(output[None], temperature)[0]
     archived = one.unit.correct((output - one.step_counts * np.array(held.offsets))[None], temperature)[0]
@@ -69,8 +69,8 @@ def require_in_pose(one: Outcome, at: InPose, tolerance_ug: float) -> None:
     })  # fmt: skip
     if not float(np.max(np.abs(error))) <= tolerance_ug:
         raise StationRefused(
-            f"{one.memory.name}: pose {pose} is corrected to {error[0]:.0f}, {error[1]:.0f}, {error[2]:.0f} µg from its "
-            f"force, {tolerance_ug:g} µg is allowed; measure the unit again"
+            f"{one.memory.name}: pose {pose}: the corrected output is {error[0]:.0f}, {error[1]:.0f}, {error[2]:.0f} µg from "
+            f"the force, {tolerance_ug:g} µg is allowed; measure the unit again"
         )
     if not apart <= RESOLUTION_UG:
         raise StationRefused(
@@ -80,7 +80,7 @@ def require_in_pose(one: Outcome, at: InPose, tolerance_ug: float) -> None:
 
 
 def write_offsets_again(one: Outcome) -> None:
-    """Volatile registers have lost their value; they are written again, as a host does at every start."""
+    """Writes the offset registers again, which lose their value without power, as a host does at every start."""
     if one.block is None:
         return
     if any(one.memory.offsets()):

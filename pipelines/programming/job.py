@@ -1,4 +1,4 @@
-"""The programming of a run: which units, on which station, what their certificates become."""
+"""The programming of the units of a run: choice of units and station, and their certificates."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
     slots = {unit["serial"]: int(unit["slot"]) for unit in run.about["lot"]["units"]}
     found = unit_calibrations(run, tuple(serials), failed=False, revoked=True)
     allowed = [unit for unit in found if not _revoked(unit)]
-    gone = [unit for unit in found if _revoked(unit)]
-    if gone and (serials or not allowed):
+    revoked = [unit for unit in found if _revoked(unit)]
+    if revoked and (serials or not allowed):
         raise WrongUse(
-            f"program: unit {gone[0].unit}: {gone[0].certified}, a calibration that was not revoked is needed; measure it again"
+            f"program: unit {revoked[0].unit}: {revoked[0].certified}, a valid calibration is needed; measure the unit again"
         )
     return [(slots[unit.unit], unit) for unit in allowed]
 
@@ -66,10 +66,10 @@ def program_run(
     choice: Choice,
     report: Callable[[str], None],
 ) -> tuple[list[Outcome], dict[str, str]]:
-    """What became of each unit, and the certificates that were given again, by serial.
+    """The outcome of each unit, and the renewed certificates by serial.
 
     The certificate of a unit ends before the first write to its device. A unit that was certified with these coefficients is
-    certified again, to the same day, when its memory is proved.
+    certified again, to the same day, when its memory is verified.
     """
     root, ledger, day = run.archive.root, Ledger(run.archive.root), today()
     serials = [unit.unit for _, unit in units]
@@ -100,20 +100,20 @@ def program_run(
 
 
 def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None:
-    """The calibration of this run that a unit has today, or had until a writing that was not completed."""
+    """The calibration of this run that a unit has today, or had until a programming that was not completed."""
     own = [one for one in ledger.calibrations(serial) if one.run == run and one.stated_until > day >= one.start]
     found = [one for one in own if one.holds(day) or (one.ended_by is not None and one.ended_by.reason == REASON)]
     return found[-1] if found else None
 
 
 def _ends(ledger: Ledger, serial: str, day: str) -> bool:
-    """Whether a unit has a certificate that the writing ends."""
+    """Whether a unit has a certificate that the programming ends."""
     return any(one.until > day and one.start < one.until for one in ledger.calibrations(serial))
 
 
 @contextmanager
 def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[], None]]]:
-    """The station, and what keeps the state of a simulated one, which goes on where the run or the last writing left it."""
+    """The station, and a function that saves the state of a simulated one, from which the next programming continues."""
     lot = Lot.model_validate(run.about["lot"])
     root = run.archive.root
     place = root / TOP / "station" / f"{run.about['capture']}.bin"

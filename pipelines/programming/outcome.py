@@ -1,4 +1,4 @@
-"""What is written into devices, and what became of each unit."""
+"""Options of the programming, and the outcome of each unit."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Choice:
-    """What is written.
+    """Options of the programming.
 
     form : of the coefficients; with_offsets : also the offset registers of an ADXL355
-    tolerance_ug : largest error of an axis in the two poses; it finds wrong coefficients and is no statement of accuracy
+    tolerance_ug : largest error of an axis in the two poses; it detects wrong coefficients and is not a statement of accuracy
     date : yyyymmdd
     """
 
@@ -29,7 +29,7 @@ class Choice:
 
 @dataclass
 class Outcome:
-    """What became of a unit: ``proved``, or ``failed`` at a step for a reason."""
+    """Outcome of a unit: ``proved``, or ``failed`` at a step for a reason."""
 
     serial: str
     slot: int
@@ -47,7 +47,7 @@ class Outcome:
 
     @property
     def open(self) -> bool:
-        """Whether nothing has failed and nothing is proved yet."""
+        """Whether the unit has neither failed nor been verified."""
         return self.outcome == "begun"
 
     def document(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""The writing of coefficients into devices: archive what was there, write, read back, power cycle, read back, verify.
+"""The writing of coefficients into devices: archive the memory, write, read back, power cycle, read back, verify.
 
-A step that fails leaves its unit not certified, and the copy that was valid before untouched: the older of the two copies is
-written, and its sequence number makes it count only when it is complete.
+A unit that fails a step is not certified, and its previously valid copy is unchanged: the older of the two copies is written, and
+a device uses it only when it is complete.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ LARGEST_STEP = 2**15 - 1
 
 @dataclass
 class Programmer:
-    """The writing of the devices of one run.
+    """The programming of the devices of one run.
 
-    run : its name; recipe : whose poses, dwell and gravity the verification uses
-    certificates : number behind the serial that the block names; 0 without one
-    before_first_write : ends the certificate of a unit, as its device is about to change
+    run : its id; recipe : gives poses, dwell time and gravity of the verification
+    certificates : number of the certificate in the block, by serial; 0 without one
+    before_first_write : ends the certificate of a unit before its device changes
     saved : called after every step, so that a simulated station can be continued
     """
 
@@ -59,22 +59,22 @@ class Programmer:
     saved: Callable[[], None]
 
     def program(self, units: Sequence[tuple[int, UnitCalibration]]) -> list[Outcome]:
-        """Writes units (slot, calibration) and gives what became of each.
+        """Writes units (slot, calibration); the outcome of each.
 
         Raises
         ------
         StationError, LeaseLost
-            The station fails for all; every unit that was begun is journalled as failed.
+            The station fails for all units; every unit whose programming has begun is recorded as failed.
         """
         outcomes = [
             Outcome(unit.unit, slot, unit, self.certificates.get(unit.unit, 0), self._memory(slot))
             for slot, unit in units
         ]
         self._check(outcomes)
-        step = "archive what was there"
+        step = "archive the memory"
         try:
             for step, act in (
-                ("archive what was there", self._archive), ("write", self._write), ("read back", self._read_back),
+                ("archive the memory", self._archive), ("write", self._write), ("read back", self._read_back),
             ):  # fmt: skip
                 self._each(outcomes, step, act)
             if any(one.open for one in outcomes):
@@ -99,7 +99,7 @@ class Programmer:
         return self.station.reader.slots[slot].memory(self.station.clock)
 
     def _check(self, outcomes: Sequence[Outcome]) -> None:
-        """Refuses, before anything is written, what cannot end in a proof."""
+        """Refuses, before anything is written, units and stations that cannot be verified."""
         reader = self.station.reader
         reader.require_switch()
         for pose in self._poses():
@@ -118,7 +118,7 @@ class Programmer:
             one.step_counts = one.memory.offset_step if self.choice.with_offsets else 0
             if self.choice.with_offsets and not one.step_counts:
                 raise WrongUse(
-                    f"program: unit {one.serial} has no offset registers, an ADXL355 has; leave --offset-registers out"
+                    f"program: unit {one.serial} has no offset registers, they are needed; leave --offset-registers out"
                 )
 
     def _each(self, outcomes: Sequence[Outcome], step: str, act: Callable[[Outcome], None]) -> None:
@@ -142,7 +142,7 @@ class Programmer:
         add(self.root, one.serial, "failed", {"run": self.run, "step": step, "reason": reason, **one.document()})
 
     def _archive(self, one: Outcome) -> None:
-        """Keeps what the memory holds, chooses the copy to write and journals the beginning."""
+        """Archives the content of the memory, chooses the copy to write, and records the beginning in the journal."""
         memory, status = one.memory, one.memory.wait()
         there = {copy: memory.read(copy) for copy in COPIES}
         valid = {copy: block for copy in COPIES if (block := unpack(there[copy])) is not None}
@@ -151,7 +151,7 @@ class Programmer:
         if status.erases[one.copy] >= status.endurance:
             raise StationRefused(
                 f"{memory.name}: copy {one.copy.upper()} has {status.erases[one.copy]} erasures, {status.endurance} are "
-                "specified; it is worn out: replace the device"
+                "specified; the memory is worn out: replace the device"
             )
         offsets = self._offsets(one)
         block = block_of(
@@ -186,7 +186,7 @@ class Programmer:
             one.memory.set_offsets(one.block.offsets)
 
     def _read_back(self, one: Outcome) -> None:
-        """Refuses where the copy is not, bit by bit, what was written."""
+        """Refuses a copy that differs from the written bytes."""
         found = one.memory.read(one.copy)[: len(one.content)]
         if found != one.content:
             place = next(i for i, (a, b) in enumerate(zip(found, one.content, strict=True)) if a != b)
@@ -207,13 +207,13 @@ class Programmer:
         clock.sleep(BOOT_S)
 
     def _after_power(self, one: Outcome) -> None:
-        """The copy is still there, and of the valid copies it is the one that counts."""
+        """Refuses a device whose new copy changed, or whose other copy has the larger sequence number."""
         self._read_back(one)
         valid = [(block.sequence, copy) for copy in COPIES if (block := unpack(one.memory.read(copy))) is not None]
         if max(valid)[1] != one.copy:
             raise StationRefused(
-                f"{one.memory.name}: copy {max(valid)[1].upper()} counts after the power cycle, copy {one.copy.upper()} is "
-                "needed; replace the device"
+                f"{one.memory.name}: copy {max(valid)[1].upper()} is the newest after the power cycle, copy "
+                f"{one.copy.upper()} is needed; replace the device"
             )
 
     def _poses(self) -> list[Any]:

@@ -1,4 +1,4 @@
-"""What the report of an import has beside its diagnosis: figures against their limits, certificates, and the budget."""
+"""Parts of the report of an import besides its diagnosis: figures against their limits, certificates, and the budget."""
 
 from __future__ import annotations
 

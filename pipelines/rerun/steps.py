@@ -74,7 +74,7 @@ class ArchivedJob(Job):
 
 
 def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
-    """What is to be done to a run, with another model or other limits where they are wanted.
+    """What is to be done to a run, with another model or other limits where they are given.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
 
 
 def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
-    """The job of a captured run, with another model or other limits where they are wanted."""
+    """The job of a captured run, with another model or other limits where they are given."""
     about = run.about
     try:
         recipe = Recipe.model_validate({**about["recipe"], **_dumped(change)})
@@ -176,10 +176,10 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     return Plan("import", tuple(steps), new, decisive)
 
 
-def _in_a_plane(run: Run, wanted: ModelChange, left_out: Dwells, across: int) -> Plan:
+def _in_a_plane(run: Run, change: ModelChange, left_out: Dwells, across: int) -> Plan:
     """The fit of a unit that was turned about one of its axes: its default model is of the two axes in the plane."""
     about, axis = run.about, AXES[across]
-    if wanted.limits is not None:
+    if change.limits is not None:
         raise WrongUse(
             f"run {run.id}: turned about {axis} alone, limits need the scale of {axis} too; measure other orientations, or fit "
             "without limits"

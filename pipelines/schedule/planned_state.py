@@ -114,7 +114,7 @@ def settled_state(force: Array, time: Array, temperature: Array, angles: Array, 
 
 
 def _recorded(columns: Iterable[str], count: int) -> dict[str, Array]:
-    """Recorded columns that nobody sets, each on its own way about its usual value."""
+    """Recorded columns that no command sets; each varies independently about its usual value."""
     rng = np.random.default_rng(1)
     known = {
         column: BY_COLUMN.get(column, Quantity(column, "", "", column, usual=1.0, spread=0.1)) for column in columns
@@ -145,7 +145,7 @@ def refuse_unidentified(recipe: Recipe, recorded: Iterable[str] = ()) -> None:
     Raises
     ------
     NotIdentified
-        With the coefficients that cannot be told apart.
+        With the coefficients that cannot be separated.
     MissingInput
         The model depends on a column that is not recorded.
     """

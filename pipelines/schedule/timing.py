@@ -99,7 +99,7 @@ def schedule(
         begin = now
         parts: list[tuple[ActivityKind, float, StationPose]] = []
         if step.soak != now.soak and not step.settled:
-            now = replace(now, soak=step.soak)  # read on the way: nobody waits
+            now = replace(now, soak=step.soak)  # measured during the change of temperature, without a wait
         elif step.soak != now.soak:
             waited, reached = soaked(now, step.temperature, station, recipe.soak_min_s)
             parts.append(("soak", waited, replace(reached, soak=step.soak)))

@@ -20,7 +20,7 @@ COLUMNS = ("bias_instability_ug", "bias_record_u_ug", "bias_long_u_ug", "bias_lo
 
 @dataclass(frozen=True)
 class BiasNoise:
-    """What a fit knows of its bias and its noise; arrays (units, 3), µg.
+    """Bias and noise of a fit; arrays (units, 3), µg.
 
     error : standard error of the coefficient; gain : (units, 3, n), what every dwell of the fit adds to the coefficient
     flicker, walk : standard deviations of the wander between dwells, and of the random walk at the end of all dwells

@@ -50,7 +50,7 @@ class Coarse:
 
     @property
     def correctable(self) -> bool:
-        """Whether rounding adds q²/12 and almost nothing else."""
+        """Whether rounding adds the variance q²/12 and almost no other error."""
         return self.spread >= FINE * self.step
 
 

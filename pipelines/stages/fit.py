@@ -45,7 +45,7 @@ class _Noisy:
     distinguished from flicker
     lack_of_fit : (units, 3), variance over that of the noise, one where it is no larger
     per_g : (units, 3), output per g
-    gain : (units, 3, p, n), what every output of the n dwells of the fit adds to the coefficients; known : factor of their errors
+    gain : (units, 3, p, n), derivative of the coefficients by every output of the n fitted dwells; known : factor of their errors
     """
 
     method: Literal["wander", "birge"]

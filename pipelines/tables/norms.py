@@ -34,7 +34,7 @@ _FAR = 8.0
 _SPARE, _ROUNDS = (
     6,
     4,
-)  # degrees of freedom from which on dwells are told from each other, and turns of leaving some out
+)  # degrees of freedom from which on single dwells are judged, and turns of leaving some out
 _WHITE_RANGE = 20.0
 """Factor about the median beyond which a white standard error is taken for a slip: weights must not follow it."""
 

@@ -24,4 +24,4 @@ class Equipment(ABC):
         """Leaves it at rest, disarmed: an absolute state, which may be ordered twice."""
 
     def stand_by(self) -> None:  # noqa: B027 - most equipment is at rest between its own records
-        """Brings it to the state in which records without it are taken; nothing is sent where it is there already."""
+        """Brings it to the state for records that do not use it; nothing is sent where it already has this state."""

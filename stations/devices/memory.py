@@ -34,7 +34,7 @@ class MemoryStatus:
 
 
 class UnitMemory:
-    """The memory of the device in one slot. Every write is sent once; what is read back decides."""
+    """The memory of the device in one slot. Every write is sent once; its success is decided by reading back."""
 
     def __init__(self, registers: Registers, clock: Clock) -> None:
         self._registers = registers
@@ -74,8 +74,8 @@ class UnitMemory:
         before = self.wait()
         if before.erases[copy] >= before.endurance:
             raise StationRefused(
-                f"{self.name}: copy {copy.upper()} has {before.erases[copy]} erasures, {before.endurance} are specified; it is "
-                "worn out: replace the device"
+                f"{self.name}: copy {copy.upper()} has {before.erases[copy]} erasures, {before.endurance} are specified; the "
+                "memory is worn out: replace the device"
             )
         data = content.ljust(BYTES, ERASED)
         words = struct.unpack(f">{BYTES // 2}H", data)

@@ -31,7 +31,7 @@ Key = tuple[str, str, int]
 class Links:
     """Links by address, each made once; a simulated station's are ``simulated_at``, by what carries them.
 
-    ``permit`` is what the gates ask before anything is sent; None where nothing is driven, or nobody else can drive.
+    ``permit`` is what the gates ask before anything is sent; None where nothing is driven, or where no other process can drive.
     """
 
     config: StationConfig

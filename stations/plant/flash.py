@@ -42,7 +42,7 @@ class Flash:
         return BUSY if self._begun_us >= 0 else FAILED if self.failed else READY
 
     def read(self, copy: int, now_us: int) -> list[int]:
-        """The words of a copy as they are now."""
+        """The present words of a copy."""
         self.settle(now_us)
         words = self._partly(now_us) if self._begun_us >= 0 and copy == self._copy else self.copies[copy]
         return [word & ~self.stuck.get((copy, place), 0) & 0xFFFF for place, word in enumerate(words)]
@@ -56,14 +56,14 @@ class Flash:
         self.buffer, self.offsets = [0] * WORDS, [0, 0, 0]
 
     def settle(self, now_us: int) -> None:
-        """Completes what is due."""
+        """Completes an operation whose time has passed."""
         if self._begun_us >= 0 and now_us >= self._begun_us + round(1e6 * (ERASE_S + PROGRAM_S)):
             self.failed = self.erases[self._copy] > self.endurance
             self.copies[self._copy] = [0] * WORDS if self.failed else self._data
             self._begun_us = -1
 
     def _partly(self, now_us: int) -> list[int]:
-        """The words of the copy under way: erased, then programmed one after another."""
+        """The words of the copy during an operation: erased, then programmed one after another."""
         share = (1e-6 * (now_us - self._begun_us) - ERASE_S) / PROGRAM_S
         if share < 0.0:  # an erasure that was interrupted leaves a mixture
             return [word | 0x0F0F for word in self.copies[self._copy]]

@@ -86,7 +86,7 @@ class Journal:
         self._count += 1
 
     def events(self, after: int = 0) -> Iterator[Event]:
-        """Every event behind the first ``after``, in order."""
+        """Every event except the first ``after`` ones, in order."""
         others, at, skipped = deque(self._others), 0, 0
         for number in range(self._count + 1):
             while others and others[0][0] == number:

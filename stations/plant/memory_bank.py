@@ -19,14 +19,14 @@ PARTS = 3
 
 @dataclass
 class MemoryBank:
-    """Memory registers of the device in the place of a unit."""
+    """Memory registers of the device in a slot, by the place of the slot."""
 
     world: World
     place: int
 
     @property
     def unit(self) -> int:
-        """The unit that really sits there."""
+        """The unit that is seated in the slot."""
         return self.world.seats[self.place]
 
     @property
@@ -54,7 +54,7 @@ class MemoryBank:
         return sources
 
     def write(self, values: dict[str, Value]) -> None:
-        """The effect of writes; a device without power, or that samples, refuses them."""
+        """Applies writes; a device that has no power, or is sampling, refuses them."""
         if values and (not self.world.powered or self.world.sampler.running):
             raise Busy("memory")
         for name, value in values.items():
@@ -63,7 +63,7 @@ class MemoryBank:
                 self.flash.buffer[part * PART : (part + 1) * PART] = [int(word) for word in value]
             elif name == "offset" and isinstance(value, list):
                 if not self.world.preset.offset_step:
-                    raise NotEncodable("offset: the device has no such registers")
+                    raise NotEncodable("offset: the device has no offset registers")
                 self.world.set_offsets(self.unit, [int(step) for step in value])
             elif name == "memory_command" and (command := int(number(values, name))):
                 if self.flash.state(self.world.now_us) == 1:

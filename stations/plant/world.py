@@ -91,7 +91,7 @@ class World:
             sim.local_gravity_m_s2 / STANDARD_G,
         )
         self.physics.orthogonality = 0.0 if self.station_errors is None else self.station_errors.orthogonality
-        self.flash = [Flash() for _ in self.serials]  # by unit, wherever it sits
+        self.flash = [Flash() for _ in self.serials]  # by unit, in any slot
         self.bench = Bench(
             self.preset,
             self._truths,
@@ -165,7 +165,7 @@ class World:
         return (self.now_us - self._switched_us) * 1e-6 if self.powered else 0.0
 
     def program_memory(self, unit: int, copy: int) -> None:
-        """Programs the buffer of a unit into one of its copies; the supply may fail meanwhile, if a fault says so."""
+        """Programs the buffer of a unit into one of its copies; the supply may fail during it, if a fault is set."""
         flash = self.flash[unit]
         flash.program(copy, self.now_us)
         if flash.lose_power_s is not None:

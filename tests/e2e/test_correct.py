@@ -187,7 +187,7 @@ def test_refusals_say_what_is_missing(
         correct(run, a, "--calibration", "latest:A1", "--force", "0,0,1")
     with pytest.raises(WrongUse, match="three numbers X,Y,Z"):
         correct(run, a, "--calibration", "latest:A1", "--force", "0,0", "--turn-on", "300")
-    with pytest.raises(DataRejected, match="does not always run forward"):
+    with pytest.raises(DataRejected, match="does not always increase"):
         correct(run, str(tmp_path / "back.csv"), "--calibration", "latest:A1")
     with pytest.raises(Exception, match="temperature"):
         correct(run, str(tmp_path / "cold.csv"), "--calibration", "latest:A1")

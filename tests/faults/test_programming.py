@@ -113,7 +113,7 @@ def test_the_older_copy_is_written_and_the_other_is_kept(run: Run) -> None:
     ("kind", "figures", "step", "reason"),
     [
         ("memory_bad_block", {"copy": 1, "word": 40}, "read back", "differs from what was written from byte 80"),
-        ("memory_worn", {}, "archive what was there", "worn out"),
+        ("memory_worn", {}, "archive the memory", "worn out"),
         ("memory_power_lost", {"after_s": 0.45}, "read back", "differs from what was written"),
         pytest.param(
             "memory_power_lost", {"after_s": 0.1}, "read back", "differs from what was written", marks=pytest.mark.slow
@@ -151,7 +151,7 @@ def test_a_fault_leaves_the_valid_copy_and_no_certificate(
 def test_coefficients_that_do_not_fit_the_unit_are_found_in_the_poses(run: Run) -> None:
     done, _ = programmed(run, ("A1",), tolerance_ug=1.0)
     assert (done["A1"].outcome, done["A1"].step) == ("failed", "verify")
-    assert "µg from its force" in done["A1"].reason
+    assert "µg from the force" in done["A1"].reason
 
 
 def test_offset_registers_move_the_output_and_are_written_after_each_power_on(run: Run) -> None:

@@ -11,7 +11,7 @@ from pipelines.archive import Archive
 from pipelines.cli import app
 from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
 from pipelines.importers import files
-from pipelines.importers.waveforms import Asked, import_waveforms
+from pipelines.importers.waveforms import RecordingLayout, import_waveforms
 from schemas.errors import DataRejected, WrongUse
 
 RATE, DURATION = 50_000.0, 0.011
@@ -85,7 +85,9 @@ def test_shocks_of_others_give_figures_and_a_verdict(form: str, tmp_path: Path, 
     units = {"output": "V", "reference": "g"}
     if form in {"mat", "hdf5"}:
         columns["time"], units["time"] = "time", "s"
-    found = import_waveforms(paths, "shock", part, "S1", Asked(columns, units, None, group), str(tmp_path / "archive"))
+    found = import_waveforms(
+        paths, "shock", part, "S1", RecordingLayout(columns, units, None, group), str(tmp_path / "archive")
+    )
     figures = {one["figure"]: one for one in found["figures"]}
     assert figures["shock_sensitivity_percent"]["value"] == pytest.approx(1.0, abs=0.1)
     assert not figures["shock_bias_shift_ug"]["identified"]
@@ -102,20 +104,20 @@ def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: 
     bare.write_text(f"dut,ref\n{rows}\n")
     columns = {"z": "dut", "reference": "ref"}
     with pytest.raises(DataRejected, match=r"bare.csv: column 'dut' has no unit.*--units output"):
-        import_waveforms([bare], "shock", None, "S1", Asked(columns, {}), str(tmp_path / "a"))
+        import_waveforms([bare], "shock", None, "S1", RecordingLayout(columns, {}), str(tmp_path / "a"))
     units = {"output": "V", "reference": "g"}
     with pytest.raises(DataRejected, match=r"no sample interval is stated.*--rate"):
-        import_waveforms([bare], "shock", None, "S1", Asked(columns, units), str(tmp_path / "a"))
-    asked = Asked(columns, units | {"reference": "psi"}, RATE)
+        import_waveforms([bare], "shock", None, "S1", RecordingLayout(columns, units), str(tmp_path / "a"))
+    layout = RecordingLayout(columns, units | {"reference": "psi"}, RATE)
     with pytest.raises(DataRejected, match=r"reference in 'psi'"):
-        import_waveforms([bare], "shock", None, "S1", asked, str(tmp_path / "a"))
+        import_waveforms([bare], "shock", None, "S1", layout, str(tmp_path / "a"))
     stated = tmp_path / "stated.csv"
     stated.write_text(f"dut [V],ref [g]\n{rows}\n")
-    asked = Asked({"z": "dut [V]", "reference": "ref [g]"}, {"output": "mV"}, RATE)
+    layout = RecordingLayout({"z": "dut [V]", "reference": "ref [g]"}, {"output": "mV"}, RATE)
     with pytest.raises(WrongUse, match=r"states V, --units has mV"):
-        import_waveforms([stated], "shock", None, "S1", asked, str(tmp_path / "a"))
+        import_waveforms([stated], "shock", None, "S1", layout, str(tmp_path / "a"))
     with pytest.raises(WrongUse, match="can be imported"):
-        import_waveforms([bare], "tilt", None, "S1", Asked(columns, units, RATE), str(tmp_path / "a"))
+        import_waveforms([bare], "tilt", None, "S1", RecordingLayout(columns, units, RATE), str(tmp_path / "a"))
     assert not (tmp_path / "a").exists() or not Archive(str(tmp_path / "a")).runs()
 
 

@@ -136,7 +136,7 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
 
 
 _MOST_STEPS = 20_000
-"""Steps over the range of the means beyond which the step cannot be told from these dwells."""
+"""Steps over the range of the means beyond which the step cannot be estimated from these dwells."""
 
 
 def _white(readings: Readings, unit: int, axis: int) -> float | None:

@@ -1,4 +1,4 @@
-"""What an effect on a centrifuge test is, and the conditions of its points."""
+"""Base class of the effects on a centrifuge test, and the conditions of its points."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ class Spins:
     slowing: Array
 
     def picked(self, rows: NDArray[np.bool_]) -> Spins:
-        """Some of the points."""
+        """The points of the selected rows (n,)."""
         return Spins(self.acceleration[rows], self.radius_m[rows], self.order[rows], self.slowing[rows])
 
 
 class CentrifugeEffect(ABC):
     """A term of the output. Every module of this package defines one class.
 
-    id : of the module · equation, source : for people · unit : of the coefficient
-    breaker : measurement that tells it from others
+    id : name of the module · equation, source : text for reports · unit : of the coefficient
+    breaker : measurement that separates it from other effects
     """
 
     id: ClassVar[str]

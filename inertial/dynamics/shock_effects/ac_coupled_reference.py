@@ -16,7 +16,9 @@ class AcCoupledReference(ShockEffect):
     id: ClassVar[str] = "ac_coupled_reference"
     equation: ClassVar[str] = "u = r + ∫r dt/RC"
     source: ClassVar[str] = "charge amplifier, IEPE sensor: one-pole high-pass"
-    breaker: ClassVar[str] = "shocks in the other direction, and a longer record after the pulse: it returns with RC"
+    breaker: ClassVar[str] = (
+        "shocks in the other direction, and a longer record after the pulse: the output returns with RC"
+    )
 
     def unit(self) -> str:
         """Unit of the coefficient or of the first parameter."""

@@ -1,4 +1,4 @@
-"""What an effect on a shock comparison is."""
+"""Base class of the effects on a shock comparison."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ShockEffect(ABC):
 
     A waveform effect changes the reference's waveform; an added effect adds a waveform with a linear coefficient.
 
-    id : of the module · equation, source : for people · breaker : the measurement that tells it from others
+    id : name of the module · equation, source : text for reports · breaker : measurement that separates it from other effects
     """
 
     id: ClassVar[str]
@@ -48,6 +48,6 @@ class ShockEffect(ABC):
 
 
 def through(wave: Array, rate_hz: float, numerator: list[float], denominator: list[float]) -> Array:
-    """A waveform (n,) that begins at zero, through a filter in s; exact for straight lines between the samples."""
+    """A waveform (n,) that begins at zero, filtered by a transfer function in s; exact for linear interpolation."""
     system: Any = cont2discrete((numerator, denominator), 1.0 / rate_hz, method="foh")
     return np.asarray(lfilter(np.atleast_1d(np.squeeze(system[0])), system[1], wave), dtype=np.float64)

@@ -15,7 +15,7 @@ class ZeroShift(ShockEffect):
     id: ClassVar[str] = "zero_shift"
     equation: ClassVar[str] = "z·∫|r|dt, of its final value"
     source: ClassVar[str] = "mechanism: change of stress in the sensing element or its mounting"
-    breaker: ClassVar[str] = "shocks in the other direction, and a longer record after the pulse: it stays"
+    breaker: ClassVar[str] = "shocks in the other direction, and a longer record after the pulse: the shift stays"
 
     def unit(self) -> str:
         """Unit of the coefficient or of the first parameter."""

@@ -27,13 +27,13 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     writer = csv.writer(sink, lineterminator="\n")
     writer.writerow(["unit", "quantity", "power_of_theta", "row", "column", "value", "unit_text", "certificate"])
     for c in units:
-        said = c.certified
+        certified = c.certified
         for k in range(ORDER):
             per = "" if k == 0 else f"/K^{k}"
             for i, row in enumerate(AXES):
-                writer.writerow([c.unit, "bias", k, row, "", repr(float(c.bias[k, i])), c.out_unit + per, said])
+                writer.writerow([c.unit, "bias", k, row, "", repr(float(c.bias[k, i])), c.out_unit + per, certified])
             for i, row in enumerate(AXES):
                 for j, column in enumerate(AXES):
                     value = repr(float(c.response[k, i, j]))
-                    writer.writerow([c.unit, "response", k, row, column, value, f"{c.out_unit}/g{per}", said])
+                    writer.writerow([c.unit, "response", k, row, column, value, f"{c.out_unit}/g{per}", certified])
     return sink.getvalue()

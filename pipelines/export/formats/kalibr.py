@@ -50,7 +50,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
             _without_calibration(unit),
             *([f"not in this file: effects {', '.join(unit.left_out)}"] if unit.left_out else []),
             "as measured at rest; Kalibr's users multiply by 5 to 20 for motion and temperature",
-            "add gyroscope_noise_density, gyroscope_random_walk and rostopic: this calibration does not know them",
+            "add gyroscope_noise_density, gyroscope_random_walk and rostopic: this calibration does not contain them",
         )
     ]
     for symbol, key, text in _KEYS:
@@ -63,7 +63,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
 
 
 def _without_calibration(unit: UnitCalibration) -> str:
-    """What the uncorrected output is wrong by, where the driver divides by the unit's own mean scale."""
+    """Error of the uncorrected output where the driver divides by the unit's own mean scale."""
     scale = float(np.mean(np.diag(unit.response[0])))
 
     def applied(output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:

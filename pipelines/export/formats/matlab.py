@@ -54,8 +54,8 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     for k, name in enumerate(names):
         if name in names[:k]:
             raise WrongUse(
-                f"export: units {units[names.index(name)].unit} and {units[k].unit} are both {name} in MATLAB, names of their "
-                "own are needed; export them one by one with --units"
+                f"export: units {units[names.index(name)].unit} and {units[k].unit} are both {name} in MATLAB, different "
+                "names are needed; export them one by one with --units"
             )
     content: dict[str, Any] = {name: _properties(unit, settings) for name, unit in zip(names, units, strict=True)}
     content["tumbleline"] = {

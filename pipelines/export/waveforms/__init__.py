@@ -45,7 +45,7 @@ WRITERS: dict[str, Writer] = _found()
 
 
 def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:
-    """Write the channels; the files that were written: one for each clock where the format has only one.
+    """Write the channels and return the paths: one file, or one for each clock where the format holds only one.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[
     if form not in WRITERS:
         raise WrongUse(f"waveforms: no format is called '{form}'; {did_you_mean(form, WRITERS)}")
     if not channels:
-        raise WrongUse("waveforms: no channel, one is needed at least; name another record")
+        raise WrongUse("waveforms: no channel, at least one is needed; name another record")
     writer = WRITERS[form]
     clocks = list(dict.fromkeys((one.interval_s, len(one.values), one.group) for one in channels))
     shared = len({(interval, count) for interval, count, _ in clocks}) == 1

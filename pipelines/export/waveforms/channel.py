@@ -16,7 +16,7 @@ class Channel:
 
     Attributes
     ----------
-    name, unit : for people and programs · group : channels of one clock, ``units`` or ``reference``
+    name, unit : texts in the file · group : channels of one clock, ``units`` or ``reference``
     values : (n,) · interval_s, start_s : s
     axis : 0 to 2, in the axes of the units
     """

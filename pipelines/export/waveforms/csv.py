@@ -16,7 +16,7 @@ NAME, SUFFIX, ONE_CLOCK = "csv", ".csv", True
 
 
 def write(channels: Sequence[Channel], path: Path) -> None:
-    """Write the channels with 17 digits, which is every double exactly."""
+    """Write the channels with 17 digits, which represent every double exactly."""
     columns = {"time [s]": channels[0].time}
     columns |= {f"{one.name} [{one.unit}]": one.values for one in channels}  # noqa: PD011 - of a channel
     pd.DataFrame(columns).to_csv(path, index=False, float_format="%.17g")

@@ -49,7 +49,7 @@ def read(name: str, data: bytes, group: str) -> Content:
     label = chosen([(one, len(channels[0])) for one, channels in groups.items()], group, name)
     with foreign(broken, REMEDY):
         found = _content(groups[label], name)
-    return replace(found, remarks=(*found.remarks, *(f"the reader says: {text}" for text in messages.texts)))
+    return replace(found, remarks=(*found.remarks, *(f"message of the reader: {text}" for text in messages.texts)))
 
 
 class _LibraryLog(logging.Handler):

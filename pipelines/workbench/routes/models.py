@@ -25,7 +25,7 @@ HEADING, ORDER, ADDRESS = "Models", 30, "/models"
 
 @router.get("/models")
 def shown(request: Request) -> Response:
-    """The page; the what-if is computed when it is asked for."""
+    """The page; the what-if is computed on request."""
     bench = workbench_of(request)
     state, problems = state_of(request, ModelsPage)
     found, job, steps = None, None, []

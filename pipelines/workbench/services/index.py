@@ -1,6 +1,6 @@
-"""The index of the archive as the pages read it: looked at again when a run was added, else every few seconds.
+"""The index of the archive for the pages: renewed when a run was added, else every few seconds.
 
-Looking at every file of ten thousand runs takes more than half a second, which no page may wait for at each click.
+To check every file of ten thousand runs takes more than half a second, too long for each click on a page.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from pipelines.audit.sql import Answer
 
 FRESH_S = 5.0
-"""Age up to which an index is taken as it is; a finished stage of a known run shows after this time at the latest."""
+"""Age, s, up to which an index is used unchanged; a finished stage of a known run is shown after this time at the latest."""
 USABLE_S = 60.0
-"""Age up to which a page is answered from it while it is renewed in the background."""
+"""Age, s, up to which a page is answered from the index while it is renewed in the background."""
 
 
 class RecentIndex:
@@ -70,6 +70,6 @@ class RecentIndex:
             self._renewing.clear()
 
     def _stamp(self) -> int:
-        """What changes when a run is added; an object store has no such mark."""
+        """A value that changes when a run is added; 0 for an object store."""
         runs = self._archive.root / "runs"
         return runs.stat().st_mtime_ns if isinstance(runs, Path) and runs.is_dir() else 0

@@ -13,7 +13,7 @@ document.addEventListener("pointerdown", () => {
 }, { capture: true });
 
 export async function go(address, { push = true, part = "", focus = false, renews = false } = {}) {
-  if (renews && going && !going.renews) return;  // a page that somebody has asked for is on its way
+  if (renews && going && !going.renews) return;  // a page that the user requested is loading
   going?.abort();
   const now = (going = Object.assign(new AbortController(), { renews }));
   let answer, text;
@@ -109,13 +109,13 @@ async function begin(place, pressed = false) {
     const job = await change("/jobs", { kind: place.dataset.jobKind, address: place.dataset.jobAddress });
     place.dataset.job = job.id;
     if (pressed && !place.querySelector("progress")) { go(location.href, { push: false }); return; }
-    told(job);
+    jobChanged(job);
   } catch (problem) {
     say(place.querySelector("[data-job-problem]"), problem.message);
   }
 }
 
-function told(job) {
+function jobChanged(job) {
   for (const place of document.querySelectorAll(`[data-job="${CSS.escape(job.id)}"]`)) {
     place.dataset.jobState = job.state;
     if (["done", "failed", "stopped"].includes(job.state)) { go(location.href, { push: false, renews: true }); return; }
@@ -136,7 +136,7 @@ listen((message) => {
       for (const place of document.querySelectorAll("[data-job]")) if (["waiting", "running"].includes(place.dataset.jobState)) look(place.dataset.job);
     }
   }
-  if (message.kind === "job") told(message.job);
+  if (message.kind === "job") jobChanged(message.job);
   if (message.kind === "changed" && document.querySelector(`[data-live="${CSS.escape(message.what)}"]`)) {
     const had = Boolean(document.querySelector("[data-phase]"));
     if (had || !document.activeElement?.matches("input")) go(location.href, { push: false, part: had ? message.what : "", renews: true });
@@ -145,7 +145,7 @@ listen((message) => {
 
 async function look(id) {
   const answer = await fetch(`/jobs/${encodeURIComponent(id)}`);
-  if (answer.ok) told(await answer.json()); else go(location.href, { push: false, renews: true });
+  if (answer.ok) jobChanged(await answer.json()); else go(location.href, { push: false, renews: true });
 }
 
 // --- what is pressed ---------------------------------------------------------------------------------------------------
@@ -163,7 +163,7 @@ document.addEventListener("click", async (event) => {
     one.textContent = "Copied";
     setTimeout(() => { one.textContent = "Copy"; }, 1500);
   } else if ("jobStart" in dataset) begin(one.closest("[data-job-kind]"), true);
-  else if ("jobStop" in dataset) change(`/jobs/${encodeURIComponent(one.closest("[data-job-kind]").dataset.job)}/stop`).then(told).catch(() => {});
+  else if ("jobStop" in dataset) change(`/jobs/${encodeURIComponent(one.closest("[data-job-kind]").dataset.job)}/stop`).then(jobChanged).catch(() => {});
   else if ("act" in dataset) act(one);
   else if ("insert" in dataset) insert(one.closest("form").elements.formula, dataset.insert);
   else if ("drop" in dataset && event.target.tagName !== "INPUT") one.querySelector("[data-file]").click();

@@ -15,7 +15,7 @@ from stations.devices.result_files import STANDARD_GRAVITY, read_recording
 
 POLL_S = 0.05
 GRACE_S = 30.0
-FIRST_V = 0.02  # amplitude of the first try: the gain of amplifier and exciter is not known
+FIRST_V = 0.02  # amplitude of the first burst, since the gain of amplifier and exciter is not known
 MOST_V = 10.0
 ROUNDS = 5
 LEVEL_SHARE = 0.05  # by which the level may depart from the order when the loop ends

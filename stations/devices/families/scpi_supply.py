@@ -24,7 +24,7 @@ class ScpiSupply(Equipment):
     def __init__(self, values: Values, clock: Clock) -> None:
         super().__init__(values, clock)
         self._nominal_V = 0.0
-        self._changed = True  # what an earlier run has left is not known
+        self._changed = True  # the setting after an earlier run is not known
 
     def set_voltage(self, volt: float) -> float:
         """Sets the voltage, V, and returns its ratio to the nominal one.

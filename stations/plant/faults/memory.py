@@ -32,7 +32,7 @@ class BadBlock(Fault):
 
 @dataclass
 class PowerLostWhileWriting(Fault):
-    """The supply of the devices fails for a second, ``after_s`` after the unit's memory was next told to program."""
+    """The supply of the devices fails for a second, ``after_s`` after the next command to program the unit's memory."""
 
     kind: ClassVar[str] = "memory_power_lost"
     targets: ClassVar[tuple[str, ...]] = (UNIT,)
@@ -46,7 +46,7 @@ class PowerLostWhileWriting(Fault):
 
 @dataclass
 class WornOut(Fault):
-    """The memory of a unit has ``left`` erasures of its specified ones left."""
+    """The memory of a unit has ``left`` of its specified erasures left."""
 
     kind: ClassVar[str] = "memory_worn"
     targets: ClassVar[tuple[str, ...]] = (UNIT,)
