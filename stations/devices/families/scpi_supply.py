@@ -32,13 +32,18 @@ class ScpiSupply(Equipment):
         Raises
         ------
         StationRefused
-            The supply reports an error.
+            The supply reports an error, or its memory 1 holds no voltage.
         OperatorNeeded
             The measured voltage is not the one that was set.
         """
         if self._nominal_V <= 0.0:
             self._recall()
-            self._nominal_V = self.values.number("voltage")
+            nominal = self.values.number("voltage")
+            if not nominal > 0.0:
+                raise StationRefused(
+                    f"{self.name}: memory 1 holds {nominal:g} V, the nominal voltage of the devices is needed; store it there"
+                )
+            self._nominal_V = nominal
         self._changed = True
         self.values.write("voltage", volt)
         self._refuse_error(f"{volt:g} V")
