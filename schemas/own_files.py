@@ -28,7 +28,9 @@ _reported: set[Path] = set()
 
 def folders(kind: Kind) -> list[Path]:
     """The folders that are searched for files of a kind, in order: that of the working folder, that of the user."""
-    config = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
+    config = os.environ.get("XDG_CONFIG_HOME", "")
+    if not Path(config).is_absolute():  # the specification: a relative path is invalid and ignored
+        config = str(Path.home() / ".config")
     return [Path(kind), Path(config) / "tumbleline" / kind]
 
 

@@ -166,13 +166,13 @@ def track(model: BiasModel, time: Array, force: Array, known: Array, magnitude: 
     bias, covariance, updated = np.empty((n, AXES)), np.empty((n, AXES, AXES)), np.zeros(n, dtype=np.bool_)
     expected, before = np.empty_like(bias), np.empty_like(covariance)
     for k in range(n):
+        accepted = len(tracker.innovations)
         tracker.predict(float(time[k] - time[k - 1]) if k else 0.0)
         expected[k], before[k] = tracker.bias, tracker.covariance
         if np.all(np.isfinite(known[k])):
             tracker.known_force(force[k] - known[k], seconds)
-            updated[k] = True
         elif np.isfinite(magnitude[k]):
             tracker.known_magnitude(force[k], float(magnitude[k]), seconds)
-            updated[k] = True
+        updated[k] = len(tracker.innovations) > accepted  # not where every innovation was beyond the gate
         bias[k], covariance[k] = tracker.bias, tracker.covariance
     return Track(bias, covariance, expected, before, updated, consistency(tracker.innovations), tracker.rejected)

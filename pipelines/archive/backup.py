@@ -3,6 +3,9 @@
 Files of an archive are written once, so a repeated copy adds only new files. The chain is read first and copied last: every file
 that an entry of the copy names was copied before it. Files that the chain does not name yet (a lot that is being measured) are
 copied in their present state and completed by the next copy. Derived files (``index/``) are left out; they are made again.
+
+A file of the copy that is as the chain or its manifest states is never replaced by one that differs: the one in the archive is
+damaged.
 """
 
 from __future__ import annotations
@@ -16,13 +19,14 @@ from pipelines.archive.files import TEMPORARY
 from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from pipelines.archive import Archive
     from pipelines.archive.store import Place
 
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record
+REPLACED = "/report.json"  # the one manifest that is made anew in its place
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
 
 
@@ -47,29 +51,60 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
     WrongUse
         The target is the source, or lies in it.
     ArchiveUnusable
-        The target holds something else, or an archive with another chain; a file was read differently than it was written.
+        The target holds something else, or an archive with another chain; a file was read differently than it was written; or
+        files of the source are damaged that are sound in the target: these are kept, and all others are copied.
     """
     source.refuse_none()
     _refuse_itself(source, target)
     entries = _names(source.root / CHAIN, CHAIN)
     target.prepare()
     _refuse_another(source, target, entries)
-    copied = Copied()
-    for name in _names(source.root, ""):
-        if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK:
-            _copy(source.root, target.root, name, copied)
-    for name in sorted(entries):
-        _copy(source.root, target.root, name, copied)
+    copied, sealed = Copied(), _sealed(source.root, entries)
+    names = [
+        name
+        for name in _names(source.root, "")
+        if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK
+    ]
+    kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, sealed, copied)]
     _drop_old_states(source.root, target.root)
+    if kept:
+        raise ArchiveUnusable(
+            f"backup: {len(kept)} files of {source.root} are damaged and sound in {target.root}, where they were kept (the "
+            f"first is {min(kept)}); run 'tumbleline verify', and restore these files from {target.root}"
+        )
     return copied
+
+
+def _sealed(root: Place, entries: set[str]) -> dict[str, str]:
+    """Hashes of files by their names, as the newest entry of the chain that names each states it."""
+    found: dict[str, str] = {}
+    for name in sorted(entries):
+        try:
+            found.update(files.read_json(root / name).get("files", {}))
+        except ArchiveUnusable:  # 'tumbleline verify' reports it
+            continue
+    return found
+
+
+def _as_stated(root: Place, name: str, sealed: Mapping[str, str]) -> bool | None:
+    """Whether a file is as the chain states, or a table as its manifest states; None where neither states its hash."""
+    if name.endswith(REPLACED):
+        return None
+    expected = sealed.get(name, "")
+    if not expected and name.endswith(WRITTEN_ONCE):
+        try:
+            manifest = files.read_json(root / f"{name.removesuffix(WRITTEN_ONCE)}.json")
+        except ArchiveUnusable:  # not written yet
+            return None
+        expected = str(manifest.get("sha256", ""))
+    return files.sha256(root / name) == expected if expected else None
 
 
 def _names(folder: Place, prefix: str) -> set[str]:
     """Names, below the root, of the files of a folder that are copied."""
     found: set[str] = set()
     for path, name in _walk(folder, prefix):
-        parts = PurePosixPath(name).parts
-        if parts[0] != INDEX and not any(part.startswith(TEMPORARY) for part in parts):
+        if PurePosixPath(name).parts[0] != INDEX:
             found.add(name)
         del path
     return found
@@ -78,7 +113,11 @@ def _names(folder: Place, prefix: str) -> set[str]:
 def _walk(folder: Place, prefix: str) -> Iterator[tuple[Place, str]]:
     if not folder.is_dir():
         return
-    for path in folder.iterdir():
+    try:
+        inside = [path for path in folder.iterdir() if not path.name.startswith(TEMPORARY)]
+    except FileNotFoundError:  # a writer has removed or renamed it meanwhile
+        return
+    for path in inside:
         name = f"{prefix}/{path.name}" if prefix else path.name
         if path.is_dir():
             yield from _walk(path, name)
@@ -86,21 +125,27 @@ def _walk(folder: Place, prefix: str) -> Iterator[tuple[Place, str]]:
             yield path, name
 
 
-def _copy(source: Place, target: Place, name: str, copied: Copied) -> None:
-    """Copy a file unless it is there; one that vanished meanwhile (a state, a temporary file) is left out."""
+def _copy(source: Place, target: Place, name: str, sealed: Mapping[str, str], copied: Copied) -> bool:
+    """Copy a file unless it is there; one that vanished meanwhile (a state, a temporary file) is left out.
+
+    False where the one of the target was kept, because that of the source is damaged.
+    """
     there, place = source / name, target / name
     try:
         if place.is_file() and _same(there, place, name):
             copied.present += 1
-            return
+            return True
+        if place.is_file() and _as_stated(source, name, sealed) is False and _as_stated(target, name, sealed):
+            return False
         data = there.read_bytes()
     except FileNotFoundError:
-        return
+        return True
     files.publish(place, data)
     if files.sha256(place) != files.hash_of(data):
         raise ArchiveUnusable(f"backup: {place} was read differently than it was written; check the disk of the copy")
     copied.files += 1
     copied.bytes += len(data)
+    return True
 
 
 def _same(there: Place, place: Place, name: str) -> bool:

@@ -161,9 +161,9 @@ def restore(
     from schemas.errors import DONE, PART_FAILED
 
     copy, target = Archive(source), Archive(archive)
+    done = copy_archive(copy, target)  # before the database: an archive that is refused leaves the database as it is
     if database is not None:
         restore_database(database, default_database())
-    done = copy_archive(copy, target)
     report = verify(target, keys=public_keys(()))
     if as_json:
         place = {"archive": str(target.root), "copy": str(copy.root), "whole": report.whole, "head": report.head}

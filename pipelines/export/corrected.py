@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 LONGEST_STEPS = 200_000
+GAP = 3.0
+"""Multiple of the usual interval of samples above which an interval is a gap in the recording."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ def _tracked(recording: Recording, fit: FitOfUnit, tracking: Tracking, plain: Co
         raise DataRejected(
             f"run {fit.run}: B of unit {fit.exported.unit} is not known; record the unit at rest for longer"
         )
-    time, rate = recording.time, (len(recording.time) - 1) / (recording.time[-1] - recording.time[0])
+    time, rate, gap = recording.time, *_rate_and_gaps(recording.time)
     per = max(1, round(tracking.step_s * rate))
     steps = len(time) // per
     if not 2 <= steps <= LONGEST_STEPS:
@@ -174,6 +176,9 @@ def _tracked(recording: Recording, fit: FitOfUnit, tracking: Tracking, plain: Co
         )
     middle, force = (_means(values, per) for values in (time, plain.force))
     known, magnitude = _references(recording, tracking, plain.force, per, rate)
+    gap[::per] = False  # between two steps the filter lets the time pass
+    torn = _means(gap.astype(np.float64), per) > 0.0  # such a step is no mean over its length
+    known[torn], magnitude[torn] = np.nan, np.nan
     if not (np.all(np.isfinite(known), axis=1) | np.isfinite(magnitude)).any():
         raise DataRejected(
             f"{recording.name}: the force is known nowhere and the unit is never at rest, one of them is needed to track the "
@@ -191,6 +196,13 @@ def _tracked(recording: Recording, fit: FitOfUnit, tracking: Tracking, plain: Co
         plain, force=plain.force - bias, covariance=covariance, track=found, bias=bias, bias_covariance=own,
         updated=found.updated[last], flicker=flicker,
     )  # fmt: skip
+
+
+def _rate_and_gaps(time: Array) -> tuple[float, NDArray[np.bool_]]:
+    """Rate of the samples, Hz, and which samples (n,) follow a gap: over the whole time, a gap would count as a lower rate."""
+    step = np.diff(time)
+    usual = step <= GAP * np.median(step)
+    return float(usual.sum() / step[usual].sum()), np.concatenate([[False], ~usual])
 
 
 def _references(recording: Recording, tracking: Tracking, force: Array, per: int, rate: float) -> tuple[Array, Array]:

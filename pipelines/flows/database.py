@@ -79,6 +79,7 @@ def restore_database(copy: Path, target: str) -> None:
         return
     place = Path(target)
     _refuse_unsound(copy)
+    _refuse_used(place)
     place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     aside = place.with_name(f"{place.name}.restored")
     aside.unlink(missing_ok=True)
@@ -104,6 +105,23 @@ def _copy_sqlite(source: Path, target: Path) -> None:
             f"backup: {source} cannot be copied ({problem}), a SQLite database is needed; check it"
         ) from None
     _refuse_unsound(target)
+
+
+def _refuse_used(place: Path) -> None:
+    """Refuse a database in write-ahead mode that another process has open: each holds a shared lock on it all the time."""
+    if not place.is_file():
+        return
+    try:
+        with closing(sqlite3.connect(place, timeout=1.0)) as database:
+            database.execute("pragma locking_mode=exclusive")
+            database.execute("begin exclusive")
+            database.rollback()
+    except sqlite3.OperationalError as problem:
+        raise WrongUse(
+            f"restore: {place} is in use ({problem}), a stopped server is needed; stop it and its workers, then restore"
+        ) from None
+    except sqlite3.DatabaseError:  # it is damaged, which is why it is replaced
+        return
 
 
 def _refuse_unsound(path: Path) -> None:

@@ -59,7 +59,7 @@ def close_dead_runs_of_queue(pool: str, queue: str, worker: str = "") -> list[st
             if (
                 (worker and taken_by and taken_by != worker)
                 or (run.state and run.state.name == SUSPENDED)
-                or _lives(run)
+                or lives(run)
             ):
                 continue
             client.set_flow_run_state(run.id, Crashed(message=GONE), force=True)
@@ -84,7 +84,7 @@ def runs_of_queue(
     )
 
 
-def _lives(run: FlowRun) -> bool:
+def lives(run: FlowRun) -> bool:
     """Whether a process of this computer still works on a run; its number alone may belong to a newer process."""
     pid = run.infrastructure_pid
     if not pid or not pid.isdecimal():

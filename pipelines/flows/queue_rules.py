@@ -17,7 +17,7 @@ from prefect.client.schemas.objects import StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.states import Cancelled, Scheduled
 
-from pipelines.flows.dead_runs import WORKING, runs_of_queue
+from pipelines.flows.dead_runs import WORKING, lives, runs_of_queue
 from pipelines.flows.policy import policy_of_tags
 from schemas.log_lines import tell
 
@@ -126,6 +126,8 @@ def _continue_crashed(client: SyncPrefectClient, pool: str, queue: str, now: dat
     crashed = runs_of_queue(client, pool, queue, (StateType.CRASHED,), FlowRunSort.EXPECTED_START_TIME_DESC)
     for run in crashed:
         if policy_of_tags(run.tags).crashed != "continue":
+            continue
+        if lives(run):  # the server missed its heartbeats: it still drives the station
             continue
         if run.state is None or not settled <= now - run.state.timestamp <= CONTINUED_WITHIN:
             continue

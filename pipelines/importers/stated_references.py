@@ -37,7 +37,7 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     given = content.setdefault("local_gravity_m_s2", gravity.value)
     apart = float(given) / gravity.value - 1.0
     u = gravity.relative().u
-    if abs(apart) > GRAVITY_SIGMAS * u:
+    if not abs(apart) <= GRAVITY_SIGMAS * u:
         raise RecipeInvalid(
             f"{where}: key 'uncertainty.gravity': {gravity.value:.8g} m/s² ± {2e6 * u:.2g} ppm (k = 2), --local-g is "
             f"{float(given):.8g}, they differ by {1e6 * apart:.0f} ppm; leave --local-g out, or correct one of the two",

@@ -106,7 +106,9 @@ def import_waveforms(
     texts = [(f.subject, f.text) for f in outcome.findings]
     if not np.isfinite(full_scale):
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
-    run = _keep(procedure, content, points, found, texts, sources, unit, archive)
+    stated = {"part": content, "columns": dict(asked.columns), "units": dict(asked.units), "rate_hz": asked.rate_hz}
+    stated |= {"group": asked.group}
+    run = _keep(procedure, stated, points, found, texts, sources, unit, archive)
     units = {spec.name: spec.unit for spec in one.figures}
     figures: list[WaveformFigure] = [
         {
@@ -244,7 +246,7 @@ def _values(content: Content, column: str, where: str) -> np.ndarray:
 
 def _keep(
     procedure: str,
-    content: Mapping[str, Any],
+    stated: Mapping[str, Any],
     points: pd.DataFrame,
     found: Sequence[Any],
     texts: Sequence[tuple[str, str]],
@@ -252,9 +254,14 @@ def _keep(
     unit: str,
     archive: str | None,
 ) -> Run:
-    """The run that holds the import, with a manifest that names the sources."""
+    """The run that holds the import, with a manifest that names the sources.
+
+    Parameters
+    ----------
+    stated : everything that the command states, as each of it decides the figures: another statement is another run
+    """
     whole = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
-    inputs, parameters = {"source": whole}, {"procedure": procedure, "part": dict(content), "unit": unit}
+    inputs, parameters = {"source": whole}, {"procedure": procedure, "unit": unit, **stated}
     code = code_hash(("pipelines.importers.waveforms", f"pipelines.procedures.{procedure}"))
     key = stage_key("import", inputs, parameters, code)
     about = {

@@ -12,6 +12,7 @@ import urllib.error
 import urllib.request
 from datetime import UTC, datetime, timedelta
 from hashlib import sha256
+from http.client import HTTPException
 from typing import TYPE_CHECKING, Any, cast
 
 from pipelines.archive.files import json_bytes, publish
@@ -30,6 +31,9 @@ MOST_IDS = 5000
 AUDIT_AGE = timedelta(days=10)
 """Findings of an older audit are not posted."""
 
+CONTENT_REFUSED = {400, 413, 422}
+"""Answers that refuse one alert for its content; the alerts after it are posted."""
+
 KINDS = {"CRASHED": "crashed", "FAILED": "failed", "CANCELLED": "missed"}
 
 
@@ -42,6 +46,20 @@ def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
     """
     found = [*_of_runs(snapshot), *_of_stations(snapshot)]
     return [*found, *_of_audit(audits, snapshot.when)] if audits is not None else found
+
+
+def _opener() -> urllib.request.OpenerDirector:
+    """Follows no redirection, which is an error here: a POST would become a GET, whose answer accepts nothing."""
+    opener = urllib.request.OpenerDirector()
+    for handler in (
+        urllib.request.ProxyHandler,
+        urllib.request.HTTPHandler,
+        urllib.request.HTTPSHandler,
+        urllib.request.HTTPDefaultErrorHandler,
+        urllib.request.HTTPErrorProcessor,
+    ):
+        opener.add_handler(handler())
+    return opener
 
 
 class Poster:
@@ -66,26 +84,30 @@ class Poster:
     def post(self, alerts: list[Alert]) -> tuple[int, str]:
         """Number of alerts accepted in this call, and the first error; the next call posts the remaining alerts."""
         accepted = self._accepted()
-        count = 0
+        count, fault = 0, ""
         for alert in alerts:
             if alert["id"] in accepted:
                 continue
             try:
                 self._send(alert)
-            except (urllib.error.URLError, TimeoutError, ConnectionError) as problem:
-                if isinstance(problem, urllib.error.HTTPError):
-                    problem.close()
-                return count, f"alerts: the web hook does not accept an alert ({problem}); it is posted again"
+            except (OSError, HTTPException) as problem:
+                fault = fault or f"alerts: the web hook does not accept an alert ({problem}); it is posted again"
+                if not isinstance(problem, urllib.error.HTTPError):
+                    return count, fault
+                problem.close()
+                if problem.code in CONTENT_REFUSED:
+                    continue
+                return count, fault
             accepted[alert["id"]] = time.time()
             newest = sorted(accepted.items(), key=lambda item: item[1])[-MOST_IDS:]
             publish(self._place, json_bytes(dict(newest)))
             count += 1
-        return count, ""
+        return count, fault
 
     def _send(self, alert: Alert) -> None:
         headers = {"Content-Type": "application/json", "User-Agent": "tumbleline"}
         request = urllib.request.Request(self._address, json.dumps(alert).encode(), headers)  # noqa: S310 - checked above
-        with urllib.request.urlopen(request, timeout=TIMEOUT_S):  # noqa: S310
+        with _opener().open(request, timeout=TIMEOUT_S):
             return
 
     def _accepted(self) -> dict[str, float]:

@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import urllib.error
+import urllib.parse
 import urllib.request
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -83,7 +84,7 @@ def read_queues(now: datetime | None = None) -> QueueNumbers:
     ended = [_run(one) for one in (*_runs(failed), *_runs(cancelled))]
     numbers.ended = [run for run in ended if run.state in FAILED or run.message.startswith(MISSED)]
     for pool in _ask("work_pools/filter", {"limit": PAGE_SIZE}):
-        name = pool["name"]
+        name = urllib.parse.quote(str(pool["name"]), safe="")
         for queue in _ask(f"work_pools/{name}/queues/filter", {"limit": PAGE_SIZE}):
             numbers.queues[queue["name"]] = bool(queue["is_paused"])
         for worker in _ask(f"work_pools/{name}/workers/filter", {"limit": PAGE_SIZE}):

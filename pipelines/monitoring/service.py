@@ -57,8 +57,8 @@ def alerting(monitor: Monitor, poster: Poster, audits: Path | None, every_s: flo
         while True:
             try:
                 count, fault = poster.post(alerts_of(monitor.snapshot(), audits))
-            except OSError as problem:  # the id could not be written: the alert is posted again
-                count, fault = 0, f"alerts: {problem}"
+            except Exception as problem:  # noqa: BLE001 - the thread must not end without a word: the alerts are posted again
+                count, fault = 0, f"alerts: {type(problem).__name__}: {problem}"
             if count:
                 tell(f"alerts: {count} posted", event="alerts_posted", count=count)
             if fault and fault != before:

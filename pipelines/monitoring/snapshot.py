@@ -91,6 +91,13 @@ class Snapshot:
         return out
 
 
+def _reason(problem: Exception, prefix: str) -> str:
+    """Why a source could not be read; never empty, as an empty reason means that it was read."""
+    if isinstance(problem, TumblelineError | OSError) and str(problem):
+        return str(problem).removeprefix(prefix)
+    return f"{type(problem).__name__}: {problem}; run 'tumbleline verify', and report this message if it stays"
+
+
 class Monitor:
     """Takes snapshots of an archive, the orchestrator of the environment and the stations of this computer.
 
@@ -127,19 +134,19 @@ class Monitor:
         try:
             self._reader.archive.refuse_none()
             archive = self._reader.read()
-        except (TumblelineError, OSError) as problem:
-            faults["archive"] = str(problem).removeprefix("archive: ")
+        except Exception as problem:  # noqa: BLE001 - a damaged file of one source must not hide the others
+            faults["archive"] = _reason(problem, "archive: ")
         if configured():
             faults["orchestrator"] = ""
             try:
                 queues = read_queues()
-            except TumblelineError as problem:
-                faults["orchestrator"] = str(problem).removeprefix("orchestrator: ")
+            except Exception as problem:  # noqa: BLE001 - the same
+                faults["orchestrator"] = _reason(problem, "orchestrator: ")
         faults["stations"] = ""
         try:
             stations = read_stations(state_folder())
-        except (TumblelineError, OSError) as problem:
-            faults["stations"] = str(problem)
+        except Exception as problem:  # noqa: BLE001 - the same
+            faults["stations"] = _reason(problem, "stations: ")
         return Snapshot(
             datetime.now(UTC),
             self._reader.window_d,

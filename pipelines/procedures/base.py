@@ -221,9 +221,14 @@ class Procedure(ABC):
 
 
 def worst(values: Sequence[FigureValue]) -> FigureValue:
-    """The deciding axis: one that is not identified, else the largest magnitude with twice its uncertainty."""
+    """The deciding axis: one that is not identified, or no number, else the largest magnitude with twice its uncertainty."""
     missing = [one for one in values if not one.identified]
-    return missing[0] if missing else max(values, key=lambda one: abs(one.value) + 2.0 * one.uncertainty)
+
+    def size(one: FigureValue) -> float:
+        found = abs(one.value) + 2.0 * one.uncertainty
+        return found if np.isfinite(found) else np.inf  # max() passes over a nan that is not the first
+
+    return missing[0] if missing else max(values, key=size)
 
 
 def scale_of(part: NominalScale, device: Device, unit: str) -> Array:

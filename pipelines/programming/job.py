@@ -38,7 +38,8 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
             f"program: run {run.id} is an import, a run on a station is needed; measure the units on a station"
         )
     slots = {unit["serial"]: int(unit["slot"]) for unit in run.about["lot"]["units"]}
-    found = unit_calibrations(run, tuple(serials), failed=False, revoked=True)
+    once = tuple(dict.fromkeys(serials))  # a device that is named twice is written once
+    found = unit_calibrations(run, once, failed=False, revoked=True)
     allowed = [unit for unit in found if not _revoked(unit)]
     revoked = [unit for unit in found if _revoked(unit)]
     if revoked and (serials or not allowed):
@@ -100,10 +101,16 @@ def program_run(
 
 
 def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None:
-    """The calibration of this run that a unit has today, or had until a programming that was not completed."""
+    """The calibration of this run that a unit has today, or had until a programming that was not completed.
+
+    The last one of the run decides: one before it, which an earlier writing ended, does not come back where the last was ended
+    for another reason.
+    """
     own = [one for one in ledger.calibrations(serial) if one.run == run and one.stated_until > day >= one.start]
-    found = [one for one in own if one.holds(day) or (one.ended_by is not None and one.ended_by.reason == REASON)]
-    return found[-1] if found else None
+    last = own[-1] if own else None
+    if last is None or last.holds(day):
+        return last
+    return last if last.ended_by is not None and last.ended_by.reason == REASON else None
 
 
 def _ends(ledger: Ledger, serial: str, day: str) -> bool:

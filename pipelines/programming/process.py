@@ -19,6 +19,7 @@ from pipelines.programming.outcome import Choice, Outcome
 from schemas.errors import OperatorNeeded, StationError, StationRefused, WrongUse
 from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.devices.memory import COPIES
+from stations.safety.suspenders import require_released
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -63,7 +64,7 @@ class Programmer:
 
         Raises
         ------
-        StationError, LeaseLost
+        StationError, LeaseLost, EmergencyStop
             The station fails for all units; every unit whose programming has begun is recorded as failed.
         """
         outcomes = [
@@ -98,10 +99,16 @@ class Programmer:
     def _memory(self, slot: int) -> UnitMemory:
         return self.station.reader.slots[slot].memory(self.station.clock)
 
+    def _require(self) -> None:
+        """Ends the programming where the lease is lost or the emergency stop is pressed; before power and axes change."""
+        self.station.require()
+        require_released(self.station.reader.guarded())
+
     def _check(self, outcomes: Sequence[Outcome]) -> None:
         """Refuses, before anything is written, units and stations that cannot be verified."""
         reader = self.station.reader
         reader.require_switch()
+        self._require()
         for pose in self._poses():
             self.station.table.check(pose.outer_deg, pose.inner_deg)
         if not reader.powered():
@@ -198,7 +205,7 @@ class Programmer:
     def _power_cycle(self) -> None:
         reader, clock = self.station.reader, self.station.clock
         self.report("power cycle")
-        self.station.require()
+        self._require()
         reader.switch("off")
         try:
             clock.sleep(OFF_S)
@@ -230,6 +237,7 @@ class Programmer:
             if not any(one.open for one in outcomes):
                 return
             self.report(f"verify in pose {pose.name}")
+            self._require()
             self.station.table.move(pose.outer_deg, pose.inner_deg)
             plain = self._means(outcomes)
             if number == 0 and self.choice.with_offsets:

@@ -173,10 +173,11 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
 
 
 def _badness(figure: Figure, guard: float, *, least: bool) -> float:
-    """How far a figure lies towards its limit, with its guard band; infinite where it is not determined."""
+    """How far a figure lies towards its limit, with its guard band; infinite where it is not determined, or no number."""
     if figure.why_not:
         return float("inf")
-    return (-figure.value if least else abs(figure.value)) + guard * figure.uncertainty
+    found = (-figure.value if least else abs(figure.value)) + guard * figure.uncertainty
+    return found if np.isfinite(found) else float("inf")
 
 
 def _coefficients(evidence: Evidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:

@@ -191,3 +191,50 @@ def test_the_command_keeps_the_newest_copies_of_the_database(
     kept = sorted(path.name for path in copies.iterdir())
     assert kept[0] == "orchestrator-20260105T000000.db"
     assert rows_of(copies / kept[1]) == 3
+
+
+@pytest.mark.parametrize("suffix", [".json", ".parquet"])
+def test_a_damaged_file_of_the_archive_does_not_replace_the_sound_one_of_the_copy(
+    made: Path, tmp_path: Path, suffix: str
+) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    copy_archive(archive, copy)
+    damaged = next((tmp_path / "line" / "archive").glob("runs/*/coefficients.json")).with_suffix(suffix)
+    name = damaged.relative_to(tmp_path / "line" / "archive")
+    sound = damaged.read_bytes()
+    damaged.write_bytes(sound[:-1])
+    with pytest.raises(ArchiveUnusable, match=rf"1 files of .* damaged .*coefficients\{suffix}"):
+        copy_archive(archive, copy)
+    assert (tmp_path / "copy" / name).read_bytes() == sound
+    assert verify(copy, keys={}).whole
+    damaged.write_bytes(sound)
+    assert copy_archive(archive, copy).files == 0
+
+
+def test_a_database_that_a_server_has_open_is_not_replaced(tmp_path: Path) -> None:
+    live, copy = tmp_path / "prefect.db", tmp_path / "one.db"
+    database(live, 5)
+    copy_database(str(live), copy)
+    with closing(sqlite3.connect(live)) as server:
+        server.execute("insert into flow_run values (7)")
+        server.commit()
+        with pytest.raises(WrongUse, match="is in use"):
+            restore_database(copy, str(live))
+        assert server.execute("select count(*) from flow_run").fetchone()[0] == 6
+    restore_database(copy, str(live))
+    assert rows_of(live) == 5
+
+
+def test_a_refused_restore_of_the_archive_leaves_the_database(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PREFECT_HOME", str(tmp_path))
+    monkeypatch.delenv("PREFECT_SERVER_DATABASE_CONNECTION_URL", raising=False)
+    database(tmp_path / "prefect.db", 5)
+    database(tmp_path / "old.db", 1)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "file").touch()
+    words = ["archive", "restore", str(made / "archive"), "--archive", str(tmp_path / "other")]
+    assert CliRunner().invoke(app, [*words, "--database", str(tmp_path / "old.db")]).exit_code != 0
+    assert rows_of(tmp_path / "prefect.db") == 5

@@ -170,6 +170,23 @@ def test_a_wrong_force_is_told_by_the_innovations(run: Run, tmp_path: Path, rng:
     assert status == 1
 
 
+def test_a_gap_in_the_recording_changes_neither_steps_nor_uncertainty(
+    run: Run, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    n = 6000
+    table = raw(run, np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 25.0), rng, np.zeros(3))
+    later = table.assign(time_s=table["time_s"] + 600.0 * (np.arange(n) >= n // 2))
+    words, found = ["--calibration", "latest:A1", "--turn-on", "300", "--force", "0,0,1"], []
+    for name, one in (("whole", table), ("gap", later)):
+        one.to_csv(tmp_path / f"{name}.csv", index=False)
+        document, _ = correct(run, str(tmp_path / f"{name}.csv"), *words, "-o", str(tmp_path / f"{name}.parquet"))
+        assert document["bias"]["steps"] == 60
+        found.append(pd.read_parquet(tmp_path / f"{name}.parquet")["u_x_ug"].to_numpy())
+    whole, gap = found
+    np.testing.assert_allclose(gap[: n // 2], whole[: n // 2], rtol=1e-6)
+    assert gap[n // 2] > whole[n // 2]  # the bias has drifted meanwhile
+
+
 def test_refusals_say_what_is_missing(
     run: Run, tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -95,7 +95,7 @@ def test_a_refused_question_writes_nothing_and_names_the_next_command(alike: Pat
     words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", tmp_path / "m.toml")
     status, out, err = run(*words, typed="perhaps\nn\n")
     assert status == 1
-    assert f"to {tmp_path / 'm.toml'}? [Y/n]" in err
+    assert f"to {tmp_path / 'm.toml'}? [Y/n]" in " ".join(err.split())
     assert "'perhaps' is neither yes nor no: y or Enter adds it" in " ".join(err.split())
     assert "second_order is not added" in out
     assert "--effect second_order\n" in out.split("Next:")[1]

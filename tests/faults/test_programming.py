@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zlib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,11 +28,13 @@ from pipelines.export import UnitCalibration
 from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, unpack
 from pipelines.integrity import verify
 from pipelines.jobs.job import Job
+from pipelines.programming.job import REASON, _held, chosen_units
 from schemas.errors import StationRefused, StationTimeout, WrongUse
 from schemas.fault import FaultOrder
 from stations.codec import Value
 from stations.devices.memory import UnitMemory
 from stations.plant.plant import Plant
+from stations.safety.suspenders import EmergencyStop
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -348,3 +351,37 @@ def test_the_guide_prints_what_the_command_prints(run: Run, monkeypatch: pytest.
 def words_of(text: str) -> str:
     """The text with every run of blanks and of table lines as one blank."""
     return " ".join(re.sub(r"[─\s]+", " ", text).split())
+
+
+def test_nothing_is_written_while_the_emergency_stop_is_pressed(run: Run) -> None:
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="emergency_stop", at_s=0.0)))
+    with pytest.raises(EmergencyStop):
+        programmed(run, ("A1",))
+    assert programming(run.archive.root, "A1") == []
+    assert ledger.valid_at("A1", today()) is not None
+
+
+def test_a_device_that_is_named_twice_is_written_once(run: Run) -> None:
+    assert [unit.unit for _, unit in chosen_units(run, ["A1", "A1"])] == ["A1"]
+
+
+def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> None:
+    class Held:
+        """Calibrations of one run: the first was ended by a writing, the second by ``reason``."""
+
+        def __init__(self, reason: str) -> None:
+            self.reason = reason
+
+        def calibrations(self, _serial: str) -> list[SimpleNamespace]:
+            span = {"run": "r", "start": "2026-01-01", "stated_until": "2027-01-01", "holds": lambda _day: False}
+            return [
+                SimpleNamespace(number=n, ended_by=SimpleNamespace(reason=reason), **span)
+                for n, reason in enumerate([REASON, self.reason], 1)
+            ]
+
+    assert _held(Held("superseded"), "A1", "r", "2026-06-01") is None
+    interrupted = _held(Held(REASON), "A1", "r", "2026-06-01")
+    assert interrupted is not None
+    assert interrupted.number == 2

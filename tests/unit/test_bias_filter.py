@@ -193,3 +193,10 @@ def test_consistency_has_the_bounds_of_chi_square() -> None:
     for n, low, high in ((50, 0.647, 1.428), (100, 0.742, 1.296), (1000, 0.914, 1.090)):
         found = consistency([(0, 1.0)] * n)
         assert (found.low, found.high) == pytest.approx((low, high), abs=1e-3)
+
+
+def test_a_step_whose_innovations_are_rejected_has_updated_nothing() -> None:
+    nothing = np.full(3, np.nan)
+    found = track(one_process(1e-5, 1e-4, 100.0), np.arange(3.0), np.full((3, 3), 0.5), np.zeros((3, 3)), nothing, 1.0)
+    assert found.rejected == 9
+    assert not found.updated.any()

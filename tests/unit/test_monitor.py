@@ -215,6 +215,13 @@ def receiver(answers: list[int]) -> Iterator[tuple[str, list[dict]]]:
             if status == 200:
                 accepted.append(content)
             self.send_response(status)
+            if 300 <= status < 400:
+                self.send_header("Location", "/elsewhere")
+            self.end_headers()
+
+        def do_GET(self) -> None:
+            """Any page but the web hook."""
+            self.send_response(200)
             self.end_headers()
 
         def log_message(self, *_: object) -> None:
@@ -304,3 +311,57 @@ def test_a_command_tells_its_error_as_json_on_request() -> None:
     content = json.loads(done.stderr)
     assert (content["level"], content["status"]) == ("error", 2)
     assert "no command is called 'shw'" in content["message"]
+
+
+def test_a_receiver_that_redirects_has_not_accepted_an_alert(tmp_path: Path) -> None:
+    alerts = alerts_of(full(stations=StationNumbers(set(), {"line-1": "run-1"})))
+    with receiver([307, 302, 301]) as (address, accepted):
+        for status in ("307", "302", "301"):
+            count, fault = Poster(address, tmp_path).post(alerts)
+            assert (count, status in fault) == (0, True)
+        assert Poster(address, tmp_path).post(alerts) == (1, "")
+    assert len(accepted) == 1
+
+
+def test_an_alert_that_is_refused_for_its_content_does_not_hold_up_the_others(tmp_path: Path) -> None:
+    alerts = alerts_of(troubled(tmp_path))
+    with receiver([400]) as (address, accepted):
+        count, fault = Poster(address, tmp_path).post(alerts)
+    assert (count, "400" in fault) == (len(alerts) - 1, True)
+    assert [one["id"] for one in accepted] == [one["id"] for one in alerts[1:]]
+
+
+def test_an_unexpected_error_of_one_source_does_not_hide_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_folder: Path) -> StationNumbers:
+        raise KeyError("pid")
+
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    monkeypatch.delenv("PREFECT_API_URL", raising=False)
+    monkeypatch.setattr(snapshots, "read_stations", broken)
+    taken = Monitor(Archive(tmp_path / "none")).snapshot()
+    assert "KeyError" in taken.faults["stations"]
+    assert not taken.ok
+
+
+class _Failing(_Fixed):
+    """A monitor whose first snapshots fail."""
+
+    failures = 2
+
+    def snapshot(self) -> Snapshot:
+        if self.failures:
+            self.failures -= 1
+            raise ValueError("no number")
+        return self.taken
+
+
+def test_alerts_go_on_after_an_unexpected_error(tmp_path: Path) -> None:
+    monitor = _Failing(full(stations=StationNumbers(set(), {"line-1": "run-1"})))
+    with receiver([]) as (address, accepted), alerting(monitor, Poster(address, tmp_path), None, every_s=0.02):
+        for _ in range(500):
+            if accepted:
+                break
+            threading.Event().wait(0.02)
+    assert [one["kind"] for one in accepted] == ["unsafe"]

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from inertial.errors import NotIdentified
@@ -13,7 +14,9 @@ from inertial.noise.terms import fit_terms
 from inertial.population.change_points import change_points
 from inertial.population.comparison import holm
 from pipelines.audit.exchanged_pairs import _fits
+from pipelines.procedures.base import FigureValue, worst
 from pipelines.stages.figures import UNITS
+from pipelines.stages.grade import _of_procedures
 from pipelines.stages.noise import limits_where_unexplained
 from schemas.limits import decide, parse_limits
 
@@ -66,3 +69,20 @@ def test_a_series_with_a_gap_has_no_change() -> None:
 @pytest.mark.parametrize(("value", "u"), [(np.nan, 1.0), (10.0, np.nan), (np.inf, 0.0)])
 def test_a_figure_that_is_no_number_does_not_pass(value: float, u: float) -> None:
     assert not decide(parse_limits(LIMITS, "t", UNITS), "bias_error_ug", value, u).passed
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_an_axis_that_is_no_number_decides(place: int) -> None:
+    values = [FigureValue("f", axis, 0.1, 0.01) for axis in "xyz"]
+    values[place] = FigureValue("f", "xyz"[place], np.nan, 0.01)
+    assert np.isnan(worst(values).value)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_repeated_procedure_that_is_no_number_decides(place: int) -> None:
+    limits = parse_limits(LIMITS, "test", UNITS)
+    row = {"unit": "A", "figure": "bias_error_ug", "axis": "x", "unit_text": "µg", "identified": True, "note": ""}
+    rows = [row | {"value": 1.0, "uncertainty": 0.1}, row | {"value": 2.0, "uncertainty": 0.1}]
+    rows[place]["value"] = np.nan
+    [found] = _of_procedures(pd.DataFrame(rows), "A", limits)
+    assert decide(limits, found.name, found.value, found.uncertainty).outcome != "pass"

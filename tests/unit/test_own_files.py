@@ -104,3 +104,9 @@ def test_a_changed_preset_of_ones_own_is_measured_anew(home: Path) -> None:
     shutil.rmtree(home)
     assert Request().job().capture_id == built_in.capture_id
     assert os.environ["XDG_CONFIG_HOME"]
+
+
+def test_a_relative_folder_of_the_configuration_is_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CONFIG_HOME", "config")
+    assert own_files.folders("limits")[1] == tmp_path / ".config" / "tumbleline" / "limits"

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from inertial.errors import NotIdentified
+from inertial.fits import plane
 from inertial.fits.plane import fit_plane, fit_plane_norm, plane_across, quiet_axis
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.importers.plane import axis_of_plane
@@ -81,3 +82,14 @@ def test_the_norm_alone_gives_no_scale_to_an_axis_that_was_not_turned(rng: np.ra
     assert axis_of_plane(dwells) == 1
     with pytest.raises(DataRejected, match="does not show its scale; turn all axes, or fit the two others"):
         diagnose(dwells)
+
+
+@pytest.mark.parametrize("unknown", [0, 1, 2])
+def test_a_probability_that_is_no_number_stays_none(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, unknown: int
+) -> None:
+    found = [np.nan if k == unknown else 0.8 for k in range(3)]
+    monkeypatch.setattr(plane, "_harmonics", lambda *_: found.pop(0))
+    force, output = turned(rng)
+    fit = fit_plane(output, force, 1, 30.0 * np.arange(24), np.full((24, 3), NOISE))
+    assert np.isnan(fit.p_value)

@@ -152,3 +152,22 @@ def test_dwells_and_steps_of_others_are_imported_by_the_command(tmp_path: Path, 
     figures = {one["figure"]: one["value"] for one in found["figures"]}
     assert figures["sweep_natural_hz"] == pytest.approx(2000.0, rel=0.01)
     assert figures["sweep_damping"] == pytest.approx(0.65, abs=0.01)
+
+
+def test_the_same_files_at_another_rate_are_another_run(tmp_path: Path, rng: np.random.Generator) -> None:
+    paths = [tmp_path / f"shock{k}.csv" for k in range(4)]
+    for k, path in enumerate(paths):
+        channels = shock((-1.0) ** k, rng)
+        rows = np.column_stack([one.values for one in channels])
+        np.savetxt(path, rows, delimiter=",", header="dut,ref", comments="")
+    part, archive = tmp_path / "part.toml", str(tmp_path / "archive")
+    part.write_text(SHOCK)
+    columns, values = {"z": "dut", "reference": "ref"}, []
+    for rate in (RATE, 0.9 * RATE):
+        asked = Asked(columns, {"output": "V", "reference": "g"}, rate)
+        found = import_waveforms(paths, "shock", part, "S1", asked, archive)
+        kept = Archive(archive).run(found["run"]).table("procedure_figures").set_index("figure")["value"]
+        shown = {one["figure"]: one["value"] for one in found["figures"] if one["identified"]}
+        assert all(kept[name] == pytest.approx(value) for name, value in shown.items())
+        values.append(found["run"])
+    assert values[0] != values[1]

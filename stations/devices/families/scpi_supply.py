@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 NOMINAL = 1.0  # the memory that holds the nominal setting
 SETTLE_S = 1.0
+FARTHEST = 0.5  # share of the nominal voltage by which an order may differ from it, as procedures may ask
 REACHED = 0.01  # share of the order by which the measured voltage may differ
 
 
@@ -32,13 +33,24 @@ class ScpiSupply(Equipment):
         Raises
         ------
         StationRefused
-            The supply reports an error.
+            The supply reports an error, its memory 1 holds no voltage, or the order is far from that voltage: a recipe that was
+            written for devices with another supply would destroy these.
         OperatorNeeded
             The measured voltage is not the one that was set.
         """
         if self._nominal_V <= 0.0:
             self._recall()
-            self._nominal_V = self.values.number("voltage")
+            nominal = self.values.number("voltage")
+            if not nominal > 0.0:
+                raise StationRefused(
+                    f"{self.name}: memory 1 holds {nominal:g} V, the nominal voltage of the devices is needed; store it there"
+                )
+            self._nominal_V = nominal
+        if not abs(volt / self._nominal_V - 1.0) <= FARTHEST:
+            raise StationRefused(
+                f"{self.name}: {volt:g} V was ordered, at most {100.0 * FARTHEST:g} % from the nominal {self._nominal_V:g} V of "
+                "the devices (memory 1) is allowed; correct supplies_V of the recipe"
+            )
         self._changed = True
         self.values.write("voltage", volt)
         self._refuse_error(f"{volt:g} V")

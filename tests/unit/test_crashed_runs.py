@@ -1,0 +1,53 @@
+"""A run that the server calls crashed is not started a second time beside its own process."""
+
+import os
+import subprocess
+import sys
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from prefect.client.schemas.objects import StateType
+
+from pipelines.flows import queue_rules
+
+NOW = datetime(2026, 6, 1, 12, tzinfo=UTC)
+
+
+class Client:
+    """A client of the server with one crashed run; it keeps what was scheduled."""
+
+    def __init__(self) -> None:
+        self.scheduled: list[str] = []
+
+    def read_flow_run_states(self, _run: str) -> list[Any]:
+        return [SimpleNamespace(type=StateType.CRASHED)]
+
+    def read_flow_run(self, _run: str) -> Any:
+        return SimpleNamespace(state_type=StateType.CRASHED)
+
+    def set_flow_run_state(self, run: str, _state: Any, *, force: bool) -> None:
+        assert force
+        self.scheduled.append(run)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are recognised by /proc")
+def test_a_crashed_run_whose_process_lives_is_not_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = [sys.executable, "-c", "import time; time.sleep(60)"]
+    process = subprocess.Popen(words, env={**os.environ, "PREFECT__FLOW_RUN_ID": "run-1"})
+    state = SimpleNamespace(timestamp=NOW - timedelta(minutes=2))
+    run = SimpleNamespace(
+        id="run-1", name="a-run", tags=["crashed=continue"], infrastructure_pid=str(process.pid), state=state
+    )
+    monkeypatch.setattr(queue_rules, "runs_of_queue", lambda *_: [run])
+    client = Client()
+    try:
+        assert queue_rules._continue_crashed(client, "pool", "line-1", NOW, queue_rules.SETTLED) == []
+        assert client.scheduled == []
+    finally:
+        process.kill()
+        process.wait()
+    [text] = queue_rules._continue_crashed(client, "pool", "line-1", NOW, queue_rules.SETTLED)
+    assert text.startswith("run a-run continues from its checkpoint")
+    assert client.scheduled == ["run-1"]
