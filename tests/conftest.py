@@ -12,7 +12,8 @@ from inertial import effects
 
 ROOT = Path(__file__).resolve().parent.parent
 for _name in ("COLUMNS", "LINES"):
-    os.environ.pop(_name, None)  # workers of pytest-xdist have those of a terminal; the output of the tests goes into pipes
+    # workers of pytest-xdist have those of a terminal; the output of the tests goes into pipes
+    os.environ.pop(_name, None)
 
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")
 

@@ -106,8 +106,8 @@ def import_waveforms(
     texts = [(f.subject, f.text) for f in outcome.findings]
     if not np.isfinite(full_scale):
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
-    stated = {"part": content, "columns": dict(asked.columns), "units": dict(asked.units), "rate_hz": asked.rate_hz}
-    stated |= {"group": asked.group}
+    stated = {"part": content, "columns": dict(layout.columns), "units": dict(layout.units), "rate_hz": layout.rate_hz}
+    stated |= {"group": layout.group}
     run = _keep(procedure, stated, points, found, texts, sources, unit, archive)
     units = {spec.name: spec.unit for spec in one.figures}
     figures: list[WaveformFigure] = [

@@ -164,8 +164,8 @@ def test_the_same_files_at_another_rate_are_another_run(tmp_path: Path, rng: np.
     part.write_text(SHOCK)
     columns, values = {"z": "dut", "reference": "ref"}, []
     for rate in (RATE, 0.9 * RATE):
-        asked = Asked(columns, {"output": "V", "reference": "g"}, rate)
-        found = import_waveforms(paths, "shock", part, "S1", asked, archive)
+        layout = RecordingLayout(columns, {"output": "V", "reference": "g"}, rate)
+        found = import_waveforms(paths, "shock", part, "S1", layout, archive)
         kept = Archive(archive).run(found["run"]).table("procedure_figures").set_index("figure")["value"]
         shown = {one["figure"]: one["value"] for one in found["figures"] if one["identified"]}
         assert all(kept[name] == pytest.approx(value) for name, value in shown.items())
