@@ -48,18 +48,12 @@ def load_profile(name: str) -> Profile:
         return _parsed(read_text(path, "profile"), str(path))
     if name not in built_in_profiles():
         raise RecipeInvalid(f"profile: no '{name}'; {did_you_mean(name, profile_names())}", key="profile")
-    return _product_profile(name)
+    return _parsed(profile_folder().joinpath(f"{name}.toml").read_text("utf-8"), f"stations/profiles/{name}.toml")
 
 
 def built_in_profiles() -> list[str]:
     """Names of the profiles of the product."""
     return [item.name.removesuffix(".toml") for item in profile_folder().iterdir() if item.name.endswith(".toml")]
-
-
-@cache
-def _product_profile(name: str) -> Profile:
-    source = f"stations/profiles/{name}.toml"
-    return parse_profile(profile_folder().joinpath(f"{name}.toml").read_text("utf-8"), source)
 
 
 @cache

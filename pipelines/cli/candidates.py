@@ -108,6 +108,11 @@ def _effects(ctx: Context) -> list[str]:
     return list(catalogue())
 
 
+def _effects_with_value(ctx: Context) -> list[str]:
+    """The beginning of EFFECT=µg; the value has no candidates."""
+    return [f"{name}=" for name in _effects(ctx)]
+
+
 def _hidden(ctx: Context) -> list[str]:
     from pipelines.demo.scenes import SCENES
 
@@ -174,6 +179,7 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("run_a", "RUN"): _runs,
     ("run_b", "RUN"): _runs,
     ("runs", "RUN"): _runs,
+    ("calibration", "RUN"): _runs,
     ("names", "RUN|UNIT"): _runs_and_units,
     ("target", "UNIT|RUN"): _runs_and_units,
     ("selection", "SELECTION"): _selections,
@@ -187,6 +193,7 @@ SOURCES: dict[tuple[str, str], Callable[[Context], Iterable[str]]] = {
     ("effect", ""): _effects,
     ("effects", ""): _effects,
     ("remove", "EFFECT"): _effects,
+    ("required_errors", "EFFECT="): _effects_with_value,
     ("see", ""): _effects,
     ("part", ""): _effects,
     ("name", "PROFILE"): _profiles,

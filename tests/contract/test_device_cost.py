@@ -105,12 +105,10 @@ def product(tmp_path, monkeypatch):
         for module in [name for name in sys.modules if name.startswith(f"{package.__name__}.acme")]:
             del sys.modules[module]
             delattr(package, module.rpartition(".")[2])
-    load_profile.cache_clear()
     adapters.cache_clear()
 
 
 def refresh():
-    load_profile.cache_clear()
     adapters.cache_clear()
 
 
@@ -164,6 +162,17 @@ def test_a_device_of_a_known_family_is_one_profile(product):
     assert "### acme_c1" not in PAGE.read_text(
         encoding="utf-8"
     )  # the check of the reference would fail until it is written
+
+
+def test_a_profile_is_parsed_once_until_its_file_changes(product):
+    profiles, *_ = product
+    path = profiles / "acme_c1.toml"
+    path.write_text(PROFILE.format(name="acme_c1", family="set_point", more=""), "utf-8")
+    first = load_profile("acme_c1")
+    assert load_profile("acme_c1") is first
+    path.write_text(PROFILE.format(name="acme_c1", family="set_point", more=ENABLE), "utf-8")
+    assert not first.has("enable")
+    assert load_profile("acme_c1").has("enable")
 
 
 def test_a_new_family_is_two_modules_beside_its_profile(product):

@@ -9,7 +9,7 @@ from small_station import lot_of, plant_of
 
 from schemas.errors import RecipeInvalid, StationRefused
 from schemas.profile import parse_profile
-from schemas.station import load_station
+from schemas.station import Device, Equipment, load_station
 from stations.codec import NotEncodable, encode
 from stations.devices.registers import Registers
 from stations.links.modbus import ModbusLink
@@ -29,6 +29,9 @@ def name(request):
 def station_with(name):
     """The built-in station with its device of that kind behind this profile."""
     config, kind = load_station(), load_profile(name).kind
+    if kind in Equipment.model_fields:
+        own = Equipment.model_validate({kind: Device(profile=name, device_id=60, link="tcp")})
+        return config.model_copy(update={"equipment": own})
     places = {"axis": ("outer", "inner"), "slot": ("slots",)}.get(kind, (kind,))
     link = "ascii" if load_profile(name).commands else "tcp"
     update = {"profile": name, "link": link}

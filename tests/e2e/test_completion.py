@@ -58,6 +58,8 @@ def bash(script: str, home: Path, *words: str) -> subprocess.CompletedProcess[st
         (["diagnose", "latest", "--effects", "bias,sca"], {"bias,scale", "bias,scale_temperature"}),
         (["plan", "opt"], {"optimise"}),
         (["run", "--fau"], {"--fault"}),
+        (["correct", "flight.csv", "--calibration", "la"], {"latest"}),
+        (["plan", "optimise", "production", "--wanted", "third"], {"third_order="}),
     ],
 )
 def test_the_tab_key_offers(place: Path, words: list[str], offered: set[str]) -> None:
@@ -83,8 +85,6 @@ def test_every_parameter_that_takes_a_name_has_candidates(name: str) -> None:
         for parameter in leaf.params:
             metavar = str(getattr(parameter, "metavar", "") or "").replace("FLOW-RUN", "")
             if any(word in metavar for word in ("RUN", "RECIPE", "PROFILE", "PRESET", "EFFECT", "SERIAL", "SELECTION")):
-                if parameter.name == "wanted":  # EFFECT=µg is no name alone
-                    continue
                 assert candidates_of(parameter) is not None, (name, parameter.name, metavar)
 
 

@@ -20,7 +20,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 def typed(page: Path) -> list[str]:
     """Every `tumbleline …` of a page: lines of code blocks and code within a sentence."""
-    text = page.read_text(encoding="utf-8")
+    text = re.sub(r" *\\\n *", " ", page.read_text(encoding="utf-8"))  # a backslash joins the next line to the command
     lines = re.findall(r"^[ $]*(tumbleline +[a-z].*)$", text, re.MULTILINE)
     inline = re.findall(r"(?<!`)`(tumbleline +[a-z][^`\n]*)`(?!`)", text)
     return [line.split("  #")[0].strip() for line in (*lines, *inline)]

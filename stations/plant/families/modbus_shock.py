@@ -45,7 +45,6 @@ def simulated(world: World, profile: Profile) -> Bank:
     sources: dict[str, Callable[[], Value]] = {
         **{name: setting(head) for name, head in HEADS.items()},
         "arm": lambda: int(report("STAT") == "ARMED"),
-        "release": lambda: 0,
         "door": named("DOOR", "door"),
         "state": named("STAT", "state"),
         "file": lambda: report("FILE"),
