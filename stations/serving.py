@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from schemas.errors import StationError, WrongUse
+from schemas.errors import StationError, StationRefused, WrongUse
 from stations.codec import named
 from stations.devices.commands import Commands
 from stations.devices.registers import Registers
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from schemas.recipe import Lot
     from schemas.station import StationConfig
     from stations.codec import Value
+    from stations.plant.plant import Plant
+    from stations.plant.server import PlantServer
 
 TICK_S = 0.05
 TRIES = 50
@@ -89,17 +91,12 @@ def serve(
         )
     from stations.clock import WallClock  # noqa: PLC0415 - only the server needs these modules
     from stations.opening import make_plant  # noqa: PLC0415
-    from stations.plant.line_server import LineServer  # noqa: PLC0415
-    from stations.plant.server import PlantServer  # noqa: PLC0415
     from stations.plant.silence import IdleStop  # noqa: PLC0415
 
     plant = make_plant(config, lot)
     silence = IdleStop(plant, config.devices, silence_s)
     with ExitStack() as stack:
-        begin = _free_port_pair(host) if plant.line_devices and port == 0 else port
-        server = stack.enter_context(PlantServer(plant, host, begin))
-        for number, device_id in enumerate(plant.line_devices, server.port + 1):
-            stack.enter_context(LineServer(plant, device_id, host, number))
+        server = _listening(plant, host, port, stack)
         ready(server.host, server.port)
         clock, done = WallClock(), 0.0
         while not stop.wait(TICK_S):
@@ -107,6 +104,27 @@ def serve(
             plant.advance(round((now - done) * speed * 1e6))
             silence.look(now)
             done = now
+
+
+def _listening(plant: Plant, host: str, port: int, stack: ExitStack) -> PlantServer:
+    """The servers of all devices, left to ``stack``; with port 0 another port is tried when a program has just taken one."""
+    from stations.plant.line_server import LineServer  # noqa: PLC0415
+    from stations.plant.server import PlantServer  # noqa: PLC0415
+
+    for attempt in range(TRIES):
+        with ExitStack() as own:
+            begin = _free_port_pair(host) if plant.line_devices and port == 0 else port
+            try:
+                server = own.enter_context(PlantServer(plant, host, begin))
+                for number, device_id in enumerate(plant.line_devices, server.port + 1):
+                    own.enter_context(LineServer(plant, device_id, host, number))
+            except StationRefused:
+                if port != 0 or attempt == TRIES - 1:
+                    raise
+                continue
+            stack.enter_context(own.pop_all())
+            return server
+    raise StationRefused(f"simulated station: {host} has no free port, one is needed; end other programs")
 
 
 def _free_port_pair(host: str) -> int:
