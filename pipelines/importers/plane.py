@@ -27,7 +27,7 @@ OUT, SPREAD = ([f"{kind}_{axis}" for axis in AXES] for kind in ("out", "sd"))
 FEWEST = 4
 UNLIKELY = 0.05
 SHOWN_DOF = 4
-"""Degrees of freedom from which an ellipse shows a turn: with fewer, outputs of any poses lie on one by chance (1 to 6 %)."""
+"""Degrees of freedom from which an ellipse shows a turn where poses are not known: with fewer, outputs of any poses lie on one by chance (1 to 6 %)."""
 GROSS = 0.02
 """Residual per degree of freedom, g, above which the dwells lie in no plane, or the model is wrong however few they are."""
 
@@ -73,7 +73,8 @@ def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
         found = _fitted(dwells, across, gravity)
     except DataRejected:
         return None
-    return _answer(found, dwells, data.out_unit) if found.dof >= SHOWN_DOF and found.misfit < GROSS else None
+    enough = known_force(dwells) is not None or found.dof >= SHOWN_DOF
+    return _answer(found, dwells, data.out_unit) if enough and found.misfit < GROSS else None
 
 
 def plane_answer(dwells: pd.DataFrame, across: int, gravity: float, out_unit: str) -> FitAnswer:
