@@ -28,10 +28,19 @@ ALONG = 0.98
 QUIET = 0.05
 """Range of an output, over the largest, below which it does not respond to gravity."""
 
+ARC = 0.25
+"""Range of the fitted force along each axis in a plane, over gravity, below which outputs show no ellipse: an arc of 83°.
+
+Without it a bias and a scale that grow together make every force alike, and |f| = g of any outputs.
+"""
+
 FEWEST_DOF = 15
 _LEAST, _TURNED = 4, 0.8
 _STEPS = 40
 _ROUNDS = 3
+_NO_ELLIPSE = (
+    "plane: the outputs of the two axes lie on no ellipse; turn further about the third axis, check the channels"
+)
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,11 @@ class PlaneFit:
     def rms(self) -> float:
         """Root mean square of the residuals, g."""
         return float(np.sqrt(np.mean(self.left**2)))
+
+    @property
+    def misfit(self) -> float:
+        """Residual of the worst series per degree of freedom, g: few dwells do not make it small."""
+        return float(np.sqrt(np.max(np.sum(self.left**2, axis=0)) / self.dof))
 
 
 def plane_across(force: Array) -> int | None:
@@ -144,6 +158,7 @@ def fit_plane_norm(output: Array, across: int, norm: float, time: Array, error: 
         whiten = norm_noise(left, rows, force / np.linalg.norm(force, axis=1, keepdims=True), time, white).whiten
     theta = _descended(flat, theta, norm, whiten)
     force, rows, left = _state(flat, theta, norm)
+    _refuse_collapsed(theta, force, norm)
     ellipse = _Series.of(rows, left, whiten)
     columns = np.column_stack([np.ones(len(flat)), force])
     other = _solved(columns, output[:, across], np.ones((len(flat), 1)), time, error[:, across])
@@ -212,6 +227,13 @@ def _refuse_few(dwells: int, coefficients: int) -> None:
         )
 
 
+def _refuse_collapsed(theta: Array, force: Array, norm: float) -> None:
+    """Refuse a fit whose norm is right because all its forces are alike, not because the outputs lie on an ellipse."""
+    along = np.ptp(force, axis=0) / norm
+    if not (np.all(_matrix(theta).diagonal() > 0.0) and np.all(along > ARC)):
+        raise NotIdentified(_NO_ELLIPSE)
+
+
 def _typical(output: Array, seen: Array, inside: tuple[int, int]) -> float:
     """Output per g of the axes in the plane."""
     columns = np.column_stack([np.ones(len(seen)), seen])
@@ -241,9 +263,7 @@ def _ellipse(flat: Array, norm: float) -> Array:
     p = np.linalg.lstsq(np.column_stack([x**2, x * y, y**2, x, y]), np.ones(len(flat)), rcond=None)[0]
     shape = np.array([[p[0], 0.5 * p[1]], [0.5 * p[1], p[2]]])
     if not np.all(np.linalg.eigvalsh(shape) > 0.0):
-        raise NotIdentified(
-            "plane: the outputs of the two axes lie on no ellipse; turn further about the third axis, check the channels"
-        )
+        raise NotIdentified(_NO_ELLIPSE)
     middle = -0.5 * np.linalg.solve(shape, p[3:])
     level = 1.0 + middle @ shape @ middle
     correction = np.linalg.cholesky(shape / level).T * norm / span

@@ -53,10 +53,11 @@ class Remaining:
     _ramp: float | None = field(init=False, default=None)
     _lag: float | None = field(init=False, default=None)
     _since: tuple[int, float] | None = field(init=False, default=None)
-    _started: float = field(init=False, default_factory=time.monotonic)
+    _started: float = field(init=False)
     _recorded: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
+        self._started = time.monotonic()
         self._planned(self.config)
 
     def _planned(self, config: StationConfig) -> None:

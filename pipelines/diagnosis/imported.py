@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 from pipelines.diagnosis.imported_norms import norm
 from pipelines.importers.faces import six_faces
-from pipelines.importers.plane import GROSS, plane
+from pipelines.importers.plane import plane, shown_turn
 from pipelines.importers.pose_check import silent_axis
 from pipelines.importers.ramp import ramp
 from schemas.errors import DataRejected
-from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,19 +29,10 @@ METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
-    if silent and (turned := _in_a_plane(data, mapping)) is not None:
+    if silent and (turned := shown_turn(data, mapping)) is not None:
         return turned
     if silent:  # more poses, which the fit requests, do not help
         raise DataRejected(
             f"import: axis {silent}; three axes that respond to gravity are needed for --fit norm; correct --map {silent[0]}=…"
         )
     return METHODS[method](data, mapping)
-
-
-def _in_a_plane(data: Imported, mapping: Mapping) -> FitAnswer | None:
-    """The fit of a sensor that was turned about its quiet axis; None where the other two do not lie on an ellipse."""
-    try:
-        found = plane(data, mapping)
-    except DataRejected:
-        return None
-    return found if found.document["error"]["rms_ug"] < MICRO * GROSS else None

@@ -26,8 +26,10 @@ if TYPE_CHECKING:
 OUT, SPREAD = ([f"{kind}_{axis}" for axis in AXES] for kind in ("out", "sd"))
 FEWEST = 4
 UNLIKELY = 0.05
+SHOWN_DOF = 4
+"""Degrees of freedom from which an ellipse shows a turn where poses are not known: with fewer, outputs of any poses lie on one by chance (1 to 6 %)."""
 GROSS = 0.02
-"""Residual, g rms, above which the dwells lie in no plane, or the model is wrong however few they are."""
+"""Residual per degree of freedom, g, above which the dwells lie in no plane, or the model is wrong however few they are."""
 
 
 def known_force(dwells: pd.DataFrame) -> Array | None:
@@ -57,6 +59,24 @@ def plane(data: Imported, mapping: Mapping) -> FitAnswer:
     return plane_answer(dwells, across, gravity, data.out_unit)
 
 
+def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
+    """The answer of a sensor that was turned about its quiet axis; None where its outputs do not show that it was.
+
+    The norm of the two other axes is that of gravity in a turn. About a dead axis it is not, for the missing part changes.
+    """
+    dwells = dwells_of(data)
+    across = axis_of_plane(dwells)
+    if across is None:
+        return None
+    gravity = gravity_of(mapping) if known_force(dwells) is None else 1.0
+    try:
+        found = _fitted(dwells, across, gravity)
+    except DataRejected:
+        return None
+    enough = known_force(dwells) is not None or found.dof >= SHOWN_DOF
+    return _answer(found, dwells, data.out_unit) if enough and found.misfit < GROSS else None
+
+
 def plane_answer(dwells: pd.DataFrame, across: int, gravity: float, out_unit: str) -> FitAnswer:
     """The fit with its verdict.
 
@@ -69,23 +89,30 @@ def plane_answer(dwells: pd.DataFrame, across: int, gravity: float, out_unit: st
     DataRejected
         Too few dwells, or outputs that lie on no ellipse.
     """
+    return _answer(_fitted(dwells, across, gravity), dwells, out_unit)
+
+
+def _fitted(dwells: pd.DataFrame, across: int, gravity: float) -> PlaneFit:
     output = dwells[OUT].to_numpy(dtype=np.float64)
     time = dwells["time_s"].to_numpy(dtype=np.float64)
     error = _errors(dwells, output)
     force = known_force(dwells)
     try:
         if force is None:
-            found = fit_plane_norm(output, across, gravity, time, error)
-        else:
-            found = fit_plane(output, force, across, time, error)
+            return fit_plane_norm(output, across, gravity, time, error)
+        return fit_plane(output, force, across, time, error)
     except NotIdentified as problem:
         raise DataRejected(f"import: {problem}") from None
+
+
+def _answer(found: PlaneFit, dwells: pd.DataFrame, out_unit: str) -> FitAnswer:
+    known = known_force(dwells) is not None
     adequate, reason = _verdict(found)
-    opened = _opened(found, known=force is not None)
+    opened = _opened(found, known=known)
     document = {
         "adequate": adequate,
         "reason": reason or None,
-        "across": AXES[across],
+        "across": AXES[found.across],
         "open": opened,
         "error": {"rms_ug": MICRO * found.rms, "p_value": found.p_value, "dof": found.dof, "coverage_factor": 2.0},
         "bias": found.bias.tolist(),
@@ -94,10 +121,14 @@ def plane_answer(dwells: pd.DataFrame, across: int, gravity: float, out_unit: st
         "response_u": found.response_error.tolist(),
     }
     unit = str(dwells["unit"].iloc[0])
-    lines = [_head(found), *(_line(found, k, out_unit) for k in (*found.inside, across)), f"open: {'; '.join(opened)}"]
+    lines = [
+        _head(found),
+        *(_line(found, k, out_unit) for k in (*found.inside, found.across)),
+        f"open: {'; '.join(opened)}",
+    ]
     if reason:
         lines.append(reason)
-    return FitAnswer("plane", adequate, document, tuple(lines), _rows(found, unit, out_unit, known=force is not None))
+    return FitAnswer("plane", adequate, document, tuple(lines), _rows(found, unit, out_unit, known=known))
 
 
 def _errors(dwells: pd.DataFrame, output: Array) -> Array:
@@ -114,10 +145,10 @@ def _errors(dwells: pd.DataFrame, output: Array) -> Array:
 
 def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
     """Whether the model describes the dwells, by harmonics of the angle beside it; None where this cannot be judged."""
-    if found.rms > GROSS:
+    if found.misfit > GROSS:
         return (
             False,
-            f"the residual is {100.0 * found.rms:.3g} % of gravity: the poses lie in no plane, or an axis is dead",
+            f"the residual is {100.0 * found.misfit:.3g} % of gravity: the poses lie in no plane, or an axis is dead",
         )
     if found.dof < FEWEST_DOF:
         return None, (

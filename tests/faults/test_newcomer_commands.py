@@ -56,7 +56,7 @@ def test_a_serial_number_alone_shows_what_holds_today(monkeypatch, capsys, tmp_p
     Ledger(Archive(tmp_path)).add(event("A1", "2020-01-01", "2099-01-01"))
     Ledger(Archive(tmp_path)).add(event("B1", "2020-01-01", "2021-01-01"))
     status, out, _ = told(monkeypatch, capsys, "show", "A1", "--archive", tmp_path)
-    assert (status, "certificate A1/1 holds on" in out) == (0, True)
+    assert (status, "certificate A1/1 is valid on" in out) == (0, True)
     status, out, _ = told(monkeypatch, capsys, "show", "B1", "--archive", tmp_path)
     assert (status, "no calibration is valid on" in out) == (1, True)
 

@@ -1,5 +1,6 @@
 """Bad input and trouble, from the recipe to the result: one message, nobody else harmed, nothing issued for refused data."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -77,8 +78,23 @@ def test_refused_data_are_never_exported(spoilt: Run) -> None:
 
 def test_the_report_names_the_refused_unit_and_gives_it_no_number(spoilt: Run) -> None:
     page = render(spoilt)
-    assert "stopped answering at record 3" in page
-    assert 'id="A2"' not in page
+    row = re.search(r'<tr><td class="n">1</td><td><a href="#A2">.*?</tr>\s*<tr>.*?</tr>', page, flags=re.DOTALL)
+    section = re.search(r'<details class="unit" id="A2" open>.*?</details>', page, flags=re.DOTALL)
+    assert row is not None
+    assert section is not None
+    reasons = r'<ul class="reasons">.*?stopped answering at record 3.*?</ul>'
+    for part in (row[0], section[0]):
+        bare, found = re.subn(reasons, "", part, flags=re.DOTALL)
+        assert found == 1
+        words = re.sub(r"<[^>]*>", " ", bare)
+        assert re.findall(r"\d+", words.replace("A2", "")) == ["1"]  # the slot
+        assert not re.search(r"<(svg|img|canvas)", bare)
+        assert "none" in words  # the grade
+    assert not re.search(r"\bA2\b", page.replace(row[0], "").replace(section[0], ""))
+    sound_section = re.search(r'<details class="unit" id="A1">.*?</details>', page, flags=re.DOTALL)
+    assert sound_section is not None
+    assert page.index(section[0]) < page.index(sound_section[0])
+    assert "<svg" in sound_section[0]
 
 
 def test_a_lot_with_a_refused_unit_leaves_with_status_1(spoilt: Run, sound: Run) -> None:

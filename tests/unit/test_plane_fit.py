@@ -8,7 +8,7 @@ from inertial.errors import NotIdentified
 from inertial.fits import plane
 from inertial.fits.plane import fit_plane, fit_plane_norm, plane_across, quiet_axis
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.importers.plane import axis_of_plane
+from pipelines.importers.plane import GROSS, axis_of_plane
 from schemas.errors import DataRejected
 
 RESPONSE = np.array([[1.01, 0.002, -0.003], [0.004, 0.99, 0.001], [0.002, -0.005, 1.005]])
@@ -67,6 +67,32 @@ def test_a_third_order_term_is_seen_in_the_harmonics_of_the_angle(rng: np.random
     assert fit_plane_norm(output, 1, 1.0, time, error).p_value < 0.01
     force, output = turned(rng)
     assert fit_plane(output, force, 1, time, error).p_value > 0.01
+
+
+@pytest.mark.parametrize("count", [9, 12])
+def test_a_dead_axis_is_never_a_turn(rng: np.random.Generator, count: int) -> None:
+    """General orientations with y at rest: a bias without bound made all forces alike, and the residual 0.0 µg."""
+    for _ in range(20):
+        force = rng.standard_normal((count, 3))
+        output = BIAS + force / np.linalg.norm(force, axis=1, keepdims=True) @ RESPONSE.T
+        output[:, 1] = 0.001
+        output += NOISE * rng.standard_normal((count, 3))
+        if quiet_axis(output) != 1:
+            continue
+        try:
+            found = fit_plane_norm(output, 1, 1.0, 30.0 * np.arange(count), np.full((count, 3), NOISE))
+        except NotIdentified:
+            continue
+        assert found.misfit > GROSS
+
+
+def test_an_arc_is_a_turn_and_gives_its_coefficients(rng: np.random.Generator) -> None:
+    angle = np.radians(np.arange(-60.0, 61.0, 10.0))
+    force = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
+    output = BIAS + force @ RESPONSE.T + NOISE * rng.standard_normal(force.shape)
+    found = fit_plane_norm(output, 1, 1.0, 30.0 * np.arange(13), np.full((13, 3), NOISE))
+    assert found.misfit < 4.0 * NOISE
+    assert found.bias[[0, 2]] == pytest.approx(BIAS[[0, 2]], abs=2e-3)
 
 
 def test_too_few_poses_are_refused() -> None:

@@ -296,7 +296,7 @@ def imported(tmp_path: Path) -> Run:
         "local_gravity_m_s2": 9.80665,
     }
     archive = tmp_path / "imports"
-    return Archive(archive).run(_import_one([tmp_path / "six.csv"], how, "test", "", str(archive))["run"])
+    return Archive(archive).run(_import_one([tmp_path / "six.csv"], how, "test", "", str(archive), None)["run"])
 
 
 def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:

@@ -58,9 +58,10 @@ def test_an_export_names_the_certificate_and_whether_it_holds(run: Run, typed: T
         "certificate": "A1/1", "from": day(), "until": months_after(day(), 12), "state": "valid", "reason": "", "valid_now": True,
     }  # fmt: skip
     assert units(typed, run)["A1"]["certificate"] == wanted
+    px4 = ("--format", "px4", "--nominal", "256000", "--units", "A1", "--device-id", "1310988")
     line = f"certificate A1/1, valid from {day()} until {months_after(day(), 12)}"
     assert f"/* A1: {line} */" in typed("export", run.id, "--format", "c").stdout
-    assert f"# {line}\n" in typed("export", run.id, "--format", "px4", "--nominal", "256000").stdout
+    assert f"# {line}\n" in typed("export", run.id, *px4).stdout
     assert line in typed("export", run.id, "--format", "csv").stdout.splitlines()[1]
 
 
