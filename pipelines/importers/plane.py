@@ -27,7 +27,10 @@ OUT, SPREAD = ([f"{kind}_{axis}" for axis in AXES] for kind in ("out", "sd"))
 FEWEST = 4
 UNLIKELY = 0.05
 SHOWN_DOF = 4
-"""Degrees of freedom from which an ellipse shows a turn where poses are not known: with fewer, outputs of any poses lie on one by chance (1 to 6 %)."""
+"""Degrees of freedom from which an ellipse shows a turn where poses are not known.
+
+With fewer, outputs of any poses lie on one by chance: 1 to 6 of 100 records with a dead axis.
+"""
 GROSS = 0.02
 """Residual per degree of freedom, g, above which the dwells lie in no plane, or the model is wrong however few they are."""
 
