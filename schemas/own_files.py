@@ -62,12 +62,23 @@ def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None
     path = next((path for folder in folders(kind) if is_file(path := folder / f"{name}{SUFFIX}")), None)
     if path is None:
         return None
+    refuse_built_in_name(kind, name, path, built_in)
+    _report(kind, name, path)
+    return path
+
+
+def refuse_built_in_name(kind: Kind, name: str, path: Path, built_in: Iterable[str]) -> None:
+    """Refuse a file that would silently stand in the place of a built-in one.
+
+    Raises
+    ------
+    RecipeInvalid
+        A built-in file has the same name.
+    """
     if name in built_in:
         raise RecipeInvalid(
             f"{kind}: '{name}' is built in, and {path} has the same name, one file per name is needed; rename {path}"
         )
-    _report(kind, name, path)
-    return path
 
 
 def contents(named: Iterable[tuple[Kind, str]]) -> dict[str, str]:

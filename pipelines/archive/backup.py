@@ -172,9 +172,21 @@ def _refuse_another(source: Archive, target: Archive, entries: set[str]) -> None
 
 
 def _drop_old_states(source: Place, target: Place) -> None:
-    """Remove checkpoints from the copy that later ones have replaced, as the capture itself does."""
+    """Remove checkpoints from the copy that later ones have replaced, as the capture itself does.
+
+    Where the copy has more records of a capture than the source, the source is the older one (a restored backup): nothing is
+    removed, so that the capture continues from its last record.
+    """
     captures = target / "captures"
     for capture in captures.iterdir() if captures.is_dir() else ():
+        there = source / "captures" / capture.name
+        if _records(capture) > _records(there):
+            continue
         for old in (capture / STATE).glob("*.bin") if (capture / STATE).is_dir() else ():
-            if not (source / "captures" / capture.name / STATE / old.name).is_file():
+            if not (there / STATE / old.name).is_file():
                 old.unlink(missing_ok=True)
+
+
+def _records(capture: Place) -> int:
+    """Number of complete records of a capture."""
+    return sum((one / "record.json").is_file() for one in capture.iterdir()) if capture.is_dir() else 0

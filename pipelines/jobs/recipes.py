@@ -19,7 +19,7 @@ from pipelines.jobs.model_files import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import is_file, shown
 from schemas.limits import Limits, parse_limits, unknown_limits
-from schemas.own_files import own_file, own_names
+from schemas.own_files import own_file, own_names, refuse_built_in_name
 from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, parse_recipe
 from schemas.serials import refuse_unusable_serials
 from schemas.toml_files import explain, read_text
@@ -106,13 +106,30 @@ def read_limits(name: str, folder: Path | None = None) -> Limits:
 
     known = sample_names("limits-")
     paths = (path for path in ((folder or Path()) / name, Path(name)) if is_file(path))
-    path = next(paths, None) or own_file("limits", name, known)
+    path = next(paths, None)
     if path is not None:
-        return parse_limits(read_text(path, "limits"), f"limits {path.name}", UNITS)
+        refuse_built_in_name("limits", name, path, known)
+    path = path or own_file("limits", name, known)
+    if path is not None:
+        return _judged_rightly(parse_limits(read_text(path, "limits"), f"limits {path.name}", UNITS), path.name)
     built_in = files("schemas") / "samples" / f"limits-{name}.toml"
     if name not in known:
         raise unknown_limits(name, [*known, *own_names("limits")])
     return parse_limits(built_in.read_text(encoding="utf-8"), f"limits {name}", UNITS)
+
+
+def _judged_rightly(limits: Limits, name: str) -> Limits:
+    """The limits; a least value of a figure of which only the largest axis is kept would be judged on the best axis."""
+    from pipelines.procedures import FIGURES
+
+    for figure, limit in limits.figures.items():
+        spec = FIGURES.get(figure)
+        if limit.min is not None and spec is not None and not spec.one_axis:
+            raise RecipeInvalid(
+                f"limits {name}: {figure}: min is given, max is needed: of this figure the largest of the axes is judged",
+                key=f"figures.{figure}.min",
+            )
+    return limits
 
 
 def lot_of(
@@ -159,6 +176,8 @@ def _recipe_text(name: str) -> tuple[str, str, Path]:
     """Content, what to call it in messages, and the folder that names inside it are relative to."""
     built_in = sample_names()
     path = Path(name) if is_file(name) else own_file("recipes", name, built_in)
+    if path is not None:
+        refuse_built_in_name("recipes", name, path, built_in)
     if path is not None:
         return read_text(path, "recipe"), f"recipe {path.name}", path.parent
     if name in built_in:

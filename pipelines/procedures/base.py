@@ -85,11 +85,15 @@ class ProcedureStep:
 
 @dataclass(frozen=True)
 class FigureSpec:
-    """A figure that limits may name: its key, unit, and meaning in one line."""
+    """A figure that limits may name: its key, unit, and meaning in one line.
+
+    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is kept
+    """
 
     name: str
     unit: str
     meaning: str
+    one_axis: bool = False
 
 
 @dataclass(frozen=True)

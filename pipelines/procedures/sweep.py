@@ -126,9 +126,11 @@ class Sweep(Procedure):
     rows: ClassVar[int] = 2
     from_waveforms: ClassVar[bool] = True
     figures: ClassVar[tuple[FigureSpec, ...]] = (
-        FigureSpec("sweep_bandwidth_hz", "Hz", "frequency at which the magnitude is 3 dB below that at low frequency"),
-        FigureSpec("sweep_natural_hz", "Hz", "undamped natural frequency of the adequate model"),
-        FigureSpec("sweep_damping", "1", "damping ratio of the adequate model"),
+        FigureSpec(
+            "sweep_bandwidth_hz", "Hz", "frequency at which the magnitude is 3 dB below that at low frequency", True
+        ),
+        FigureSpec("sweep_natural_hz", "Hz", "undamped natural frequency of the adequate model", True),
+        FigureSpec("sweep_damping", "1", "damping ratio of the adequate model", True),
         FigureSpec(
             "sweep_flatness_percent",
             "%",

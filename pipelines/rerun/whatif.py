@@ -15,7 +15,7 @@ from pipelines.rerun.partition import parts
 from schemas.counts import number_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -29,7 +29,7 @@ FALLS = 0.005
 LEVEL = 0.05
 """Two-sided level of the verdict: units scatter as much, or more, in one of twenty archives where the models are equally good."""
 FEWEST = 3
-"""Calibrations that can show a difference: two have one degree of freedom."""
+"""Units that can show a difference: two have one degree of freedom."""
 BETTER, WORSE, EQUAL, NOTHING = "better", "worse", "no better", "nothing to judge"
 
 
@@ -171,7 +171,9 @@ def _verdict(
     old, new = total[figure]
     sentence = f"the error {where} changes from {old:.3g} to {new:.3g} µg, the yield from {before:.1%} to {after:.1%}"
     ratio = _log_ratios(figure, lots, fresh)
-    count = number_of(int(ratio.size), "calibration")
+    count = number_of(int(ratio.size), "unit")
+    if lost := _lost(figure, lots, fresh):
+        return WORSE, f"{sentence}; {number_of(lost, 'calibration')} of units cannot be judged with the new model"
     if ratio.size < FEWEST:
         return EQUAL, f"{sentence}; {count} cannot show that this is more than scatter, {FEWEST} are needed"
     if not _differs(ratio, LEVEL):
@@ -202,20 +204,32 @@ def _of(lots: Sequence[LotComparison], row: dict[str, Any]) -> list[LotCompariso
     return [one for one in lots if (one.entry.station, one.entry.device) == (row["station"], row["device"])]
 
 
-def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> NDArray[np.float64]:
-    """Natural logarithm of new over old error, one value per calibration of a unit that both models judge."""
-    out: list[float] = []
+def _pairs(
+    figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]
+) -> Iterator[tuple[lot_comparison.Sums, lot_comparison.Sums]]:
+    """Errors of the units of each lot, under the old and the new model."""
     for one in lots:
         if figure == "fresh_rms_ug":
             later = fresh.get(one.entry.id)
-            pair = (later.old, later.new) if later else ({}, {})
+            yield (later.old, later.new) if later else ({}, {})
         else:
-            pair = (one.old.verified if one.old else {}, one.new.verified if one.new else {})
-        for unit in pair[0].keys() & pair[1].keys():
-            (before, _), (after, _) = pair[0][unit], pair[1][unit]
+            yield one.old.verified if one.old else {}, one.new.verified if one.new else {}
+
+
+def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> NDArray[np.float64]:
+    """Natural logarithm of new over old error, one value per unit: the mean of its calibrations that both models judge."""
+    found: dict[str, list[float]] = defaultdict(list)
+    for old, new in _pairs(figure, lots, fresh):
+        for unit in old.keys() & new.keys():
+            (before, _), (after, _) = old[unit], new[unit]
             if before > 0.0 and after > 0.0:
-                out.append(0.5 * np.log(after / before))
-    return np.array(out)
+                found[unit].append(0.5 * float(np.log(after / before)))
+    return np.array([float(np.mean(own)) for own in found.values()])
+
+
+def _lost(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> int:
+    """How many calibrations the old model judges and the new one does not."""
+    return sum(len(old.keys() - new.keys()) for old, new in _pairs(figure, lots, fresh))
 
 
 def _differs(ratios: NDArray[np.float64], level: float) -> bool:

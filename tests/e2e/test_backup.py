@@ -111,6 +111,20 @@ def test_a_copy_while_a_lot_is_measured_is_sound(made: Path, tmp_path: Path) -> 
     assert verify(copy, keys={}).whole
 
 
+def test_an_older_copy_restored_leaves_the_checkpoint_of_records_measured_since(made: Path, tmp_path: Path) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    line, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    copy_archive(line, copy)
+    capture = next(path for path in (line.root / "captures").iterdir() if path.is_dir())
+    newest = max(path for path in capture.iterdir() if (path / "record.json").is_file())
+    shutil.copytree(newest, capture / f"{int(newest.name) + 1:05d}")  # measured after the backup
+    state = capture / "state" / f"{int(newest.name) + 1:05d}.bin"
+    state.parent.mkdir(exist_ok=True)
+    state.write_bytes(b"checkpoint")
+    copy_archive(copy, line)
+    assert state.is_file()
+
+
 def test_a_copy_of_another_archive_or_into_itself_is_refused(made: Path, tmp_path: Path) -> None:
     archive = Archive(made / "archive")
     measure(tmp_path, 7)

@@ -141,3 +141,15 @@ def test_of_several_axes_the_smallest_is_decided_for_a_least_value() -> None:
         for axis, value in (("x", 950.0), ("y", 805.0), ("z", 990.0))
     ]  # fmt: skip
     assert [one.value for one in _of_procedures(pd.DataFrame(rows), "A", own)] == [805.0]
+
+
+def test_a_least_value_of_a_figure_of_which_the_largest_axis_is_kept_is_refused(tmp_path) -> None:
+    from pipelines.jobs.recipes import read_limits
+
+    (tmp_path / "least.toml").write_text(
+        'name = "least"\n[figures]\nturn_on_repeatability_ug = { min = 5.0, unit = "µg" }\n', encoding="utf-8"
+    )
+    with pytest.raises(RecipeInvalid, match="largest of the axes is judged"):
+        read_limits("least.toml", tmp_path)
+    (tmp_path / "good.toml").write_text(LEAST.format(rule="simple_acceptance"), encoding="utf-8")
+    assert read_limits("good.toml", tmp_path).figures["sweep_bandwidth_hz"].min == 800.0

@@ -110,3 +110,17 @@ def test_a_relative_folder_of_the_configuration_is_ignored(tmp_path: Path, monke
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_CONFIG_HOME", "config")
     assert own_files.folders("limits")[1] == tmp_path / ".config" / "tumbleline" / "limits"
+
+
+def test_a_file_with_the_bare_name_of_a_built_in_recipe_or_limits_is_not_taken_in_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipelines.jobs.recipes import load_recipe, read_limits
+
+    monkeypatch.chdir(tmp_path)
+    for name in ("production", "consumer"):
+        Path(name).write_text("name = 'other'\n", encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match="'production' is built in, and production has the same name"):
+        load_recipe("production")
+    with pytest.raises(RecipeInvalid, match="'consumer' is built in"):
+        read_limits("consumer")
