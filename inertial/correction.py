@@ -44,19 +44,29 @@ def correct(effects: Sequence[str], state: State, output: Array, coefficients: A
     coefficients : (..., 3, p), as fitted
     nonlinear : values of nonlinear parameters and constants by effect id
     """
-    names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in range(3))
-    response = response_matrix(coefficients, names)
-    inverse = np.linalg.inv(response)
     force = np.zeros(np.broadcast_shapes(output.shape, state.force.shape))
     for _ in range(_STEPS):
-        left = output - predict(
-            effects, replace(state, force=force, felt=_felt(response, force), memory={}), coefficients, nonlinear
-        )
-        step = np.einsum("...ij,...nj->...ni", inverse, left)
+        step = remaining_step(effects, state, output, coefficients, nonlinear, force)
         force = force + step
         if float(np.max(np.abs(step), initial=0.0)) < 1e-12:
             break
     return force
+
+
+def remaining_step(
+    effects: Sequence[str], state: State, output: Array, coefficients: Array, nonlinear: Values, force: Array
+) -> Array:
+    """Change (..., n, 3) in g that a further step of :func:`correct` would make: rounding errors where it has converged.
+
+    Parameters
+    ----------
+    force : (..., n, 3) in g, as :func:`correct` returns it; the others as there
+    """
+    names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in range(3))
+    response = response_matrix(coefficients, names)
+    felt = replace(state, force=force, felt=_felt(response, force), memory={})
+    left = output - predict(effects, felt, coefficients, nonlinear)
+    return np.einsum("...ij,...nj->...ni", np.linalg.inv(response), left)
 
 
 def output_covariance(

@@ -10,7 +10,7 @@ import pandas as pd
 from scipy.linalg import block_diag
 
 from inertial import static_intervals
-from inertial.correction import correct, output_covariance
+from inertial.correction import correct, output_covariance, remaining_step
 from inertial.noise.bias_filter import Track, track
 from inertial.noise.gauss_markov import bias_model, flicker_terms
 from pipelines.export.polynomials import unit_calibrations
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
+CONVERGED_G = 1e-6
+"""Largest further step of a correction that has converged, g."""
 LONGEST_STEPS = 200_000
 GAP = 3.0
 """Multiple of the usual interval of samples above which an interval is a gap in the recording."""
@@ -148,7 +150,15 @@ def corrected(recording: Recording, fit: FitOfUnit, tracking: Tracking | None) -
         The model needs a quantity that the recording does not have, or the force is known nowhere.
     """
     own = (fit.effects, recording.state)
-    force = correct(*own, recording.output, fit.coefficients, fit.nonlinear)
+    with np.errstate(over="ignore", invalid="ignore"):  # a sample without a solution is refused below
+        force = correct(*own, recording.output, fit.coefficients, fit.nonlinear)
+        step = remaining_step(*own, recording.output, fit.coefficients, fit.nonlinear, force)
+    unsolved = ~(np.max(np.abs(step), axis=-1) < CONVERGED_G)  # a nan is not converged
+    if unsolved.any():
+        raise DataRejected(
+            f"{recording.name}: {int(unsolved.sum())} samples have no force that explains them (first: sample "
+            f"{int(np.argmax(unsolved))}), output within the range of the calibration is needed; leave these samples out"
+        )
     covariance = output_covariance(
         fit.effects, replace(recording.state, force=force, memory={}), fit.coefficients, fit.nonlinear, fit.covariance
     )

@@ -254,6 +254,11 @@ def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
             f"{found.direction_deg:.1f}° ± {2.0 * found.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
         )
         out = [("direction of the largest transverse sensitivity", text)]
+    if not np.isfinite(found.p_value):
+        return [
+            *out,
+            ("model", "a sine over the angle cannot be judged: no degree of freedom is left; measure at more angles"),
+        ]
     verdict = "adequate" if found.p_value >= 0.005 else "not adequate"
     text = f"a sine over the angle is {verdict}: χ² {found.chi_square:.1f} for {found.dof} degrees of freedom"
     text += f", p = {found.p_value:.2g}"
