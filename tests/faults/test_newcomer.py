@@ -112,7 +112,7 @@ def test_a_run_that_was_stopped_is_refused_with_the_way_on(
 ) -> None:
     status, out, message = told(monkeypatch, capsys, command, "latest", "--archive", str(stopped.root))
     assert (status, out) == (2, "")
-    assert re.search(r"give (its|the) .*again|again (to continue|and it goes on)", message)
+    assert re.search(r"repeat its 'tumbleline run'|give (its|the) .*again|again (to continue|and it goes on)", message)
 
 
 def test_a_run_that_was_stopped_is_shown_as_such(
