@@ -59,6 +59,10 @@ FAULTS |= {
     "dwell_and_thermometer": World(fault="bad_dwell", amount=1.0, beside=(("thermometer", 0.5),)),
     "moved_and_thermometer": World(fault="unit_moved", amount=0.2, beside=(("thermometer", 0.5),)),
     "pose_and_moved": World(fault="wrong_pose", amount=0.1, beside=(("unit_moved", 0.2),)),
+    "dwell_5sd": World(fault="bad_dwell", floors=5.0),
+    "dwell_5sd_white": World(fault="bad_dwell", floors=5.0, noise=Noise(white=100.0, flicker=0.0)),
+    "dwell_7sd": World(fault="bad_dwell", floors=7.0),
+    "dwell_5sd_one_unit": World(units=1, fault="bad_dwell", floors=5.0),
 }
 """What goes wrong, one at a time and two at once."""
 
