@@ -187,6 +187,23 @@ def test_a_gap_in_the_recording_changes_neither_steps_nor_uncertainty(
     assert gap[n // 2] > whole[n // 2]  # the bias has drifted meanwhile
 
 
+def test_samples_after_the_last_whole_step_have_the_uncertainty_of_their_time(
+    run: Run, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    n, tail = 6050, 50  # half a step, an hour later
+    table = raw(run, np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 25.0), rng, np.zeros(3))
+    table["time_s"] += 3600.0 * (np.arange(n) >= n - tail)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    words = ["--calibration", "latest:A1", "--turn-on", "300", "--force", "0,0,1", "-o", str(tmp_path / "o.parquet")]
+    document, _ = correct(run, str(tmp_path / "a.csv"), *words)
+    found = pd.read_parquet(tmp_path / "o.parquet")
+    own = found["u_bias_x_ug"].to_numpy()
+    assert np.all(own[-tail:] > 2.0 * own[-tail - 1])
+    assert not found["updated"][-tail:].any()
+    assert (document["bias"]["updates"], document["bias"]["steps"]) == (60, 61)
+    assert document["bias"]["u_last_ug"]["x"] == pytest.approx(own[-1])
+
+
 def test_refusals_say_what_is_missing(
     run: Run, tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
