@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from c_compiler import FIXED, REAL, compiled
 from capture_double import LSB_PER_G, CaptureDouble, small_job
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from inertial.correction import correct as correct_output
@@ -21,6 +22,7 @@ from pipelines.archive.signatures import VARIABLE
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.export import ExportSettings, export_text, unit_calibrations
+from pipelines.export.documents import CorrectDocument
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse
 
@@ -63,6 +65,7 @@ def correct(run: Run, *words: str) -> tuple[dict, int]:
     done = CliRunner().invoke(app, ["correct", *words, "--archive", str(run.archive.root), "--json"])
     if done.exception and not isinstance(done.exception, SystemExit):
         raise done.exception
+    TypeAdapter(CorrectDocument).validate_json(done.stdout, strict=True, extra="forbid")
     return json.loads(done.stdout), done.exit_code
 
 

@@ -1,5 +1,6 @@
 """Coefficients in the memory of devices: they are proved, or the unit is not certified and its valid copy is untouched."""
 
+import json
 import os
 import re
 import shlex
@@ -15,6 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from programmed_lot import keep_state, lot_run, plant_of, programmed
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
@@ -28,7 +30,9 @@ from pipelines.export import UnitCalibration
 from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, unpack
 from pipelines.integrity import verify
 from pipelines.jobs.job import Job
-from pipelines.programming.job import REASON, _held, chosen_units
+from pipelines.programming.documents import ProgramDocument
+from pipelines.programming.job import REASON, _held, chosen_units, document
+from pipelines.tables.json_values import json_value
 from schemas.errors import ArchiveUnusable, OperatorNeeded, StationRefused, StationTimeout, WrongUse
 from schemas.fault import FaultOrder
 from stations.codec import Value
@@ -94,6 +98,8 @@ def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
     events = programming(run.archive.root, "A1")
     assert [entry["event"] for entry in events] == ["begun", "proved"]
     assert events[0]["before"]["copies"]["A"] == "ff" * 384
+    printed = json.dumps(json_value(document(run, list(done.values()), given)))
+    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")
     findings = verify(Archive(run.archive.root), [], keys={}).checked.findings
     assert findings == []
 
@@ -135,6 +141,8 @@ def test_a_fault_leaves_the_valid_copy_and_no_certificate(
     done, given = programmed(run)
     one = done["A1"]
     assert (one.outcome, one.step) == ("failed", step), one.reason
+    printed = json.dumps(json_value(document(run, list(done.values()), given)))
+    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")
     assert reason in one.reason
     newest = [block for content in copies(run) if (block := unpack(content)) is not None]
     assert [block.sequence for block in newest] == [1]  # never half written: the copy of the first time counts

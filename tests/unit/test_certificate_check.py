@@ -28,6 +28,7 @@ from pipelines.certificate_document.documents import CertificateCheckDocument
 from pipelines.certificate_document.signature_check import canonical, parsed, xml_signature
 from pipelines.certificate_document.signing import SigningKey, sign_pdf, sign_xml
 from pipelines.certificates import Ledger
+from pipelines.certificates.documents import CertifyDocument
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from schemas.errors import WrongUse
@@ -72,7 +73,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Issued:
     folder = tmp_path_factory.mktemp("issued")
     run = small_run(folder)
     run.seal()
-    certify(Ledger(run.archive.root), run)
+    done = CliRunner().invoke(app, ["certify", run.id, "--archive", str(run.archive.root), "--json"])
+    TypeAdapter(CertifyDocument).validate_json(done.stdout, strict=True, extra="forbid")
     key = made_key(ec.generate_private_key(ec.SECP256R1()))
     (folder / "laboratory.toml").write_text(LABORATORY, encoding="utf-8")
     (folder / "key.pem").write_bytes(pem(key))
