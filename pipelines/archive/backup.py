@@ -3,6 +3,7 @@
 Files of an archive are written once, so a repeated copy adds only new files. The chain is read first and copied last: every file
 that an entry of the copy names was copied before it. Files that the chain does not name yet (a lot that is being measured) are
 copied in their present state and completed by the next copy. Derived files (``index/``) are left out; they are made again.
+What is packed is copied as single files; the copy may be compacted by itself.
 
 A file of the copy that is as the chain or its manifest states is never replaced by one that differs: the one in the archive is
 damaged.
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from pipelines.archive import files
+from pipelines.archive import files, packs
 from pipelines.archive.files import TEMPORARY
 from schemas.errors import ArchiveUnusable, WrongUse
 
@@ -104,7 +105,7 @@ def _names(folder: Place, prefix: str) -> set[str]:
     """Names, below the root, of the files of a folder that are copied."""
     found: set[str] = set()
     for path, name in _walk(folder, prefix):
-        if PurePosixPath(name).parts[0] != INDEX:
+        if PurePosixPath(name).parts[0] not in {INDEX, packs.FOLDER}:
             found.add(name)
         del path
     return found
