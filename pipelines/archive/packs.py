@@ -158,6 +158,18 @@ class Packs:
         return {one.removeprefix(start).partition("/")[0] for one in own if one.startswith(start)}
 
 
+def read_together(members: Mapping[str, Member]) -> dict[str, bytes]:
+    """The bytes of files of a folder, by name, in one read for each pack: a disk reads on faster than it seeks."""
+    out: dict[str, bytes] = {}
+    for pack in {one.pack for one in members.values()}:
+        own = {name: one for name, one in members.items() if one.pack == pack}
+        start = min(one.offset for one in own.values())
+        end = max(one.offset + one.size for one in own.values())
+        whole = memoryview(read(Member(pack, start, end - start, 0)))
+        out |= {name: bytes(whole[one.offset - start : one.offset - start + one.size]) for name, one in own.items()}
+    return out
+
+
 def identity_of(place: Path) -> tuple[str, int, int]:
     """What tells a file from another one of the same name: an archive may be removed and restored."""
     about = place.stat()

@@ -28,7 +28,7 @@ import pyarrow.parquet as pq
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath, address_of, first_line
-from pipelines.audit.run_files import read_runs, stamps_of
+from pipelines.audit.run_files import in_order_of_disk, read_runs, stamps_of
 from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
 from pipelines.parallel import map_partitions
 from schemas.errors import ArchiveUnusable
@@ -149,7 +149,7 @@ def _refreshed(archive: Archive, place: Place, distribute: Distributor | None, w
     if len(small) > MOST_SMALL:
         good = {part: runs for part, runs in good.items() if part not in small}
     there = {run for runs in good.values() for run in runs}
-    missing = sorted(stamps.keys() - there)
+    missing = in_order_of_disk(archive.root, list(stamps.keys() - there))
     chunks = [missing[k : k + RUNS_PER_PART] for k in range(0, len(missing), RUNS_PER_PART)]
     root = address_of(archive.root)
     own = "" if place == archive.root / FOLDER else str(place)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from pipelines.archive.packed_path import PackedPath
+from pipelines.archive.packs import read_together
 from pipelines.archive.store import ObjectPath
 from schemas.errors import ArchiveUnusable
 
@@ -70,6 +71,15 @@ def stamps_of(root: Place) -> dict[str, str]:
     return out
 
 
+def in_order_of_disk(root: Place, runs: Sequence[str]) -> list[str]:
+    """Runs in the order in which their files lie: those of the packs by pack, then the others by name."""
+    place: dict[str, int] = {}
+    for contents in root.known.contents("runs") if isinstance(root, PackedPath) else ():
+        for folder in contents.names():
+            place[folder.partition("/")[2]] = len(place)
+    return sorted(runs, key=lambda run: (place.get(run, len(place)), run))
+
+
 def stamps_among(root: Path, names: Sequence[str]) -> dict[str, str]:
     """Stamps of some runs of a local archive."""
     folders = {run: root.known.folder(f"runs/{run}") for run in names} if isinstance(root, PackedPath) else {}
@@ -78,7 +88,17 @@ def stamps_among(root: Path, names: Sequence[str]) -> dict[str, str]:
 
 def _read(path: Place, stamp: str) -> RunFiles:
     content: dict[str, bytes] = {}
+    single = None
+    if isinstance(path, PackedPath) and (found := path.known.folder(f"runs/{path.name}")) is not None:
+        single = set(_names(str(path)))
+        packed = {name: found.files[name] for name in WATCHED if name in found.files and name not in single}
+        try:
+            content = read_together(packed)
+        except OSError as trouble:
+            return RunFiles(path.name, stamp, content, str(trouble).splitlines()[0])
     for name in WATCHED:
+        if name in content or (single is not None and name not in single):
+            continue
         try:
             content[name] = _bytes(path, name)
         except FileNotFoundError:

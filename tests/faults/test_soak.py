@@ -1,4 +1,4 @@
-"""Shifts of orders at three stations with random faults: workers, server, disk and clocks fail, and nothing is lost, twice or unsafe.
+"""Shifts of orders at three stations with random faults (worker, server, disk, clock): nothing is lost, twice or unsafe.
 
 The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (4): some ten minutes on two free cores; 90 is a month of one shift a day.
 Clocks are those of the workers' processes, by libfaketime where it is installed; the clock of this computer is left alone.
@@ -296,7 +296,7 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
             assert memory[-1] - memory[0] < GROWTH_MB, f"{name}: {memory} MB"
             assert files[-1] - files[0] < GROWTH_FILES, f"{name}: {files} open files"
         assert soak.happened.total() == SHIFTS
-        print(dict(soak.happened), f"workers started again: {soak.again}", sizes)
+        print(dict(soak.happened), f"workers started again: {soak.again}", sizes)  # noqa: T201 - the figures of the soak
 
 
 def free_port() -> int:
