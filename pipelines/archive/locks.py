@@ -24,7 +24,6 @@ from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:
     from collections.abc import Generator
-    from pathlib import Path
 
     from pipelines.archive.store import Place
 
@@ -59,7 +58,7 @@ def _locked(folder: Place, *, wait: bool) -> Generator[None, None, None]:
             return
 
 
-def _lock_file(folder: Path) -> TextIO:
+def _lock_file(folder: Place) -> TextIO:
     """The open lock file of a folder; both are made where they do not exist."""
     with files.writing(folder):
         while True:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pipelines.archive import packs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator
 
     from pipelines.archive.store import Place
 
@@ -87,7 +87,7 @@ class PackedPath(Base):
         with io.TextIOWrapper(io.BytesIO(self.read_bytes()), encoding or "utf-8", errors, newline) as file:
             return file.read()
 
-    def iterdir(self) -> Iterator[Any]:
+    def iterdir(self) -> Generator[Any, None, None]:
         """What lies directly below, by itself or packed, in no particular order."""
         try:
             names = set(os.listdir(self))
@@ -97,9 +97,9 @@ class PackedPath(Base):
                 raise
         else:
             names |= self._packed_names()
-        return iter([self / name for name in names])
+        yield from [self / name for name in names]
 
-    def glob(self, pattern: str, **options: Any) -> Iterator[Any]:
+    def glob(self, pattern: str, **options: Any) -> Generator[Any, None, None]:
         """What lies below and has such a name; with packs every part of the pattern is one level."""
         if "**" in pattern or not self.known.contents():
             yield from super().glob(pattern, **options)

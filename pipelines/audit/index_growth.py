@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.archive import Archive
+    from pipelines.archive.store import Place
 
 LOGGER = logging.getLogger("tumbleline.archive")
 
@@ -52,7 +53,7 @@ def add_runs(archive: Archive, runs: Sequence[str]) -> int:
 def _added(archive: Archive, root: Path, runs: Sequence[str]) -> int:
     place, version = root / FOLDER, version_of_rows()
     with alone(place, wait=True):
-        small = [part for part in part_folders(place) if _rows(Path(part)) < RUNS_PER_PART // 2]
+        small = [part for part in part_folders(place) if _rows(part) < RUNS_PER_PART // 2]
         merged = small if len(small) >= MOST_SMALL else []
         before = {run for part in merged for run in runs_of(part, version)}
         portion = Portion(
@@ -63,7 +64,7 @@ def _added(archive: Archive, root: Path, runs: Sequence[str]) -> int:
     return len(portion.runs)
 
 
-def _rows(part: Path) -> int:
+def _rows(part: Place) -> int:
     """Number of runs in a part; none where it cannot be read: it is made again."""
     try:
         return pq.read_metadata(str(part / "runs.parquet")).num_rows
