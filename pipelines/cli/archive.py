@@ -13,10 +13,9 @@ from schemas.counts import number_of
 
 PART = "Certificates, trace, audit"
 ORDER = 460
-SUMMARY = "Maintain the archive: signing key, leftovers of interrupted commands, compaction, backup, restore."
+SUMMARY = "Maintain the archive: signing key, leftovers, compaction, backup, restore."
 EXAMPLES = (
-    "tumbleline archive clean --dry-run",
-    "tumbleline archive compact",
+    "tumbleline archive compact --before 2026-05-01",
     "tumbleline archive backup /mnt/copy --database /mnt/copies",
 )
 
