@@ -151,9 +151,11 @@ def _first_row(
         return filled[1] if len(filled) > 1 else len(lines)  # names alone
     alike = (place for place, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
     place = next(alike, len(filled) - 1)
+    last_number = max(k for k, here in enumerate(numeric) if here)
     while place > 0:
         row = fields_of(lines[filled[place - 1]], divider)
-        if len(row) != width or not any(is_number(word, decimal) for word in row):
+        short = last_number < len(row) < width  # without its last fields, which hold no numbers
+        if not (len(row) == width or short) or not any(is_number(word, decimal) for word in row):
             break
         place -= 1
     return filled[place]

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 WARM = 5.0
 """K over which a temperature must move for its own offset of the bias to be part of the point of expansion."""
 
+_ONE_POSE = 0.15
+"""Largest change of the outputs over their norm of a sensor that was not turned: bias over temperature, an uneven shelf."""
+
 _FAR = 8.0
 """Robust standard deviations beyond which a dwell takes no part in finding the point of expansion."""
 
@@ -83,6 +86,7 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
         As :func:`inertial.fits.ellipsoid.fit_ellipsoid`.
     """
     kept = readings.there[unit].copy()
+    _refuse_one_pose(readings.output[unit, kept])
     _refuse_quiet(readings.output[unit, kept])
     heat = _heat(readings, unit, kept)
     warm = heat is not None and float(np.ptp(heat)) > WARM and shape == "nine"
@@ -102,6 +106,17 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
             break
         kept &= ~far
     return fit
+
+
+def _refuse_one_pose(output: Array) -> None:
+    """Refuse dwells that all have one direction: further poses are no remedy for the record of a chamber or a shelf."""
+    spans = np.ptp(output, axis=0)
+    if len(output) > 1 and float(np.linalg.norm(spans)) < _ONE_POSE * float(np.median(np.linalg.norm(output, axis=1))):
+        raise NotIdentified(
+            "fit: the sensor was not turned: all dwells have one direction, in which the norm of gravity shows neither scale nor "
+            "misalignment; turn it; or judge its bias and what drives it: import the record again with --face FACE (+x, -x … "
+            "-z, the face that is up) --local-g M/S2, and with --blocks 60 where it is one long rest"
+        )
 
 
 def _refuse_quiet(output: Array) -> None:
