@@ -38,6 +38,7 @@ SEEDS = {"development": 52_000_000, "judging": 96_000_000}
 RATE_HZ = 100.0
 GRAVITY = 9.80665
 FIRST_REST_S = 50.0
+_DRAWN = 400  # records for the covariance of a noise
 
 NOISES = {
     "white 280": Noise(white=280.0, flicker=0.0),
@@ -135,11 +136,11 @@ def make(what: Recording, seed: int) -> Made:
 def projector(noise: str, start: Floats, length: Floats, force: Floats) -> Floats:
     """P (n, n) = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ of the norms, µg⁻², with the nine columns H that show and the true noise V.
 
-    V is the covariance of 1500 records of this noise in these dwells. With the noise known, (Py)/√diag(P) of the norms y are the
+    V is the covariance of 400 records of this noise in these dwells. With the noise known, (Py)/√diag(P) of the norms y are the
     deviations of the dwells from their prediction by the others, in standard deviations.
     """
-    drawn = dwell_noise(NOISES[noise], start, length, 1500, np.random.default_rng(1))
-    inverse = np.linalg.inv(np.cov(np.sum(drawn * force, axis=2).T))
+    drawn = dwell_noise(NOISES[noise], start, length, _DRAWN, np.random.default_rng(1))
+    inverse = np.linalg.inv(np.cov(np.sum(drawn * force, axis=2).T)) * (_DRAWN - len(start) - 2) / (_DRAWN - 1)
     i, j = np.triu_indices(3)
     columns = np.concatenate([force, force[:, i] * force[:, j]], axis=1)
     weighted = inverse @ columns
