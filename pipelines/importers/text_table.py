@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, unit_in
-from pipelines.importers.text_layout import BLANKS, Layout, is_comment, layout
+from pipelines.importers.text_layout import BLANKS, Layout, filled_lines, is_comment, layout
 from pipelines.importers.thousands import without_thousands
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
@@ -66,7 +66,7 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     if found is None:
         raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
     labels = _labels(found, where)
-    body = [line for line in lines[found.first :] if not is_comment(line)]
+    body = [lines[k] for k in filled_lines(lines, found.first)]
     table = _parsed(body, found, labels, where)
     units = {label: unit for label, unit in zip(labels, found.units, strict=False) if unit} or {
         label: unit for label in labels if (unit := unit_in(label))
@@ -78,6 +78,8 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
 
 def logical_lines(text: str) -> list[str]:
     """The rows of a text: a line break inside a quoted field is a part of the field, as in RFC 4180."""
+    if '"' not in text:
+        return text.splitlines()
     rows: list[str] = []
     waiting: list[str] = []  # lines from one that opens a field with a quote and does not close it
     for line in text.splitlines():

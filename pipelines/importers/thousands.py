@@ -28,9 +28,8 @@ the same column whole numbers without it, all below a thousand."""
 
 def without_thousands(lines: Sequence[str]) -> tuple[list[str], str]:
     """Lines with their numbers without separators of thousands, and a remark; the lines as they are where there are none."""
-    filled = [line for line in lines if not is_comment(line)]
-    sample = filled[len(filled) // 3 :]
-    sample = sample[:: max(1, len(sample) // _SAMPLE)]
+    later = lines[len(lines) // 3 :]
+    sample = [line for line in later[:: max(1, len(later) // _SAMPLE)] if not is_comment(line)]
     divider = _divider(sample)
     if not divider:
         return list(lines), ""
