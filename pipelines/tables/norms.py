@@ -86,14 +86,17 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
         As :func:`inertial.fits.ellipsoid.fit_ellipsoid`.
     """
     kept = readings.there[unit].copy()
-    _refuse_one_pose(readings.output[unit, kept])
     _refuse_quiet(readings.output[unit, kept])
     heat = _heat(readings, unit, kept)
     warm = heat is not None and float(np.ptp(heat)) > WARM and shape == "nine"
     unknowns = {"six": 6, "nine": 9}[shape] + (3 if warm else 0)
     if warm and int(kept.sum()) <= unknowns + _SPARE:
         warm = False
-    fit = _fitted(readings, unit, kept, shape, warm=warm)
+    try:
+        fit = _fitted(readings, unit, kept, shape, warm=warm)
+    except NotIdentified:
+        refuse_one_pose(readings.output[unit, kept])
+        raise
     for _ in range(_ROUNDS):
         if int(kept.sum()) < unknowns + _SPARE:
             break
@@ -108,8 +111,11 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
     return fit
 
 
-def _refuse_one_pose(output: Array) -> None:
-    """Refuse dwells that all have one direction: further poses are no remedy for the record of a chamber or a shelf."""
+def refuse_one_pose(output: Array) -> None:
+    """Refuse dwells that all have one direction: further poses are no remedy for the record of a chamber or a shelf.
+
+    For dwells that a fit could not use: counts of a converter with its zero far away change little beside their norm, too.
+    """
     spans = np.ptp(output, axis=0)
     if len(output) > 1 and float(np.linalg.norm(spans)) < _ONE_POSE * float(np.median(np.linalg.norm(output, axis=1))):
         raise NotIdentified(

@@ -16,7 +16,8 @@ from pipelines.importers.inspection import inspect
 from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
 from pipelines.importers.unit_check import unsigned_bits
-from pipelines.tables.norms import _refuse_one_pose
+from pipelines.stages.norm_fit import norms_fitted
+from pipelines.tables.norms import refuse_one_pose
 from schemas.errors import DataRejected
 
 COUNTS = [[16005, -416, 650], [-12, 1002, 999], [7, -1024, 16384]] * 10
@@ -165,9 +166,22 @@ def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Gene
     assert "the clock restarts 5 times" in "; ".join(found.remarks)
 
 
+def test_counts_far_from_zero_are_fitted(rng: np.random.Generator) -> None:
+    """100 counts per g about 2048: the outputs change by a tenth of their norm."""
+    force = rng.standard_normal((30, 3))
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    table = pd.DataFrame(
+        2048.0 + 100.0 * force + rng.normal(0.0, 0.01, force.shape), columns=["out_x", "out_y", "out_z"]
+    )
+    table = table.assign(unit="A", dwell=range(30), time_s=np.arange(30) * 10.0, out_unit="LSB")
+    assert norms_fitted(table, None, ("bias", "scale", "misalignment")).fit.fit.coefficients[0, 0, 0] == pytest.approx(
+        2048.0, abs=0.1
+    )
+
+
 def test_a_sensor_that_was_not_turned_is_told_so_and_what_to_do(rng: np.random.Generator) -> None:
     """A chamber cycle was told to add poses."""
     still = np.array([0.1, -0.05, -9.7]) + rng.normal(0.0, 0.05, (30, 3))
     with pytest.raises(NotIdentified, match=r"was not turned.*--face FACE"):
-        _refuse_one_pose(still)
-    _refuse_one_pose(np.concatenate([still, -still]))
+        refuse_one_pose(still)
+    refuse_one_pose(np.concatenate([still, -still]))
