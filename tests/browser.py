@@ -22,7 +22,8 @@ PATIENCE_S = float(os.environ.get("TUMBLELINE_PATIENCE_S", "120"))
 READY = """() => Boolean(document.body.dataset.ready) && !document.querySelector('.work progress')
     && [...document.querySelectorAll('[data-figure]')].every((e) => {
         const r = e.getBoundingClientRect();
-        return !e.checkVisibility() || r.top > innerHeight + 150 || e.dataset.drawn === e.dataset.figure || e.querySelector('p.note'); })"""
+        return !e.checkVisibility() || r.top > innerHeight + 150
+            || e.dataset.drawn === e.dataset.figure || e.querySelector('p.note'); })"""
 
 
 @dataclass
