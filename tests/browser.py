@@ -32,13 +32,13 @@ class Served:
 
     archive: Path
     folder: Path
-    station: Path | None = None
+    stations: tuple[Path, ...] = ()
     port: int = 0
     process: subprocess.Popen[str] | None = None
 
     def begin(self) -> None:
         command = [sys.executable, "-m", "pipelines.cli", "workbench", str(self.archive), "--folder", str(self.folder)]
-        command += ["--port", str(self.port), *(["--station", str(self.station)] if self.station else [])]
+        command += ["--port", str(self.port), *(word for one in self.stations for word in ("--station", str(one)))]
         own = {
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",
@@ -82,9 +82,9 @@ def until(true: Any, what: str, patience_s: float = PATIENCE_S) -> None:
 
 
 @contextmanager
-def served(archive: Path, folder: Path, station: Path | None = None) -> Iterator[Served]:
+def served(archive: Path, folder: Path, *stations: Path) -> Iterator[Served]:
     folder.mkdir(parents=True, exist_ok=True)
-    one = Served(archive, folder, station)
+    one = Served(archive, folder, stations)
     one.begin()
     try:
         yield one
@@ -112,6 +112,11 @@ class Tab:
 
     def ready(self) -> None:
         until(lambda: self.page.evaluate(READY), f"{self.page.url} is drawn")
+
+    @property
+    def href(self) -> str:
+        """The address as the page has it; ``page.url`` is told of later."""
+        return str(self.page.evaluate("() => location.href"))
 
     def press(self, selector: str) -> None:
         self.page.locator(selector).first.click()

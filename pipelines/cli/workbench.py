@@ -52,6 +52,13 @@ def command(
     ] = None,
     workers: Annotated[int, typer.Option("--workers", min=1, max=32, help="Processes for diagnoses and fits.")] = 2,
     *,
+    pause_lots: Annotated[
+        bool,
+        typer.Option(
+            "--pause-lots",
+            help="Pause lots when the workbench ends, for a service manager that ends their processes with it.",
+        ),
+    ] = False,
     behind_proxy: Annotated[
         bool,
         typer.Option("--behind-proxy", help="A proxy in front encrypts; needed on other hosts without a certificate."),
@@ -86,7 +93,7 @@ def command(
     settings = Settings(
         archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
         tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
-        **({"token": given} if given else {}),
+        pause_lots=pause_lots, **({"token": given} if given else {}),
     )  # fmt: skip
     app = create_app(settings)
     console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)

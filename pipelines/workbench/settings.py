@@ -20,6 +20,7 @@ class Settings:
     """A workbench of an archive.
 
     archive : its address · folder : of files of dwells, models, uploads and the state of jobs and lots
+    pause_lots : whether lots are paused when the server ends
     host, port : interface to listen on · names : further host names
     stations : files of the stations that lots are measured on; empty for the simulated one
     token : allows a browser to change data · tls : whether it uses HTTPS · proxied : whether a proxy encrypts
@@ -35,6 +36,7 @@ class Settings:
     proxied: bool = False
     stations: tuple[Path, ...] = ()
     workers: int = 2
+    pause_lots: bool = False
 
     @property
     def station(self) -> Path | None:

@@ -89,7 +89,7 @@ def test_a_finding_of_the_audit_leads_to_the_values_that_it_is_drawn_from(bench:
         assert len(numbers.splitlines()) > 2
         assert subject in main_text(one)
         opened.locator("table a").first.click()  # the run of the finding
-        until(lambda: "/run?" in one.page.url, "the run of the finding is opened")
+        until(lambda: "/run?" in one.href, "the run of the finding is opened")
         one.ready()
         assert one.findings() == []
         assert one.errors == [] == one.outside
@@ -100,7 +100,7 @@ def test_five_hundred_units_are_listed_found_and_paged(bench: Served, browser: A
         one.open("/units?search=MANY0&outcome=pass")
         assert one.page.locator("[aria-label=Calibrations] tbody tr").count() == 50
         one.press("text=Next")
-        until(lambda: "page=2" in one.page.url, "the second page")
+        until(lambda: "page=2" in one.href, "the second page")
         one.ready()
         assert "51 to 100 of" in main_text(one)
         one.open(f"/run?run={run_of(bench, 'bench-')}")
@@ -153,7 +153,7 @@ def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:
 def test_an_empty_archive_says_on_every_page_what_to_do(tmp_path: Path, browser: Any) -> None:
     pages = {
         "/units": "Measure a lot", "/missing": "Choose a source", "/models": "No model file yet", "/upload": "Drop a file",
-        "/operator": "Scan each unit", "/station": "Measure a lot", "/audit": "make a run", "/run": "tumbleline run",
+        "/operator": "Scan each unit", "/station": "Measure a lot", "/audit": "Measure a lot", "/run": "tumbleline run",
     }  # fmt: skip
     with served(tmp_path / "archive", tmp_path / "bench") as server, tab(browser, server.address) as one:
         for path, words in pages.items():

@@ -202,10 +202,10 @@ def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_w
         one.page.mouse.down()
         one.page.mouse.move(*end, steps=4)
         one.page.mouse.up()
-        until(lambda: "pose=" in one.page.url, "the dropped pose is in the address")
+        until(lambda: "pose=" in one.href, "the dropped pose is in the address")
         until(lambda: one.page.locator("tr[data-effect]").count() > 0, "the plan is computed anew")
         one.ready()
-        moved = urllib.parse.parse_qs(urllib.parse.urlsplit(one.page.url).query)["pose"]
+        moved = urllib.parse.parse_qs(urllib.parse.urlsplit(one.href).query)["pose"]
         assert len(moved) == 1
         floors = floors_of(one)
         changed = [
@@ -219,7 +219,7 @@ def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_w
         one.page.fill("input[name=outer]", "75.5")
         one.page.fill("input[name=inner]", "-20")
         one.press("text=Move the pose")
-        until(lambda: "p2" in urllib.parse.unquote(one.page.url), "the second move is in the address")
+        until(lambda: "p2" in urllib.parse.unquote(one.href), "the second move is in the address")
         one.sees("tr[data-effect]")
         one.ready()
         assert one.findings() == []

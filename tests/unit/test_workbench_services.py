@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from importlib.resources import files
@@ -171,6 +173,27 @@ def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: Settin
     assert lots.start(two, recipe, ["A2"], [0], [], 0, left.file).phase == "starting"
     with pytest.raises(lots.Stale):
         lots.pause(two, lot.id)
+
+
+def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: Settings) -> None:
+    script = (
+        "import json, pathlib, signal, sys, time\n"
+        "place = pathlib.Path(sys.argv[1]) / 'state.json'\n"
+        "def safe(*_):\n"
+        "    place.write_text(json.dumps({**json.loads(place.read_text()), 'phase': 'stopped'}))\n"
+        "    sys.exit(0)\n"
+        "signal.signal(signal.SIGTERM, safe)\n"
+        "print('ready', flush=True)\n"
+        "time.sleep(60)\n"
+    )
+    place = settings.folder / "lots" / "abc"
+    with subprocess.Popen([sys.executable, "-c", script, str(place)], stdout=subprocess.PIPE) as process:
+        name = lot_of(settings, pid=process.pid, phase="measuring")
+        assert process.stdout.readline() == b"ready\n"
+        assert lots.pause_all(settings) == []
+        assert process.wait(10.0) == 0
+    assert lots.state_of(place).phase == "paused"
+    assert name == "abc"
 
 
 def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Settings) -> None:

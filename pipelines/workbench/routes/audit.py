@@ -35,7 +35,7 @@ def audit(request: Request) -> Response:
     except TumblelineError as problem:
         problems = [*problems, str(problem)]
     return page(
-        request, "audit.html", state, problems, found=found, job=job, who=WHO, most_due=DUE,
+        request, "audit.html", state, problems, empty=not bench.archive.run_ids(), found=found, job=job, who=WHO, most_due=DUE,
         most_findings=FINDINGS, chance=chance, labels={name: kind.label for name, kind in FIGURES.items()},
     )  # fmt: skip
 

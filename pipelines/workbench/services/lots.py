@@ -30,6 +30,8 @@ ENDED = frozenset({"done", "stopped", "failed", "interrupted"})
 PAUSED = "paused"
 """Name of the phase, and of the file that keeps it: a lot that was stopped to be continued holds its station."""
 NEWEST = 12
+SAFE_S, POLL_S = 20.0, 0.1
+"""Time that the processes of lots are given at the end of the server, and how often they are looked at, s."""
 
 
 class Stale(TumblelineError):
@@ -178,6 +180,17 @@ def pause(settings: Settings, name: str) -> LotState:
         raise Stale(f"lot {name}: it has ended already; the page shows its present state")
     (place / PAUSED).touch()
     return _ended(place)
+
+
+def pause_all(settings: Settings) -> list[str]:
+    """Pause every lot that is measured, and wait until its process has made the station safe; the lots that did not in time."""
+    working = [one for one in lots(settings) if not one.idle]
+    for one in working:
+        pause(settings, one.id)
+    end = time.monotonic() + SAFE_S
+    while time.monotonic() < end and any(_alive(one.pid) for one in working if one.pid):
+        time.sleep(POLL_S)
+    return [one.id for one in working if one.pid and _alive(one.pid)]
 
 
 def _ended(place: Path) -> LotState:
