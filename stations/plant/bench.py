@@ -330,7 +330,8 @@ class Bench:
 
     def _as_reference(self, reference: Array, rng: np.random.Generator, troubles: frozenset[str]) -> Array:
         """What the reference sensor reads of (n, 3) g: its error of calibration, noise, and a range that may clip."""
-        read = reference * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
+        felt = 0.0 * reference if "reference_cable_off" in troubles else reference
+        read = felt * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
         if "clipped_reference" in troubles:
             top = 0.6 * float(np.max(np.abs(read)))
             read = np.clip(read, -top, top)

@@ -33,7 +33,7 @@ class Centrifuge:
     def __init__(self, world: World) -> None:
         self._world = world
         self._from, self._to, self._since_us = 0.0, 0.0, 0
-        self._closed, self._direction = False, 1.0
+        self._closed, self._direction, self._asked = False, 1.0, 0.0
         self._heard_us, self._tripped = 0, ""
         self._number, self._seconds, self._start_us = 0, 0.0, 0
         self._files = ResultFiles()
@@ -57,6 +57,7 @@ class Centrifuge:
         except ValueError:
             return UNKNOWN, False
         if head == ":dem:rate 1":
+            self._asked = number
             self._go(number if self._closed and not self._tripped else 0.0)
         elif head == ":mount 1":
             self._direction = 1.0 if number > 0.0 else -1.0
@@ -85,6 +86,8 @@ class Centrifuge:
             self._go(0.0)
         elif not found:
             self._tripped = ""
+        if "drive_runaway" in troubles and self._to > 0.0 and self._to == self._asked:
+            self._go(1.5 * self._asked)
         if self._to > 0.0 and self._world.now_us - self._heard_us > round(1e6 * IDLE_S):
             self._go(0.0)
 
