@@ -156,6 +156,7 @@ class Ratiometry(Procedure):
                         "setting": record.step.setting["supply_V"], "value": float(output.mean()),
                         "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": record.step.setting["side"],
                         "white": white, "flicker": flicker, "window_s": output.size / own.rate_hz,
+                        "time_s": float(own.time.mean()),
                         "measured_V": float(reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
                     }
                 )  # fmt: skip
@@ -220,8 +221,12 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
             if len(one):
                 means[k, side], errors[k, side] = float(one["value"].iloc[0]), float(one["uncertainty"].iloc[0])
     zero, sensitivity, error = zero_and_sensitivity(means, errors)
+    apart = 0.0
+    if "time_s" in rows:  # points of earlier versions have none
+        time = rows.groupby("setting")["time_s"].mean()
+        apart = float((time - time.min()).iloc[1:].abs().mean()) if len(time) > 1 else 0.0
     pooled = difference_error(
-        float(rows["white"].mean()), float(rows["flicker"].mean()), float(rows["window_s"].mean())
+        float(rows["white"].mean()), float(rows["flicker"].mean()), float(rows["window_s"].mean()), apart
     )
     error = np.maximum(error, 0.5 * pooled)  # of a mean of two faces: a face has 1/√2 of a difference
     error = np.hypot(error, 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0))

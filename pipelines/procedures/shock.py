@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from pydantic import Field, model_validator
 from scipy.signal import butter, sosfiltfilt
 
@@ -38,7 +39,6 @@ from schemas.units import AXES, MICRO
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import pandas as pd
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
@@ -99,7 +99,7 @@ class ShockTest(Procedure):
         FigureSpec(
             "shock_undershoot_percent",
             "%",
-            "largest excursion against the pulse after it, of the peak, beyond that of the reference",
+            "largest excursion against the pulse after it, of the peak, beyond that of the reference; mean of the shocks",
         ),
         FigureSpec(
             "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
@@ -304,6 +304,7 @@ def _bias(unit: str, number: int, record: ProcedureRecord, own: UnitRecord, scal
         {
             "unit": unit, "axis": axis, "series": "bias", "point": number, "setting": after, "value": float(output[:, i].mean()),
             "uncertainty": float(error[i]), "white": noise[i][0], "flicker": noise[i][1], "window_s": len(output) / own.rate_hz,
+            "time_s": float(own.time.mean()),
         }
         for i, axis in enumerate(AXES)
     ]  # fmt: skip
@@ -335,8 +336,8 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
         FigureValue(
             names[1],
             part.axis,
-            float(under.max()),
-            float(np.hypot(floor, under.std(ddof=1) if under.size > 1 else 0.0)),
+            float(under.mean()),
+            float(np.hypot(floor, under.std(ddof=1) / np.sqrt(under.size) if under.size > 1 else 0.0)),
         ),
     ]
 
@@ -345,11 +346,7 @@ def _shift(rows: pd.DataFrame) -> FigureValue:
     """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
     found: list[FigureValue] = []
     bias = rows[rows["series"] == "bias"]
-    pooled = (
-        difference_error(float(bias["white"].mean()), float(bias["flicker"].mean()), float(bias["window_s"].mean()))
-        if len(bias)
-        else 0.0
-    )
+    pooled = _drifts_apart(bias) if len(bias) else 0.0
     for axis, own in rows[rows["series"] == "bias"].groupby("axis", sort=False):
         before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
         if before.empty or after.empty:
@@ -363,6 +360,13 @@ def _shift(rows: pd.DataFrame) -> FigureValue:
         return FigureValue("shock_bias_shift_ug", "*", np.nan, np.nan, identified=False, note="no bias before or after")
     lost = [one for one in found if not one.identified]
     return lost[0] if lost else max(found, key=lambda one: abs(one.value) + 2.0 * one.uncertainty)
+
+
+def _drifts_apart(bias: pd.DataFrame) -> float:
+    """Standard uncertainty of after minus before by white noise and flicker, pooled over the axes."""
+    white, flicker, window = (float(bias[name].mean()) for name in ("white", "flicker", "window_s"))
+    time = bias["time_s"] if "time_s" in bias else pd.Series([0.0])  # points of earlier versions have none
+    return difference_error(white, flicker, window, float(np.ptp(time.to_numpy(dtype=float))))
 
 
 PROCEDURE = ShockTest()

@@ -76,7 +76,10 @@ class Tilt(Procedure):
     part: ClassVar[type[Part]] = TiltPart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec(
-            "tilt_linearity_ug", "µg", "largest residual from bias and scale over the plane, worst axis in it; 1 g only"
+            "tilt_linearity_ug",
+            "µg",
+            "largest departure from bias and scale over the plane by K2 and K3 (with orders = 1 the largest residual), worst "
+            "axis in it; 1 g only",
         ),
         FigureSpec("tilt_orthogonality_mrad", "mrad", "departure from 90° of the two axes in the plane"),
         FigureSpec("tilt_second_order_ug_g2", "µg/g²", "K2 of the worst axis in the plane"),
@@ -113,6 +116,7 @@ class Tilt(Procedure):
                         "setting": float(reading["outer_deg"]),
                         "value": mean[i],
                         "uncertainty": sd[i],
+                        "time_s": float(own.time.mean()),
                     }
                     for i, axis in enumerate(AXES)
                 ]
@@ -123,10 +127,11 @@ class Tilt(Procedure):
         """Figures of the axes in the plane, and what the plane leaves open."""
         del device
         figures: dict[str, list[FigureValue]] = {}
+        largest: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):
             fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
             linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
-            found = [worst([_linearity(axis, one) for axis, one in linear.items()]), _orthogonality(part, linear)]
+            found = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, linear)]
             if part.orders == 3:
                 found.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
             else:
@@ -141,9 +146,11 @@ class Tilt(Procedure):
                     )
                 )
             figures[str(unit)] = found
+            largest += [_residual(str(unit), axis, one) for axis, one in linear.items()]
         inside, turned = " and ".join(_plane(part)), part.about
         open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))
         findings = [
+            *largest,
             Finding("", "not determined by this plane", f"axes {inside}: {open_in}"),
             Finding("", "not determined by this plane", f"axis {turned}, about which the unit turns: {open_out}"),
         ]
@@ -184,14 +191,26 @@ def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltF
     plain = fit_tilt(angle, output, np.ones_like(output))
     slope = plain.scale[0] * np.abs(np.cos(angle + plain.phase[0]))
     error = np.hypot(white, slope * np.radians(part.angle_uncertainty_deg))
-    return fit_tilt(angle, output, error, orders=part.orders if orders is None else orders)
+    time = rows["time_s"].to_numpy(dtype=float) if "time_s" in rows else None  # points of earlier versions have none
+    return fit_tilt(angle, output, error, orders=part.orders if orders is None else orders, time=time)
 
 
 def _linearity(axis: str, one: TiltFit) -> FigureValue:
+    """By K2 and K3 where they are fitted: the largest of many residuals is noise, whatever the axis does."""
+    if "second_order" in one.names:
+        value, error = one.departure
+        return FigureValue("tilt_linearity_ug", axis, MICRO * value / one.scale[0], MICRO * error / one.scale[0])
     residual = MICRO * one.residuals / one.scale[0]
     k = int(np.argmax(np.abs(residual)))
     spread = float(np.sqrt(np.mean(residual**2)))
     return FigureValue("tilt_linearity_ug", axis, float(abs(residual[k])), spread)
+
+
+def _residual(unit: str, axis: str, one: TiltFit) -> Finding:
+    residual = MICRO * one.residuals / one.scale[0]
+    k = int(np.argmax(np.abs(residual)))
+    text = f"{residual[k]:+.3g} µg at {np.degrees(one.angle[k]):.4g}°, rms {np.sqrt(np.mean(residual**2)):.3g} µg"
+    return Finding(unit, f"largest residual from bias and scale, axis {axis}", text)
 
 
 def _orthogonality(part: TiltPart, fits: dict[str, TiltFit]) -> FigureValue:
