@@ -47,15 +47,19 @@ class TiltFit:
         slope = np.array([-c, s]) / size**2
         return float(np.arctan2(c, s)), float(np.sqrt(slope @ self.covariance[1:3, 1:3] @ slope))
 
+    def curve(self, angle: Array) -> Array:
+        """Departure (n,) of the K2–K3 curve from bias and scale at table angles (n,), rad; output unit."""
+        turn = angle + self.phase[0]
+        return _departures(turn) @ self.value[[self.names.index(name) for name in TERMS[3:]]]
+
     @property
     def departure(self) -> tuple[float, float]:
         """Largest departure of the K2–K3 curve from bias and scale over the turn, and its standard uncertainty; output unit.
 
         K2·sin² departs by −½·K2·cos 2θ and K3·sin³ by −¼·K3·sin 3θ from a constant and a sine.
         """
-        turn = np.linspace(0.0, 2.0 * np.pi, 721)
-        curve = np.column_stack([-0.5 * np.cos(2.0 * turn), -0.25 * np.sin(3.0 * turn)])
-        place = [self.names.index(name) for name in ("second_order", "third_order")]
+        curve = _departures(np.linspace(0.0, 2.0 * np.pi, 721))
+        place = [self.names.index(name) for name in TERMS[3:]]
         found = curve @ self.value[place]
         k = int(np.argmax(np.abs(found)))
         return float(abs(found[k])), float(np.sqrt(curve[k] @ self.covariance[np.ix_(place, place)] @ curve[k]))
@@ -64,6 +68,11 @@ class TiltFit:
         """Value and standard uncertainty of a term."""
         k = self.names.index(name)
         return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
+
+
+def _departures(turn: Array) -> Array:
+    """Columns (n, 2) of K2 and K3 after bias and scale, at angles (n,) from the zero of the input axis."""
+    return np.column_stack([-0.5 * np.cos(2.0 * turn), -0.25 * np.sin(3.0 * turn)])
 
 
 def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time: Array | None = None) -> TiltFit:

@@ -41,6 +41,7 @@ BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
 FINAL_SHARE = 0.3  # of the step's duration, at its end: the final value
 BINS = 2  # points of the averaged response for each sample interval
 COLOURS = ("#0072b2", "#d55e00", "#009e73")
+WIDTHS = (3.0, 1.9, 0.8)  # axes that agree still show one above the other
 
 
 class StepPart(Part):
@@ -145,11 +146,11 @@ class StepResponse(Procedure):
     def draw(self, drawing: Drawing, part: StepPart, points: pd.DataFrame) -> None:
         """The response of every axis, and its last part about the final value with the band and the settling times."""
         left, right = drawing.subplots(1, 2)
-        for axis, colour in zip(AXES, COLOURS, strict=True):
+        for axis, colour, width in zip(AXES, COLOURS, WIDTHS, strict=True):
             own = points[points["axis"] == axis].sort_values("setting")
             time, value = 1e3 * own["setting"].to_numpy(dtype=float), 100.0 * own["value"].to_numpy(dtype=float)
-            left.plot(time, value, lw=1.0, c=colour, label=f"axis {axis}")
-            right.plot(time, value - 100.0, lw=1.0, c=colour)
+            left.plot(time, value, lw=width, c=colour, label=f"axis {axis}")
+            right.plot(time, value - 100.0, lw=width, c=colour)
             try:
                 settled = 1e3 * axis_figures(part, own).settling_s
             except NotIdentified:

@@ -168,15 +168,23 @@ class Tilt(Procedure):
                 np.degrees(one.angle)[order],
                 residual[order],
                 error[order],
-                fmt="o-",
+                fmt="o",
                 ms=3,
                 lw=0.8,
                 c=colour,
                 label=f"axis {axis}",
             )
+            if part.orders == 3:
+                turn = np.linspace(-np.pi, np.pi, 361)
+                curve = _fit(part, points[points["axis"] == axis]).curve(turn)
+                place.plot(
+                    np.degrees(turn), MICRO * curve / one.scale[0], lw=1.1, c=colour, label=f"K2 and K3 of axis {axis}"
+                )
         place.axhline(0.0, c="#999999", lw=0.8)
         place.set(xlabel="angle / °", ylabel="residual from bias and scale / µg")
-        place.legend(frameon=False, loc="upper right")
+        place.set_xticks(np.arange(-180, 181, 45))
+        place.margins(y=0.25)  # room for the legend above the points
+        place.legend(frameon=False, loc="upper right", ncols=4)
 
 
 def _plane(part: TiltPart) -> tuple[str, str]:
