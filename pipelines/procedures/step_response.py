@@ -172,10 +172,16 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
         raise NotIdentified(FAULTS[int(rows["fault"].iloc[0])])
     kept = rows.sort_values("setting")
     time, value, error = (kept[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+    rate = float(kept["rate_hz"].iloc[0])
     found = step_figures(
-        time, value, error, band=1e-2 * part.band_percent, edge_error_s=float(kept["edge_error_s"].iloc[0])
+        time,
+        value,
+        error,
+        band=1e-2 * part.band_percent,
+        edge_error_s=float(kept["edge_error_s"].iloc[0]),
+        bin_s=1.0 / rate / BINS,
     )
-    samples = found.rise_s * float(kept["rate_hz"].iloc[0])
+    samples = found.rise_s * rate
     if samples < RISE_POINTS:
         msg = (
             f"{samples:.1f} samples in the rise time, {RISE_POINTS:g} are needed to resolve a tenth of 1/f_n; record the "
