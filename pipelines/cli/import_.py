@@ -9,6 +9,8 @@ import typer
 
 from pipelines.cli.options import (
     ArchiveOption,
+    GroupOption,
+    JoinOption,
     JsonOption,
     console,
     error_console,
@@ -110,13 +112,8 @@ def command(
             "--faulty", metavar="refuse|leave-out|keep", help="Constant axes and torn words; refuse by default."
         ),
     ] = "",
-    join: Annotated[
-        str,
-        typer.Option("--join", metavar="rows|columns", help="Join several files into one recording."),
-    ] = "",
-    group: Annotated[
-        str, typer.Option("--group", metavar="NAME", help="Group of channels, if the file has several.")
-    ] = "",
+    join: JoinOption = "",
+    group: GroupOption = "",
     list_dwells: Annotated[
         bool, typer.Option("--list-dwells", help="List every dwell: start, end, mean, sd, residual, influence.")
     ] = False,

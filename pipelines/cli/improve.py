@@ -10,6 +10,7 @@ import typer
 
 from pipelines.cli.options import (
     ArchiveOption,
+    ByOption,
     EffectFileOption,
     EffectsOption,
     FreshHistoryOption,
@@ -61,9 +62,7 @@ def command(
     fresh: FreshOption = "",
     fresh_history: FreshHistoryOption = "",
     leave_out: LeaveOutOption = "",
-    by: Annotated[
-        str, typer.Option("--by", metavar="NAME", help="Author of the change; the user's name by default.")
-    ] = "",
+    by: ByOption = "",
     effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     *,
