@@ -217,16 +217,22 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
             if len(one):
                 means[k, side], errors[k, side] = float(one["value"].iloc[0]), float(one["uncertainty"].iloc[0])
     zero, sensitivity, error = zero_and_sensitivity(means, errors)
-    apart = 0.0
-    if "time_s" in rows:  # points of earlier versions have none
-        time = rows.groupby("setting")["time_s"].mean()
-        apart = float((time - time.min()).iloc[1:].abs().mean()) if len(time) > 1 else 0.0
-    pooled = difference_error(
-        float(rows["white"].mean()), float(rows["flicker"].mean()), float(rows["window_s"].mean()), apart
-    )
-    error = np.maximum(error, 0.5 * pooled)  # of a mean of two faces: a face has 1/√2 of a difference
-    error = np.hypot(error, 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0))
-    return departures(measured, zero, sensitivity, error, follows=part.follows)
+    apart = _time_between(rows)
+    white, flicker, window = (float(rows[name].mean()) for name in ("white", "flicker", "window_s"))
+    # both faces of a voltage follow each other: slow wander is the same on them, so their mean has it like one longer record
+    zero_error = np.maximum(error, difference_error(white, flicker, 2.0 * window, apart) / np.sqrt(2.0))
+    error = np.maximum(error, 0.5 * difference_error(white, flicker, window, apart))
+    own = 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0)
+    error, zero_error = np.hypot(error, own), np.hypot(zero_error, own)
+    return departures(measured, zero, sensitivity, error, follows=part.follows, zero_error=zero_error)
+
+
+def _time_between(rows: pd.DataFrame) -> float:
+    """Mean time between a voltage and the first one, s; 0 where no times are known."""
+    if "time_s" not in rows:  # points of earlier versions have none
+        return 0.0
+    middle = rows.groupby("setting", sort=False)["time_s"].mean()
+    return float((middle - middle.min()).drop(middle.idxmin()).mean()) if len(middle) > 1 else 0.0
 
 
 def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:

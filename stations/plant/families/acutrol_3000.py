@@ -109,10 +109,10 @@ class Centrifuge:
         arm = (RADIUS_M + rig.arm_radius_error_m) * (1.0 + rig.arm_stretch * omega**2)
         offsets = np.array([unit.mass_offset_m for unit in bench.units])
         force = self._direction * (arm + self._direction * offsets) * omega**2 / STANDARD_G
-        wobble = np.random.Generator(np.random.Philox(key=self._start_us + 10)).standard_normal()
+        wobble = bench.stream_at(self._start_us, 10).standard_normal()
         force = force * (1.0 + 2e-6 * float(wobble))
         outputs = bench.steady(force, 2, self._seconds, RECORD_HZ, self._start_us)
-        rng = np.random.Generator(np.random.Philox(key=self._start_us + 9))
+        rng = bench.stream_at(self._start_us, 9)
         reference = np.zeros((round(self._seconds * 10.0), 3))
         reference[:, 0] = self._to * (1.0 + 1e-6 * rng.standard_normal(len(reference)))
         return Waveforms(outputs, RECORD_HZ, reference, 10.0)
