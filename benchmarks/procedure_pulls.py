@@ -101,7 +101,8 @@ def outcome(name: str, count: int, seed: int) -> tuple[pd.DataFrame, Plant]:
             for k, step in enumerate(steps(recipe))
             if step.order is not None
         ]
-    procedure, part, device = PROCEDURES[name], parts_of(recipe)[0], nominal_device(readings)
+    procedure: Any = PROCEDURES[name]
+    part, device = parts_of(recipe)[0], nominal_device(readings)
     points = procedure.reduce(part, taken, device)
     if name in ONE_AXIS:
         points = points[points["axis"] == "z"]
@@ -141,7 +142,8 @@ def main() -> None:
             most = min(LOTS.get(name, MOST), left)
             figures, plant = outcome(name, most, asked.seed + 17 * lot)
             known = {unit: truths(name, plant, k) for k, unit in enumerate(plant.serials)}
-            for row in figures.to_dict("records"):
+            whole: list[dict[str, Any]] = [{str(k): v for k, v in row.items()} for row in figures.to_dict("records")]
+            for row in whole:
                 true = known[row["unit"]][row["figure"]]
                 error = row["uncertainty"] if row["uncertainty"] > 0.0 else np.nan
                 rows.append(row | {"true": true, "pull": (row["value"] - true) / error, "held": covered(row, true)})

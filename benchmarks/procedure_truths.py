@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from scipy import signal
@@ -78,16 +78,19 @@ def _warm_up(plant: Plant, k: int) -> dict[str, float]:
 def _chain(own: Any) -> Array:
     """Denominator of sprung mass and low-pass in s."""
     mass, pole = 2.0 * np.pi * own.natural_hz, 2.0 * np.pi * own.low_pass_hz
-    return np.polymul([1.0 / mass**2, 2.0 * own.damping / mass, 1.0], [1.0 / pole**2, np.sqrt(2.0) / pole, 1.0])
+    return np.asarray(
+        np.polymul([1.0 / mass**2, 2.0 * own.damping / mass, 1.0], [1.0 / pole**2, np.sqrt(2.0) / pole, 1.0]),
+        dtype=np.float64,
+    )
 
 
 def _frequency(plant: Plant, k: int) -> dict[str, float]:
     own, static = plant.bench.units[k], plant.truth(plant.serials[k])
     grid = np.linspace(10.0, 4000.0, 400_001)
-    answer: Any = signal.freqs([1.0], _chain(own), worN=2.0 * np.pi * grid)
+    answer: Any = signal.freqs([1.0], _chain(own), worN=cast("Any", 2.0 * np.pi * grid))
     size = np.abs(answer[1])
     f = 10.0 * 2.0 ** (np.arange(40) / 4.0)
-    at: Any = signal.freqs([1.0], _chain(own), worN=2.0 * np.pi * f[f <= FLAT_HZ])
+    at: Any = signal.freqs([1.0], _chain(own), worN=cast("Any", 2.0 * np.pi * f[f <= FLAT_HZ]))
     apart = np.abs(at[1]) / np.abs(at[1][0]) - 1.0
     return {
         "sweep_bandwidth_hz": float(grid[np.flatnonzero(size < np.sqrt(0.5))[0]]),
@@ -102,7 +105,7 @@ def _step(plant: Plant, k: int) -> dict[str, float]:
     own = plant.bench.units[k]
     t = np.linspace(0.0, 0.012, 240_001)
     parts: Any = signal.residue([1.0], np.polymul(np.polymul(_chain(own), [2e-6, 1.0]), [1.0, 0.0]))
-    out = np.real(sum(r * np.exp(p * t) for r, p in zip(parts[0], parts[1], strict=True)))
+    out: Any = np.real(sum(r * np.exp(p * t) for r, p in zip(parts[0], parts[1], strict=True)))
     at = {level: float(t[np.flatnonzero(out > level)[0]]) for level in (0.1, 0.9)}
     settled = float(t[np.flatnonzero(np.abs(out - 1.0) > 0.02)[-1]])
     return {
@@ -122,9 +125,9 @@ def _shock(plant: Plant, k: int) -> dict[str, float]:
     mass: Any = signal.freqs(
         [1.0],
         [(2.0 * np.pi * own.natural_hz) ** -2, 2.0 * own.damping / (2.0 * np.pi * own.natural_hz), 1.0],
-        worN=2.0 * np.pi * f,
+        worN=cast("Any", 2.0 * np.pi * f),
     )
-    whole: Any = signal.freqs([1.0], _chain(own), worN=2.0 * np.pi * f)
+    whole: Any = signal.freqs([1.0], _chain(own), worN=cast("Any", 2.0 * np.pi * f))
     smooth = 1.0 / (1.0 + (f / (6.0 / PULSE_S)) ** 4)
 
     def measured(force: Array) -> tuple[float, float]:

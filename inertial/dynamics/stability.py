@@ -64,8 +64,8 @@ def stability(record: Array, rate_hz: float) -> Stability:
         msg = f"stability: {hundred.size} means of 100 s, 10 or more are needed; record at least 1000 s"
         raise NotIdentified(msg)
     second = block_means(record, max(1, round(rate_hz)))
-    time = 100.0 * np.arange(hundred.size) / 3600.0
-    rows = np.column_stack([np.ones_like(time), time - time.mean()])
+    time: Array = np.asarray(100.0 * np.arange(hundred.size) / 3600.0, dtype=np.float64)
+    rows: Array = np.asarray(np.column_stack([np.ones_like(time), time - time.mean()]), dtype=np.float64)
     c = np.linalg.lstsq(rows, hundred, rcond=None)[0]
     noise = float(np.var(np.diff(second), ddof=1)) / 2.0 / 100.0  # white part of a mean of 100 s
     inverse = np.linalg.pinv(rows)
