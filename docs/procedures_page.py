@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pipelines.procedures import Procedure
 
 PAGE = Path(__file__).resolve().parent / "reference" / "procedures.md"
+RECIPES = PAGE.parents[2] / "deploy" / "recipes" / "procedures"
 HEAD = """\
 # Test procedures
 
@@ -35,6 +36,8 @@ def _section(one: Procedure) -> str:
     roles = ", ".join(f"`{role}`" for role in one.roles) or "table, chamber and reader"
     lines = [f"## {one.name}", "", f"{one.title}: {one.states}.", "", f"Source: {one.source}. Station: {roles}.", ""]
     lines += [" ".join((one.part.__doc__ or "").split()), ""]
+    if (RECIPES / f"{one.name}.toml").is_file():
+        lines += [f"Sample: `tumbleline run deploy/recipes/procedures/{one.name}.toml`.", ""]
     fields = {name: field for name, field in one.part.model_fields.items() if name != "kind"}
     if fields:
         lines += ["| key | default |", "|---|---|"]

@@ -6,15 +6,20 @@ only. ``verified`` states whether it was compared with the device.
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from schemas.bounds import Number
 from schemas.errors import RecipeInvalid, did_you_mean
+from schemas.motion import Motion
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
@@ -138,7 +143,8 @@ class Fifo(Strict):
 class Profile(Strict):
     """A device's register map, or its lines of text.
 
-    ``adapter`` names what its commands mean; ``links`` what carries them, the device's own way first.
+    ``adapter`` names what its commands mean; ``links`` what carries them, the device's own way first. ``motion`` holds the limits
+    of an exciter, ``stated`` the largest values of a station's file (:meth:`limited`).
     """
 
     name: str
@@ -154,6 +160,8 @@ class Profile(Strict):
     commands: list[Command] = Field(default_factory=list[Command])
     groups: dict[str, list[str]] = Field(default_factory=dict[str, list[str]])
     fifo: Fifo | None = None
+    motion: Motion | None = None
+    stated: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
     def _consistent(self) -> Profile:
@@ -193,6 +201,38 @@ class Profile(Strict):
     def entry(self, name: str) -> Register | Command:
         """The register or command of that name."""
         return self.command(name) if self.commands else self.register(name)
+
+    def limited(self, maximum: Mapping[str, float]) -> Profile:
+        """The profile with smaller largest values, by the names of its numeric orders and of the limits of motion.
+
+        Raises
+        ------
+        RecipeInvalid
+            No order and no limit has this name.
+        """
+        if not maximum:
+            return self
+        orders = [e.name for e in (*self.registers, *self.commands) if e.writable and e.type not in {"text", "string"}]
+        moving = list(Motion.model_fields) if self.kind == "exciter" else []
+        for name in maximum:
+            if name not in orders and name not in moving:
+                raise RecipeInvalid(
+                    f"maximum: profile {self.name} has no order '{name}'; {did_you_mean(name, [*orders, *moving])}",
+                    key="maximum",
+                )
+
+        def least(name: str, own: float | None) -> dict[str, float]:
+            return {"maximum": min(maximum[name], math.inf if own is None else own)} if name in maximum else {}
+
+        motion = Motion(**{name: value for name, value in maximum.items() if name in moving})
+        return self.model_copy(
+            update={
+                "registers": [r.model_copy(update=least(r.name, r.maximum)) for r in self.registers],
+                "commands": [c.model_copy(update=least(c.name, c.maximum)) for c in self.commands],
+                "stated": {**self.stated, **maximum},
+                "motion": motion if self.motion is None else self.motion.tighter(motion),
+            }
+        )
 
     def has(self, name: str) -> bool:
         """Whether there is a register, command or group of that name."""

@@ -40,9 +40,21 @@ LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
 
 
 class Device(Carried):
-    """A device at an address."""
+    """A device at an address.
+
+    ``maximum`` bounds what may be ordered, by the names of the profile's orders, below the profile's own largest values; for an
+    exciter also ``displacement_mm``, ``velocity_m_s`` and ``acceleration_g``, all peak values. The absolute maximum of the
+    devices' supply is ``maximum.voltage`` of the power supply.
+    """
 
     device_id: Annotated[int, Field(ge=1, le=247)]
+    maximum: dict[str, Positive] = Field(default_factory=dict[str, float])
+
+    @model_serializer(mode="wrap")
+    def _without_default(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without an empty ``maximum``: captures of earlier versions keep their names."""
+        content = handler(self)
+        return {name: value for name, value in content.items() if name != "maximum" or value}
 
 
 class Slots(Carried):
@@ -265,6 +277,12 @@ class StationConfig(Strict):
             for role, device in self.equipment.there().items():
                 if missing := device.missing():
                     raise ValueError(f"equipment.{role}.{missing}: empty, a station of kind modbus needs one; add it")
+            supply = self.equipment.power_supply
+            if supply is not None and "voltage" not in supply.maximum:
+                raise ValueError(
+                    "equipment.power_supply.maximum.voltage: missing, a station of kind modbus needs the absolute maximum of the "
+                    "devices' supply; add maximum = { voltage = … }"
+                )
         return self
 
 

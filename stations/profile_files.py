@@ -28,8 +28,8 @@ def profile_names() -> list[str]:
 
 
 def profile_of(device: Carried) -> Profile:
-    """The profile of a device of a station, with the word order that the device is set to."""
-    profile = load_profile(device.profile)
+    """The profile of a device of a station, with the word order that it is set to and the station's own largest values."""
+    profile = load_profile(device.profile).limited(getattr(device, "maximum", {}))
     if device.word_order is None:
         return profile
     kept = [register.model_copy(update={"word_order": None}) for register in profile.registers]

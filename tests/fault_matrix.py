@@ -234,8 +234,8 @@ fault starts within the third dwell (437.5 s), in the move after it (443 s), in 
   the run.
 
 Faults of test equipment (exciter, shock machine, centrifuge) are not in the matrix: a spoilt recording is discarded and repeated,
-an abort, an open guard door or an overspeed ends the run for a person, and a unit whose cable is off has no figure
-(`test_equipment_faults`).
+an abort, an open guard door, an overspeed, a drive that runs away or a loose cable of the reference ends the run for a person,
+and a unit whose cable is off has no figure (`test_equipment_faults`).
 
 """
 

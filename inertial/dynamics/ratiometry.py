@@ -46,7 +46,9 @@ def zero_and_sensitivity(means: Array, errors: Array) -> tuple[Array, Array, Arr
     return 0.5 * (means[:, 0] + means[:, 1]), 0.5 * (means[:, 0] - means[:, 1]), both
 
 
-def departures(supply: Array, zero: Array, sensitivity: Array, error: Array, *, follows: bool) -> Follows:
+def departures(
+    supply: Array, zero: Array, sensitivity: Array, error: Array, *, follows: bool, zero_error: Array | None = None
+) -> Follows:
     """Departures from the values at the first supply; for an output that follows the supply after division by the voltage ratio.
 
     Ratiometric error of the sensitivity: S(V)/S(V₀)·V₀/V − 1. The point at V₀ is common, so departures share its uncertainty.
@@ -54,6 +56,7 @@ def departures(supply: Array, zero: Array, sensitivity: Array, error: Array, *, 
     Parameters
     ----------
     supply, zero, sensitivity, error : (n,)
+    zero_error : (n,), that of the zero where it differs: wander is common to both faces, and leaves with their difference alone
     follows : whether the output is to be proportional to the supply
     """
     ratio = supply / supply[0] if follows else np.ones_like(supply)
@@ -62,10 +65,12 @@ def departures(supply: Array, zero: Array, sensitivity: Array, error: Array, *, 
     gain = sensitivity / ratio / sensitivity[0] - 1.0
     level = (zero / ratio - zero[0]) / scale
     spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own, own[0]))
+    own_zero = own if zero_error is None else zero_error / ratio / scale
+    zero_spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own_zero, own_zero[0]))
     step = supply - supply[0]
-    covariance = np.diag(own**2) + own[0] ** 2
+    covariance = np.diag(own_zero**2) + own_zero[0] ** 2
     used = slice(1, None)
     weight = np.linalg.solve(covariance[used, used], step[used])
     norm = float(step[used] @ weight)
     slope = float(weight @ level[used]) / norm
-    return Follows(supply, gain, spread, level, spread, slope, float(norm**-0.5), scale)
+    return Follows(supply, gain, spread, level, zero_spread, slope, float(norm**-0.5), scale)

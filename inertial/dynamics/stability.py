@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from inertial.dynamics.wander import wander_variance
 from inertial.errors import NotIdentified
 from inertial.noise.allan import overlapping
+from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
 
@@ -20,10 +22,10 @@ class Stability:
 
     Attributes
     ----------
-    sd_100s, sd_100s_error : standard deviation of 100 s means, and its standard uncertainty from effective degrees of freedom
+    sd_100s, sd_100s_error : standard deviation of 100 s means, and its standard uncertainty for white and 1/f noise
     sd_1s, range_1s, range_100s : standard deviation and range of 1 s means, range of 100 s means
     allan_100s, allan_100s_error : Allan deviation at 100 s
-    drift_h, drift_h_error : slope per hour and its standard uncertainty from the scatter of the 100 s means
+    drift_h, drift_h_error : slope per hour and its standard uncertainty for white and 1/f noise, which looks like drift
     """
 
     sd_100s: float
@@ -62,18 +64,19 @@ def stability(record: Array, rate_hz: float) -> Stability:
         msg = f"stability: {hundred.size} means of 100 s, 10 or more are needed; record at least 1000 s"
         raise NotIdentified(msg)
     second = block_means(record, max(1, round(rate_hz)))
-    time = 100.0 * np.arange(hundred.size) / 3600.0
-    rows = np.column_stack([np.ones_like(time), time - time.mean()])
+    time: Array = np.asarray(100.0 * np.arange(hundred.size) / 3600.0, dtype=np.float64)
+    rows: Array = np.asarray(np.column_stack([np.ones_like(time), time - time.mean()]), dtype=np.float64)
     c = np.linalg.lstsq(rows, hundred, rcond=None)[0]
-    left = hundred - rows @ c
-    drift_error = float(np.sqrt(left @ left / (hundred.size - 2) / np.sum(rows[:, 1] ** 2)) * _correlated(left))
+    noise = float(np.var(np.diff(second), ddof=1)) / 2.0 / 100.0  # white part of a mean of 100 s
+    inverse = np.linalg.pinv(rows)
+    drift_error = float(np.sqrt((inverse @ _covariance(rows, hundred, time, noise) @ inverse.T)[1, 1]))
     rate = rate_hz / max(1, round(rate_hz))
     curve = overlapping(second, rate, np.array([1, 3, 10, 30, round(100.0 * rate)]))
     allan = float(curve.deviation[-1])
     sd = float(hundred.std(ddof=1))
     return Stability(
         sd_100s=sd,
-        sd_100s_error=sd / np.sqrt(2.0 * (hundred.size - 1)) * _correlated(hundred - hundred.mean()),
+        sd_100s_error=_error_of_sd(hundred, time, noise),
         sd_1s=float(second.std(ddof=1)),
         range_1s=float(np.ptp(second)),
         range_100s=float(np.ptp(hundred)),
@@ -84,12 +87,20 @@ def stability(record: Array, rate_hz: float) -> Stability:
     )
 
 
-def _correlated(values: Array) -> float:
-    """Factor √((1 + ρ)/(1 − ρ)) on a standard uncertainty for neighbours that are correlated by ρ > 0."""
-    y = values - values.mean()
-    power = float(y @ y)
-    rho = float(np.clip(y[1:] @ y[:-1] / power, 0.0, 0.9)) if power > 0.0 else 0.0
-    return float(np.sqrt((1.0 + rho) / (1.0 - rho)))
+def _covariance(rows: Array, means: Array, time: Array, white: float) -> Array:
+    """Covariance (n, n) of means: a known white variance, and 1/f wander by restricted likelihood beside the terms ``rows``."""
+    known, kernel = white * np.eye(means.size), flicker_kernel(time)
+    return known + wander_variance(rows, means, known, kernel) * kernel
+
+
+def _error_of_sd(means: Array, time: Array, white: float) -> float:
+    """Standard uncertainty of the standard deviation of correlated means: Var s² = 2 tr((CV)²)/(n − 1)²."""
+    n = means.size
+    centred = _covariance(np.ones((n, 1)), means, time, white)
+    centred = centred - centred.mean(axis=0)
+    centred = centred - centred.mean(axis=1)[:, None]
+    sd = float(means.std(ddof=1))
+    return float(np.sqrt(2.0 * np.sum(centred * centred.T)) / (n - 1) / (2.0 * sd)) if sd > 0.0 else 0.0
 
 
 def white_and_flicker(record: Array, rate_hz: float) -> tuple[float, float]:
@@ -107,12 +118,31 @@ def white_and_flicker(record: Array, rate_hz: float) -> tuple[float, float]:
     return white, values[1] - white / taus[1]
 
 
-def difference_error(white: float, flicker: float, window_s: float) -> float:
-    """Standard uncertainty of the difference of the means of two windows: 2N²/T + 2·1.2·F².
+def difference_error(white: float, flicker: float, window_s: float, apart_s: float = 0.0) -> float:
+    """Standard uncertainty of the difference of the means of two windows of w s, their middles d s apart: white and 1/f noise.
 
-    For adjacent windows of flicker B the difference scatters by 0.99·B, with F = 0.664·B; a fifth is added for the gap.
+    Its square is 2N²/w + 2h·(L(d) − ln w + 3/2), with the one-sided density h/f, h = F²/(2 ln 2), and L the mean of ln|t − t′| of
+    both windows. Adjacent windows, which is what is assumed where no distance is given, have 2·F².
     """
-    return float(np.sqrt(2.0 * max(white, 0.0) / window_s + 2.4 * max(flicker, 0.0)))
+    x = max(1.0, apart_s / window_s)
+    outer, inner = (x + 1.0) ** 2 * np.log(x + 1.0), 0.0 if x <= 1.0 else (x - 1.0) ** 2 * np.log(x - 1.0)
+    far = 0.5 * (outer + inner - 2.0 * x**2 * np.log(x))  # L(d) − ln w + 3/2
+    return float(np.sqrt(2.0 * max(white, 0.0) / window_s + max(flicker, 0.0) / np.log(2.0) * far))
+
+
+def settled_error(white: float, flicker: float, window_s: float, final_s: float, apart_s: float) -> float:
+    """Standard uncertainty of a mean over a window minus that over a later part of the record, in white and 1/f noise.
+
+    With a one-sided density h/f the variance is h·(3 + ln(d²/(w·T))) for means over w and T whose middles are d apart, and
+    h = F²/(2 ln 2).
+
+    Parameters
+    ----------
+    white, flicker : N² (per s) and F², as of :func:`white_and_flicker`
+    window_s, final_s, apart_s : w, T and d, s
+    """
+    slow = max(flicker, 0.0) / (2.0 * np.log(2.0)) * max(0.0, 3.0 + np.log(apart_s**2 / (window_s * final_s)))
+    return float(np.sqrt(max(white, 0.0) * (1.0 / window_s + 1.0 / final_s) + slow))
 
 
 def warm_up_time(time: Array, record: Array, *, band: float, window_s: float) -> tuple[float, float]:

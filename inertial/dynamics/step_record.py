@@ -43,7 +43,9 @@ class StepFigures:
         return self.settling_high_s - self.settling_low_s <= 12.0 * self.settling_error_s
 
 
-def step_figures(time: Array, response: Array, error: Array, *, band: float, edge_error_s: float = 0.0) -> StepFigures:
+def step_figures(
+    time: Array, response: Array, error: Array, *, band: float, edge_error_s: float = 0.0, bin_s: float = 0.0
+) -> StepFigures:
     """Figures of a response that is normalised: 0 before the edge of the drive at time 0, 1 at the end.
 
     Crossings and the maximum are those of parabolas through the points near them, which noise does not bias.
@@ -54,6 +56,7 @@ def step_figures(time: Array, response: Array, error: Array, *, band: float, edg
     response, error : (n,), share of the step, and its standard uncertainty
     band : share of the step
     edge_error_s : standard uncertainty of the edge's time
+    bin_s : duration over which each value is a mean; the curvature within it is taken out
 
     Raises
     ------
@@ -73,15 +76,16 @@ def step_figures(time: Array, response: Array, error: Array, *, band: float, edg
         msg = f"step: {within} points in the rise time, {FEWEST} are needed; sample faster"
         raise NotIdentified(msg)
     width = 0.12 * rise
+    blur = bin_s**2 / 12.0
     first, half, last = (
-        _crossing(time, response, error, level, near, width)
+        _crossing(time, response, error, level, near, width, blur)
         for level, near in ((0.1, ten), (0.5, _first_above(time, response, 0.5)), (0.9, ninety))
     )
-    top, top_error = _maximum(time, response, error, last[0], rise)
+    top, top_error = _maximum(time, response, error, last[0], rise, blur)
     smooth, left = _smoothed(time, response, error, width)
     margin = 3.0 * left
     settled = [_last_outside(time, smooth, size) for size in (band, band + margin, max(band - margin, 0.1 * band))]
-    at, spread = _settling(time, response, error, band, settled[0], width)
+    at, spread = _settling(time, response, error, band, settled[0], width, blur)
     return StepFigures(
         max(0.0, top - 1.0),
         top_error,
@@ -155,8 +159,13 @@ def _last_outside(time: Array, response: Array, band: float) -> float:
     return float(0.5 * (time[outside[-1]] + time[outside[-1] + 1]))
 
 
-def _local(time: Array, response: Array, error: Array, near: float, width: float) -> tuple[Array, Array, float]:
-    """Parabola in (t − near)/width through the points near a time: coefficients, covariance, and the half width used."""
+def _local(
+    time: Array, response: Array, error: Array, near: float, width: float, blur: float
+) -> tuple[Array, Array, float]:
+    """Parabola in (t − near)/width through the points near a time: coefficients, covariance, and the half width used.
+
+    Points that are means over times of variance ``blur``, s², lie above the response by half its curvature times that.
+    """
     while True:
         rows = np.abs(time - near) <= width
         if np.count_nonzero(rows) >= FEWEST:
@@ -165,14 +174,16 @@ def _local(time: Array, response: Array, error: Array, near: float, width: float
     x = (time[rows] - near) / width
     design = np.column_stack([np.ones_like(x), x, x**2]) / error[rows, None]
     covariance: Array = np.asarray(np.linalg.inv(design.T @ design), dtype=np.float64)
-    return covariance @ (design.T @ (response[rows] / error[rows])), covariance, width
+    c = covariance @ (design.T @ (response[rows] / error[rows]))
+    c[0] -= c[2] * blur / width**2
+    return c, covariance, width
 
 
 def _crossing(
-    time: Array, response: Array, error: Array, level: float, near: float, width: float
+    time: Array, response: Array, error: Array, level: float, near: float, width: float, blur: float
 ) -> tuple[float, float]:
     """Time at which the response crosses a level near a time, and its standard uncertainty."""
-    c, covariance, width = _local(time, response, error, near, width)
+    c, covariance, width = _local(time, response, error, near, width, blur)
     x = 0.0
     for _ in range(20):  # Newton on the parabola; the slope at a crossing is not zero
         slope = c[1] + 2.0 * c[2] * x
@@ -185,20 +196,32 @@ def _crossing(
 
 
 def _settling(
-    time: Array, response: Array, error: Array, band: float, near: float, width: float
+    time: Array, response: Array, error: Array, band: float, near: float, width: float, blur: float
 ) -> tuple[float, float]:
     """Time of the last crossing into the band, and its standard uncertainty."""
     side = float(np.sign(np.interp(near - width, time, response) - 1.0)) or 1.0
-    return _crossing(time, response, error, 1.0 + side * band, near, width)
+    return _crossing(time, response, error, 1.0 + side * band, near, width, blur)
 
 
-def _maximum(time: Array, response: Array, error: Array, after: float, rise: float) -> tuple[float, float]:
-    """Largest value of the response after a time, and its standard uncertainty."""
+def _maximum(time: Array, response: Array, error: Array, after: float, rise: float, blur: float) -> tuple[float, float]:
+    """Largest value of the response after a time, and its standard uncertainty.
+
+    A polynomial of fourth degree is laid about the vertex of a parabola: a parabola alone cuts the top of a skewed maximum, and
+    one about the largest point is raised by its noise.
+    """
     inside = time >= after
     if not inside.any():
         return 1.0, float(error.mean())
     near = float(time[inside][int(np.argmax(response[inside]))])
-    c, covariance, _ = _local(time, response, error, near, 0.25 * rise)
-    at = float(np.clip(-0.5 * c[1] / c[2], -1.0, 1.0)) if c[2] < 0.0 else 0.0
-    row = np.array([1.0, at, at**2])
-    return float(row @ c), float(np.sqrt(row @ covariance @ row))
+    c, _, width = _local(time, response, error, near, 0.4 * rise, blur)
+    near += width * (float(np.clip(-0.5 * c[1] / c[2], -1.0, 1.0)) if c[2] < 0.0 else 0.0)
+    rows = np.abs(time - near) <= width
+    design = np.vander((time[rows] - near) / width, 5) / error[rows, None]
+    covariance = np.linalg.inv(design.T @ design)
+    c = covariance @ (design.T @ (response[rows] / error[rows]))
+    places = np.linspace(-0.8, 0.8, 161)
+    curve = np.vander(places, 5)
+    k = int(np.argmax(curve @ c))
+    bend = float(np.polyval(np.polyder(c, 2), places[k]))
+    value = float(curve[k] @ c) - 0.5 * bend * blur / width**2
+    return value, float(np.sqrt(curve[k] @ covariance @ curve[k]))

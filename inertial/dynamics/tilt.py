@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.dynamics.wander import wander_variance
 from inertial.errors import NotIdentified
+from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
 TERMS = ("bias", "sine", "cosine", "second_order", "third_order")
@@ -45,20 +47,44 @@ class TiltFit:
         slope = np.array([-c, s]) / size**2
         return float(np.arctan2(c, s)), float(np.sqrt(slope @ self.covariance[1:3, 1:3] @ slope))
 
+    def curve(self, angle: Array) -> Array:
+        """Departure (n,) of the K2–K3 curve from bias and scale at table angles (n,), rad; output unit."""
+        turn = angle + self.phase[0]
+        return _departures(turn) @ self.value[[self.names.index(name) for name in TERMS[3:]]]
+
+    @property
+    def departure(self) -> tuple[float, float]:
+        """Largest departure of the K2–K3 curve from bias and scale over the turn, and its standard uncertainty; output unit.
+
+        K2·sin² departs by −½·K2·cos 2θ and K3·sin³ by −¼·K3·sin 3θ from a constant and a sine.
+        """
+        curve = _departures(np.linspace(0.0, 2.0 * np.pi, 721))
+        place = [self.names.index(name) for name in TERMS[3:]]
+        found = curve @ self.value[place]
+        k = int(np.argmax(np.abs(found)))
+        return float(abs(found[k])), float(np.sqrt(curve[k] @ self.covariance[np.ix_(place, place)] @ curve[k]))
+
     def of(self, name: str) -> tuple[float, float]:
         """Value and standard uncertainty of a term."""
         k = self.names.index(name)
         return float(self.value[k]), float(np.sqrt(self.covariance[k, k]))
 
 
-def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1) -> TiltFit:
-    """Weighted least squares of one axis over angles in its plane.
+def _departures(turn: Array) -> Array:
+    """Columns (n, 2) of K2 and K3 after bias and scale, at angles (n,) from the zero of the input axis."""
+    return np.column_stack([-0.5 * np.cos(2.0 * turn), -0.25 * np.sin(3.0 * turn)])
+
+
+def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time: Array | None = None) -> TiltFit:
+    """Generalised least squares of one axis over angles in its plane.
 
     Parameters
     ----------
     angle : (n,), rad; the force along the axis is sin(angle + φ) g
     output, error : (n,), output unit; the error must hold noise and the share of the angle's uncertainty (scale·cos θ·u_θ)
     orders : 1 for bias and scale, 3 with K2 and K3; φ must be small then (below 0.1 rad), since the powers are of sin θ
+    time : (n,), s, of the dwells; with it 1/f wander between them is estimated from the residuals, and weighs. Wander over a
+        whole turn looks like a sine, more than its scatter from dwell to dwell shows.
 
     Raises
     ------
@@ -78,8 +104,14 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1) -> T
     ):
         msg = f"tilt: {len(angle)} angles do not tell {', '.join(names)} apart; add angles over the whole turn"
         raise NotIdentified(msg)
-    c = np.linalg.lstsq(weighted, output / error, rcond=None)[0]
-    covariance = np.asarray(np.linalg.inv(weighted.T @ weighted), dtype=np.float64)
+    whole = np.diag(error**2)
+    if time is not None:
+        kernel = flicker_kernel(time)
+        whole = whole + wander_variance(rows, output, whole, kernel) * kernel
+    root = np.linalg.cholesky(whole)
+    white_rows, white_output = np.linalg.solve(root, rows), np.linalg.solve(root, output)
+    c = np.linalg.lstsq(white_rows, white_output, rcond=None)[0]
+    covariance = np.asarray(np.linalg.inv(white_rows.T @ white_rows), dtype=np.float64)
     return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
-from inertial.dynamics.transfer_model import Points, TransferFit, fit_transfer
+from inertial.dynamics.transfer_model import Points, TransferFit, best_of_exchange, fit_transfer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -111,6 +111,11 @@ def _next_class(points: Points, best: TransferFit, current: Sequence[str]) -> tu
     fits: dict[str, TransferFit] = {}
     for name in candidates:
         fits[name] = fit_transfer(points, [*current, name], known)
+        if name in {
+            "two_pole",
+            "second_order",
+        }:  # mass and low-pass exchanged are another minimum, which breeds further effects
+            fits[name] = best_of_exchange(points, fits[name])[0]
     price = np.log(len(best.residual))
 
     def score(fit: TransferFit) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -56,7 +57,9 @@ class Supervisor:
             figures = {f"slot_{unit.slot}{VOLT}": supply[unit.slot] for unit in units}
             self.note("reference", NO_RECORD, "supplies at the start", "reference of later supplies", figures)
         reference = {int(name.removeprefix("slot_").removesuffix(VOLT)): volt for name, volt in figures.items()}
-        self.watched = Watched(config.suspenders, config.soak, reference)
+        supply = config.fitted().get("power_supply")
+        most = math.inf if supply is None else supply.maximum.get("voltage", math.inf)
+        self.watched = Watched(config.suspenders, config.soak, reference, most_V=most)
 
     def expect_supply(self, ratio: float) -> None:
         """The devices' supply that later checks expect, over that at the start: a procedure may set it."""

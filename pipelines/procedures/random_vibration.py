@@ -177,9 +177,17 @@ class RandomVibration(InG, OnEquipment, Evaluated):
         density = points[points["series"] == "density"]
         f = density["setting"].to_numpy(dtype=float)
         target = _target(part, points, f)
+        inside = target > 0.0
         left.fill_between(
-            f, target * 10.0 ** (-LINE_DB / 10.0), target * 10.0 ** (LINE_DB / 10.0), color="#dddddd", label="± 3 dB"
+            f[inside],
+            target[inside] * 10.0 ** (-LINE_DB / 10.0),
+            target[inside] * 10.0 ** (LINE_DB / 10.0),
+            color="#cccccc",
+            label="± 3 dB",
+            lw=0.0,
         )
+        left.set_ylim(0.03 * float(target[inside].min()), 8.0 * float(target.max()))
+        left.set_xlim(0.7 * float(f[inside][0]), 1.3 * float(f[inside][-1]))
         left.plot(f, density["value"], lw=0.9, c="#0072b2", label="reference")
         left.set(xscale="log", yscale="log", xlabel="frequency / Hz", ylabel="density / (g²/Hz)")
         for axis in (left.xaxis, left.yaxis):

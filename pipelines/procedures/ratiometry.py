@@ -154,6 +154,7 @@ class Ratiometry(SetsEquipment, Evaluated):
                         "setting": record.step.setting["supply_V"], "value": float(output.mean()),
                         "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": record.step.setting["side"],
                         "white": white, "flicker": flicker, "window_s": output.size / own.rate_hz,
+                        "time_s": float(own.time.mean()),
                         "measured_V": float(reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
                     }
                 )  # fmt: skip
@@ -216,12 +217,22 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
             if len(one):
                 means[k, side], errors[k, side] = float(one["value"].iloc[0]), float(one["uncertainty"].iloc[0])
     zero, sensitivity, error = zero_and_sensitivity(means, errors)
-    pooled = difference_error(
-        float(rows["white"].mean()), float(rows["flicker"].mean()), float(rows["window_s"].mean())
-    )
-    error = np.maximum(error, 0.5 * pooled)  # of a mean of two faces: a face has 1/√2 of a difference
-    error = np.hypot(error, 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0))
-    return departures(measured, zero, sensitivity, error, follows=part.follows)
+    apart = _time_between(rows)
+    white, flicker, window = (float(rows[name].mean()) for name in ("white", "flicker", "window_s"))
+    # both faces of a voltage follow each other: slow wander is the same on them, so their mean has it like one longer record
+    zero_error = np.maximum(error, difference_error(white, flicker, 2.0 * window, apart) / np.sqrt(2.0))
+    error = np.maximum(error, 0.5 * difference_error(white, flicker, window, apart))
+    own = 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0)
+    error, zero_error = np.hypot(error, own), np.hypot(zero_error, own)
+    return departures(measured, zero, sensitivity, error, follows=part.follows, zero_error=zero_error)
+
+
+def _time_between(rows: pd.DataFrame) -> float:
+    """Mean time between a voltage and the first one, s; 0 where no times are known."""
+    if "time_s" not in rows:  # points of earlier versions have none
+        return 0.0
+    middle = rows.groupby("setting", sort=False)["time_s"].mean()
+    return float((middle - middle.min()).drop(middle.idxmin()).mean()) if len(middle) > 1 else 0.0
 
 
 def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:

@@ -94,7 +94,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         FigureSpec(
             "shock_undershoot_percent",
             "%",
-            "largest excursion against the pulse after it, of the peak, beyond that of the reference",
+            "largest excursion against the pulse after it, of the peak, beyond that of the reference; mean of the shocks",
         ),
         FigureSpec(
             "shock_bias_shift_ug", "µg", "bias after the shocks minus before, same pose and temperature, worst axis"
@@ -286,8 +286,8 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
         FigureValue(
             names[1],
             part.axis,
-            float(under.max()),
-            float(np.hypot(floor, under.std(ddof=1) if under.size > 1 else 0.0)),
+            float(under.mean()),
+            float(np.hypot(floor, under.std(ddof=1) / np.sqrt(under.size) if under.size > 1 else 0.0)),
         ),
     ]
 

@@ -30,6 +30,7 @@ def bias_points(
         {
             "unit": unit, "axis": axis, "series": "bias", "point": number, "setting": after, "value": float(output[:, i].mean()),
             "uncertainty": float(error[i]), "white": noise[i][0], "flicker": noise[i][1], "window_s": len(output) / own.rate_hz,
+            "time_s": float(own.time.mean()),
         }
         for i, axis in enumerate(AXES)
     ]  # fmt: skip
@@ -39,11 +40,7 @@ def bias_shift(rows: pd.DataFrame) -> FigureValue:
     """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
     found: list[FigureValue] = []
     bias = rows[rows["series"] == "bias"]
-    pooled = (
-        difference_error(float(bias["white"].mean()), float(bias["flicker"].mean()), float(bias["window_s"].mean()))
-        if len(bias)
-        else 0.0
-    )
+    pooled = _pooled_error(bias) if len(bias) else 0.0
     for axis, own in bias.groupby("axis", sort=False):
         before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
         if before.empty or after.empty:
@@ -56,3 +53,10 @@ def bias_shift(rows: pd.DataFrame) -> FigureValue:
     if not found:
         return FigureValue.not_determined("shock_bias_shift_ug", "*", "no bias before or after")
     return worst(found)
+
+
+def _pooled_error(bias: pd.DataFrame) -> float:
+    """Standard uncertainty of after minus before by white noise and flicker, pooled over the axes."""
+    white, flicker, window = (float(bias[name].mean()) for name in ("white", "flicker", "window_s"))
+    time = bias["time_s"].to_numpy(dtype=float) if "time_s" in bias else np.zeros(1)  # earlier versions have none
+    return difference_error(white, flicker, window, float(np.ptp(time)))

@@ -42,6 +42,7 @@ BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
 FINAL_SHARE = 0.3  # of the step's duration, at its end: the final value
 BINS = 2  # points of the averaged response for each sample interval
 COLOURS = ("#0072b2", "#d55e00", "#009e73")
+WIDTHS = (3.0, 1.9, 0.8)  # axes that agree still show one above the other
 
 
 class StepPart(Part):
@@ -145,11 +146,11 @@ class StepResponse(OnEquipment, FromWaveforms):
     def draw(self, drawing: Drawing, part: StepPart, points: pd.DataFrame) -> None:
         """The response of every axis, and its last part about the final value with the band and the settling times."""
         left, right = drawing.subplots(1, 2)
-        for axis, colour in zip(AXES, COLOURS, strict=True):
+        for axis, colour, width in zip(AXES, COLOURS, WIDTHS, strict=True):
             own = points[points["axis"] == axis].sort_values("setting")
             time, value = 1e3 * own["setting"].to_numpy(dtype=float), 100.0 * own["value"].to_numpy(dtype=float)
-            left.plot(time, value, lw=1.0, c=colour, label=f"axis {axis}")
-            right.plot(time, value - 100.0, lw=1.0, c=colour)
+            left.plot(time, value, lw=width, c=colour, label=f"axis {axis}")
+            right.plot(time, value - 100.0, lw=width, c=colour)
             try:
                 settled = 1e3 * axis_figures(part, own).settling_s
             except NotIdentified:
@@ -171,10 +172,16 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
         raise NotIdentified(FAULTS[int(rows["fault"].iloc[0])])
     kept = rows.sort_values("setting")
     time, value, error = (kept[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+    rate = float(kept["rate_hz"].iloc[0])
     found = step_figures(
-        time, value, error, band=1e-2 * part.band_percent, edge_error_s=float(kept["edge_error_s"].iloc[0])
+        time,
+        value,
+        error,
+        band=1e-2 * part.band_percent,
+        edge_error_s=float(kept["edge_error_s"].iloc[0]),
+        bin_s=1.0 / rate / BINS,
     )
-    samples = found.rise_s * float(kept["rate_hz"].iloc[0])
+    samples = found.rise_s * rate
     if samples < RISE_POINTS:
         msg = (
             f"{samples:.1f} samples in the rise time, {RISE_POINTS:g} are needed to resolve a tenth of 1/f_n; record the "

@@ -76,7 +76,10 @@ class Tilt(Evaluated):
     part: ClassVar[type[Part]] = TiltPart
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec(
-            "tilt_linearity_ug", "µg", "largest residual from bias and scale over the plane, worst axis in it; 1 g only"
+            "tilt_linearity_ug",
+            "µg",
+            "largest departure from bias and scale over the plane by K2 and K3 (with orders = 1 the largest residual), worst "
+            "axis in it; 1 g only",
         ),
         FigureSpec("tilt_orthogonality_mrad", "mrad", "departure from 90° of the two axes in the plane"),
         FigureSpec("tilt_second_order_ug_g2", "µg/g²", "K2 of the worst axis in the plane"),
@@ -110,6 +113,7 @@ class Tilt(Evaluated):
                         "setting": float(reading["outer_deg"]),
                         "value": mean[i],
                         "uncertainty": sd[i],
+                        "time_s": float(own.time.mean()),
                     }
                     for i, axis in enumerate(AXES)
                 ]
@@ -120,18 +124,21 @@ class Tilt(Evaluated):
         """Figures of the axes in the plane, and what the plane leaves open."""
         del device
         figures: dict[str, list[FigureValue]] = {}
+        largest: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):
             fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
             linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
-            found = [worst([_linearity(axis, one) for axis, one in linear.items()]), _orthogonality(part, linear)]
+            found = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, linear)]
             if part.orders == 3:
                 found.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
             else:
                 found.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
             figures[str(unit)] = found
+            largest += [_residual(str(unit), axis, one) for axis, one in linear.items()]
         inside, turned = " and ".join(_plane(part)), part.about
         open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))
         findings = [
+            *largest,
             Finding("", "not determined by this plane", f"axes {inside}: {open_in}"),
             Finding("", "not determined by this plane", f"axis {turned}, about which the unit turns: {open_out}"),
         ]
@@ -149,15 +156,23 @@ class Tilt(Evaluated):
                 np.degrees(one.angle)[order],
                 residual[order],
                 error[order],
-                fmt="o-",
+                fmt="o",
                 ms=3,
                 lw=0.8,
                 c=colour,
                 label=f"axis {axis}",
             )
+            if part.orders == 3:
+                turn = np.linspace(-np.pi, np.pi, 361)
+                curve = _fit(part, points[points["axis"] == axis]).curve(turn)
+                place.plot(
+                    np.degrees(turn), MICRO * curve / one.scale[0], lw=1.1, c=colour, label=f"K2 and K3 of axis {axis}"
+                )
         place.axhline(0.0, c="#999999", lw=0.8)
         place.set(xlabel="angle / °", ylabel="residual from bias and scale / µg")
-        place.legend(frameon=False, loc="upper right")
+        place.set_xticks(np.arange(-180, 181, 45))
+        place.margins(y=0.25)  # room for the legend above the points
+        place.legend(frameon=False, loc="upper right", ncols=4)
 
 
 def _plane(part: TiltPart) -> tuple[str, str]:
@@ -172,14 +187,26 @@ def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltF
     plain = fit_tilt(angle, output, np.ones_like(output))
     slope = plain.scale[0] * np.abs(np.cos(angle + plain.phase[0]))
     error = np.hypot(white, slope * np.radians(part.angle_uncertainty_deg))
-    return fit_tilt(angle, output, error, orders=part.orders if orders is None else orders)
+    time = rows["time_s"].to_numpy(dtype=float) if "time_s" in rows else None  # points of earlier versions have none
+    return fit_tilt(angle, output, error, orders=part.orders if orders is None else orders, time=time)
 
 
 def _linearity(axis: str, one: TiltFit) -> FigureValue:
+    """By K2 and K3 where they are fitted: the largest of many residuals is noise, whatever the axis does."""
+    if "second_order" in one.names:
+        value, error = one.departure
+        return FigureValue("tilt_linearity_ug", axis, MICRO * value / one.scale[0], MICRO * error / one.scale[0])
     residual = MICRO * one.residuals / one.scale[0]
     k = int(np.argmax(np.abs(residual)))
     spread = float(np.sqrt(np.mean(residual**2)))
     return FigureValue("tilt_linearity_ug", axis, float(abs(residual[k])), spread)
+
+
+def _residual(unit: str, axis: str, one: TiltFit) -> Finding:
+    residual = MICRO * one.residuals / one.scale[0]
+    k = int(np.argmax(np.abs(residual)))
+    text = f"{residual[k]:+.3g} µg at {np.degrees(one.angle[k]):.4g}°, rms {np.sqrt(np.mean(residual**2)):.3g} µg"
+    return Finding(unit, f"largest residual from bias and scale, axis {axis}", text)
 
 
 def _orthogonality(part: TiltPart, fits: dict[str, TiltFit]) -> FigureValue:

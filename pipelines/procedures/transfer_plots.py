@@ -34,7 +34,7 @@ def draw_bode(drawing: Drawing, points: Points, found: Diagnosis, coherence: Arr
     plan = Conditions(fine, *(np.full(300, np.median(one)) for one in (c.level, c.temperature, c.record_s)))
     curves = [("model", found.fit, MODEL, "--")]
     if found.classes:
-        curves.append(("with " + ", ".join(found.recommended), found.extended, EXTENDED, "-"))
+        curves.append(("with the missing effects", found.extended, EXTENDED, "-"))
     size, phase, left, bond, plane, empty = places.ravel()
     size.errorbar(
         f,
@@ -86,7 +86,8 @@ def draw_bode(drawing: Drawing, points: Points, found: Diagnosis, coherence: Arr
     for one in (left, bond):
         one.yaxis.set_major_formatter(FuncFormatter(_plain))
     empty.axis("off")
-    lines = [f"{p.name}: {_text(found, p.name, p.unit)}" for p in found.extended.parameters]
+    added = [f"missing: {name}" for name in found.recommended]
+    lines = [*added, *(f"{p.name}: {_text(found, p.name, p.unit)}" for p in found.extended.parameters)]
     verdict = {True: "model adequate", False: "model not adequate", None: "model cannot be judged"}[found.adequate]
     empty.text(0.0, 0.95, "\n".join([verdict, *lines]), va="top", fontsize=8.5)
 

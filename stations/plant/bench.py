@@ -171,7 +171,7 @@ class Bench:
 
         With ``across_deg`` the axis still points up and the exciter moves across it, at this angle from the next axis.
         """
-        rng, rig = self._rng(tick, 1), self.rig
+        rng, rig = self.stream_at(tick, 1), self.rig
         a = level * (1.0 + 0.02 * rng.standard_normal())
         if "level_not_reached" in conditions:
             a *= 0.3
@@ -229,7 +229,7 @@ class Bench:
         fine_hz : of the force
         slow_hz : rate of the recorder for a long recording; its usual one where 0
         """
-        rng = self._rng(tick, 2)
+        rng = self.stream_at(tick, 2)
         n = len(force)
         along = np.zeros((n, 3))
         along[:, axis] = force
@@ -274,7 +274,7 @@ class Bench:
         conditions: frozenset[str] = frozenset(),
     ) -> Waveforms:
         """Response to a step of voltage at the self-test inputs, which push all masses; the reference is the drive in V."""
-        rng, fine_hz = self._rng(tick, 4), STEP_FINE_HZ
+        rng, fine_hz = self.stream_at(tick, 4), STEP_FINE_HZ
         volts *= 0.3 if "level_not_reached" in conditions else 1.0
         n = round(seconds * fine_hz)
         time = np.arange(n) / fine_hz - before_s - rng.uniform(0.0, 1.0) / ANALOGUE_HZ
@@ -291,7 +291,7 @@ class Bench:
 
     def steady(self, force: Array, axis: int, seconds: float, rate_hz: float, tick: int) -> Array:
         """Outputs (n, units, 3) under steady forces (units,) in g along an axis."""
-        rng = self._rng(tick, 3)
+        rng = self.stream_at(tick, 3)
         count = round(seconds * rate_hz)
         outputs = np.zeros((count, len(self.units), 3))
         for k, (unit, truth) in enumerate(zip(self.units, self.truths, strict=True)):
@@ -330,7 +330,8 @@ class Bench:
 
     def _as_reference(self, reference: Array, rng: np.random.Generator, conditions: frozenset[str]) -> Array:
         """What the reference sensor reads of (n, 3) g: its error of calibration, noise, and a range that may clip."""
-        read = reference * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
+        felt = 0.0 * reference if "reference_cable_off" in conditions else reference
+        read = felt * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
         if "clipped_reference" in conditions:
             top = 0.6 * float(np.max(np.abs(read)))
             read = np.clip(read, -top, top)
@@ -347,5 +348,6 @@ class Bench:
             out = out + 2.0 / PERIOD_POINTS * np.real(spin[:, None] * spectrum[k])
         return out
 
-    def _rng(self, tick: int, channel: int) -> np.random.Generator:
+    def stream_at(self, tick: int, channel: int) -> np.random.Generator:
+        """Random numbers of a record that begins at a time in µs; other stations and lots have others."""
         return np.random.Generator(np.random.Philox(key=self.key, counter=[0, 7, channel, tick]))

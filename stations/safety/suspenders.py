@@ -53,13 +53,15 @@ def require_released(instruments: Instruments | Guarded) -> None:
 class Watched:
     """The rules of a station's file for one run; ``reference`` is the supply by slot at the start, V.
 
-    ``supply_ratio`` is the supply that a procedure has set over that at the start; bounds in V hold where it is 1.
+    ``supply_ratio`` is the supply that a procedure has set over that at the start; bounds in V hold where it is 1. ``most_V`` is
+    the absolute maximum of the devices' supply, which holds always.
     """
 
     rules: Suspenders
     soak: Soak
     reference: dict[int, float]
     supply_ratio: float = 1.0
+    most_V: float = math.inf
 
     def instrument_reasons(self, instruments: Instruments, slots: Sequence[int]) -> list[Reason]:
         """Reasons from the reader: door, vibration and the supply of these slots."""
@@ -101,6 +103,8 @@ class Watched:
     def _supply(self, slot: int, volt: float) -> str:
         """Why a slot's supply is out of tolerance; empty where it is not."""
         bounds, start = self.rules.supply_V, self.reference.get(slot)
+        if not volt <= self.most_V and math.isfinite(self.most_V):
+            return f"supply {volt:.4g} V, at most {self.most_V:g} V is allowed (maximum.voltage of the power supply)"
         start = None if start is None else self.supply_ratio * start
         if bounds is not None and self.supply_ratio == 1.0 and not bounds[0] <= volt <= bounds[1]:
             return f"supply {volt:.4g} V, {bounds[0]:g} to {bounds[1]:g} V is needed"

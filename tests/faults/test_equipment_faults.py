@@ -27,6 +27,7 @@ PARTS = {
     "centrifuge": "forces_g = [1.0, 5.0, 10.0, 20.0]\nrecord_s = 0.5\nreversed = false\ndown_again = false\nscale = 0.007",
     "step_response": "steps = 4",
     "ratiometry": 'supplies_V = [12.0, 11.0, 13.0]\naxes = ["z"]\ndwell_s = 2.0\nsettle_s = 0.0',
+    "random_vibration": "seconds = 2.0\nlevels_g = [1.0, 2.0, 3.0]\nscale = 0.007",
     "transverse": "step_deg = 45.0\nrecord_s = 0.05\nscale = 0.007",
 }  # fmt: skip
 
@@ -60,8 +61,18 @@ def take(folder: Path, name: str, faults: list[FaultOrder], archive: str):
         ("sweep", "missed_trigger"),
         ("sweep", "clipped_reference"),
         ("sweep", "level_not_reached"),
+        ("sweep", "reference_cable_off"),
         ("shock", "missed_trigger"),
+        ("shock", "clipped_reference"),
+        ("shock", "level_not_reached"),
         ("step_response", "missed_trigger"),
+        ("step_response", "level_not_reached"),
+        ("transverse", "missed_trigger"),
+        ("transverse", "clipped_reference"),
+        ("transverse", "level_not_reached"),
+        ("random_vibration", "missed_trigger"),
+        ("random_vibration", "clipped_reference"),
+        ("random_vibration", "level_not_reached"),
     ],
 )
 def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_path: Path) -> None:
@@ -73,7 +84,7 @@ def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_
     events = [event for event in again.events.recorded() if event.kind == "spoilt"]
     assert events
     assert again.finished() == good.finished()
-    assert {"sweep": "exciter", "shock": "shock", "step_response": "step generator"}[name] in events[0].reason
+    assert {"shock": "shock", "step_response": "step generator"}.get(name, "exciter") in events[0].reason
 
 
 @pytest.mark.parametrize(
@@ -85,12 +96,16 @@ def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_
         ("shock", "level_not_reached", "was ordered"),
         ("centrifuge", "guard_door", "guard door"),
         ("centrifuge", "overspeed", "overspeed"),
+        ("centrifuge", "drive_runaway", "runs away"),
         ("centrifuge", "missed_trigger", "trigger was missed"),
         ("step_response", "missed_trigger", "trigger was missed"),
         ("step_response", "level_not_reached", "was ordered"),
         ("step_response", "controller_abort", "amplifier reports a fault"),
         ("ratiometry", "current_limit", "V measured, 13 V was set"),
         ("transverse", "controller_abort", "interlock open"),
+        ("random_vibration", "controller_abort", "interlock open"),
+        ("random_vibration", "reference_cable_off", "was ordered"),
+        ("shock", "reference_cable_off", "was ordered"),
     ],
 )
 def test_trouble_that_stays_ends_the_run_for_a_person(name: str, kind: str, text: str, tmp_path: Path) -> None:
@@ -98,7 +113,7 @@ def test_trouble_that_stays_ends_the_run_for_a_person(name: str, kind: str, text
         take(tmp_path, name, [FaultOrder(kind=kind)], "bad")
 
 
-@pytest.mark.parametrize("name", ["sweep", "shock", "centrifuge", "step_response", "transverse"])
+@pytest.mark.parametrize("name", ["sweep", "shock", "centrifuge", "step_response", "transverse", "random_vibration"])
 def test_a_unit_whose_cable_is_off_has_no_figure(name: str, tmp_path: Path) -> None:
     recipe = recipe_of(tmp_path, name)
     figure = {
@@ -107,6 +122,7 @@ def test_a_unit_whose_cable_is_off_has_no_figure(name: str, tmp_path: Path) -> N
         "centrifuge": "centrifuge_linearity_percent",
         "step_response": "step_settling_ms",
         "transverse": "transverse_sensitivity_percent",
+        "random_vibration": "vibration_rectification_ug_g2",
     }
     limits = limits_of({"name": "one", "figures": {figure[name]: {"max": 1e9, "unit": UNITS[figure[name]]}}}, UNITS)
     station = with_faults(load_station(), [FaultOrder(kind="cable_off", serial="F2")])

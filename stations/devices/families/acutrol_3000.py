@@ -16,6 +16,7 @@ POLL_S = 0.5
 PATIENCE_S = 600.0
 REACHED = 2e-5  # of the rate, or deg/s below one
 STANDING_DEG_S = 0.01
+OVERSPEED = 1.02  # of the larger of the rate at the start and the ordered one, and a degree a second
 
 
 class Acutrol(Equipment):
@@ -38,7 +39,7 @@ class Acutrol(Equipment):
         Raises
         ------
         OperatorNeeded
-            The interlock has opened: guard door or overspeed.
+            The interlock has opened, by guard door or overspeed; or the rate rises beyond the order.
         RecordingSpoilt
             The recorder has missed its trigger, or the rate has left its band.
         """
@@ -53,6 +54,7 @@ class Acutrol(Equipment):
         self.clock.sleep(seconds)
         self._require_no_fault()
         found = self.values.number("rate_read")
+        self._refuse_overspeed(found, rate_deg_s)
         if not abs(found - rate_deg_s) <= 10.0 * REACHED * max(rate_deg_s, 1.0):
             raise RecordingSpoilt(
                 f"{self.name}: {found:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive"
@@ -74,12 +76,26 @@ class Acutrol(Equipment):
 
     def _wait(self, rate_deg_s: float, band: float) -> None:
         end = self.clock.now() + PATIENCE_S
-        while not abs(self.values.number("rate_read") - rate_deg_s) <= band:
+        start = found = self.values.number("rate_read")
+        while not abs(found - rate_deg_s) <= band:
             self._require_no_fault()
+            self._refuse_overspeed(found, max(start, rate_deg_s))
             if self.clock.now() > end:
                 self.make_safe()
                 raise StationTimeout(f"{self.name}: not at {rate_deg_s:g} °/s after {PATIENCE_S:g} s; check the drive")
             self.clock.sleep(POLL_S)
+            found = self.values.number("rate_read")
+
+    def _refuse_overspeed(self, found: float, most: float) -> None:
+        """A drive that runs away: rate 0 and the interlock open, without waiting for its monitor."""
+        if found <= OVERSPEED * most + 1.0:
+            return
+        self.make_safe()
+        self.values.write("interlock", "open 1")
+        raise OperatorNeeded(
+            f"{self.name}: {found:.5g} °/s, at most {most:.5g} °/s was ordered: the drive runs away; the interlock was opened; "
+            "have the machine inspected"
+        )
 
     def _require_no_fault(self) -> None:
         state = self.values.text("fault")

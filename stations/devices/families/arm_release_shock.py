@@ -59,15 +59,13 @@ class ShockMachine(Equipment):
         ):
             self.values.write(name, value)
         before = self.values.text("file")
-        self.values.write("arm", self.on)
-        self.values.write("release", self.now)
-        end = self.clock.now() + PATIENCE_S
-        while (state := self.values.text("state")) == "RUN":
-            if self.clock.now() > end:
-                self.make_safe()
-                raise StationTimeout(f"{self.name}: no shock within {PATIENCE_S:g} s of the release; check the machine")
-            self.clock.sleep(POLL_S)
+        try:
+            state = self._released()
+        except BaseException:
+            self.make_safe()  # armed, and nobody waits for the shock
+            raise
         if state == "DOOR":
+            self.make_safe()
             raise OperatorNeeded(
                 f"{self.name}: the guard door was opened, the shock was not released; close it, then again"
             )
@@ -77,6 +75,17 @@ class ShockMachine(Equipment):
         recording = read_recording(Path(path), list(slots), self.name)
         _refuse_wrong_pulse(recording.reference[:, axis] * direction, peak, self.name)
         return recording
+
+    def _released(self) -> str:
+        """Arms and releases; the machine's state after the shock."""
+        self.values.write("arm", self.on)
+        self.values.write("release", self.now)
+        end = self.clock.now() + PATIENCE_S
+        while (state := self.values.text("state")) == "RUN":
+            if self.clock.now() > end:
+                raise StationTimeout(f"{self.name}: no shock within {PATIENCE_S:g} s of the release; check the machine")
+            self.clock.sleep(POLL_S)
+        return state
 
     def make_safe(self) -> None:
         """Disarms the machine."""

@@ -10,14 +10,18 @@ import numpy as np
 
 from schemas.errors import OperatorNeeded, StationRefused, StationTimeout
 from stations.devices.equipment import Equipment
+from stations.devices.exciter_limits import refuse_motion, tone_level
 from stations.devices.recording import Recording, RecordingSpoilt
 from stations.devices.result_files import STANDARD_GRAVITY, read_recording
 
 POLL_S = 0.05
 GRACE_S = 30.0
 FIRST_V = 0.02  # amplitude of the first burst, since the gain of amplifier and exciter is not known
-MOST_V = 10.0
-ROUNDS = 5
+MOST_V = 10.0  # where the profile states no largest amplitude
+LARGEST_RISE = 10.0  # of the drive from one burst to the next
+FOLLOWS = 2.0  # factor by which the level may depart from the drive times the gain of the burst before
+SEEN = 6.0  # standard uncertainties by which a tone must exceed the noise of the reference
+ROUNDS = 7
 LEVEL_SHARE = 0.05  # by which the level may depart from the order when the loop ends
 FLAT_SHARE = 0.1  # of the samples within a thousandth of the extremes: a sine has less
 TRY_S = 0.1
@@ -52,32 +56,61 @@ class ScpiGenerator(Equipment):
         Raises
         ------
         RecordingSpoilt
-            Missed trigger, clipped reference, or a level that is not reached within the generator's range.
+            Missed trigger, clipped reference, or a level that is not reached.
         OperatorNeeded
-            The amplifier reports a fault.
+            The amplifier reports a fault, the reference does not follow the drive, or the level is beyond the exciter or the
+            largest amplitude of the generator.
         """
+        refuse_motion(self.values.profile, self.name, frequency, level)
         self.values.write("function", "SIN")
         self.values.write("frequency", frequency)
         self.values.write("axis", float(axis))
         self.values.write("before", 0.0)
-        volts, reached = FIRST_V, 0.0
-        for _ in range(ROUNDS):
-            trial = self._record(volts, frequency, max(TRY_S, 8.0 / frequency), slots)
-            reached = self._level(trial, axis)
-            if abs(reached / level - 1.0) <= LEVEL_SHARE:
-                break
-            wanted = volts * level / max(reached, 1e-3 * level)
-            if wanted > MOST_V:
-                break
-            volts = wanted
+        volts = self._found_drive(frequency, level, axis, slots)
         recording = self._record(volts, frequency, seconds, slots)
-        reached = self._level(recording, axis)
+        reached = self._level(recording, axis, frequency)
         if not abs(reached / level - 1.0) <= 2.0 * LEVEL_SHARE:
             raise RecordingSpoilt(
                 f"{self.name}: {reached:.4g} g at {frequency:g} Hz with {volts:.3g} V, {level:g} g was ordered; check amplifier "
                 "and fixture"
             )
         return recording
+
+    def _found_drive(self, frequency: float, level: float, axis: int, slots: Sequence[int]) -> float:
+        """The amplitude in V that gives the level.
+
+        A reference whose cable is loose shows too little, so the drive must not be raised for that alone: it rises tenfold at
+        most, the reference must show a tone after the second burst, and each later level must follow the drive.
+        """
+        stated = self.values.profile.entry("amplitude").maximum
+        most = MOST_V if stated is None else stated
+        volts, gain, silent = min(FIRST_V, most), 0.0, False
+        for _ in range(ROUNDS):
+            trial = self._record(volts, frequency, max(TRY_S, 8.0 / frequency), slots)
+            reached = self._level(trial, axis, frequency)
+            if reached == 0.0 and (silent or gain > 0.0):
+                self._refuse_reference(f"no tone at {frequency:g} Hz with {volts:.3g} V")
+            if gain > 0.0 and not 1.0 / FOLLOWS <= reached / (gain * volts) <= FOLLOWS:
+                self._refuse_reference(
+                    f"{reached:.3g} g at {frequency:g} Hz with {volts:.3g} V, {gain * volts:.3g} g by the burst before"
+                )
+            if abs(reached / level - 1.0) <= LEVEL_SHARE:
+                return volts
+            silent, gain = reached == 0.0, reached / volts
+            wanted = volts * min(LARGEST_RISE, level / reached if reached > 0.0 else LARGEST_RISE)
+            if wanted > most:
+                raise OperatorNeeded(
+                    f"{self.name}: {level:g} g at {frequency:g} Hz needs {level / gain if gain else wanted:.3g} V, at most "
+                    f"{most:g} V is allowed; check the amplifier's gain and the cable of the reference sensor, or lower the level"
+                )
+            volts = wanted
+        return volts
+
+    def _refuse_reference(self, found: str) -> None:
+        raise OperatorNeeded(
+            f"{self.name}: the reference shows {found}; check the cable of the reference sensor, its conditioner and the "
+            "amplifier before the drive is raised"
+        )
 
     def step(self, volts: float, hold_s: float, before_s: float, slots: Sequence[int]) -> Recording:
         """One step of voltage that is held, recorded from ``before_s`` before its edge; the reference is the drive in V.
@@ -109,16 +142,10 @@ class ScpiGenerator(Equipment):
         self.values.write("amplitude", volts)
         self.values.write("length", seconds)
         self.values.write("cycles", cycles or float(np.ceil(frequency * (seconds + 0.5)) + 1.0))
-        self.values.write("output", "ON")
-        self.values.write("start", "NOW")
-        self._refuse_error(f"{volts:.4g} V at {frequency:.4g} Hz")
-        end = self.clock.now() + seconds + GRACE_S
-        while (state := self.values.text("state")) == "RUN":
-            if self.clock.now() > end:
-                self.make_safe()
-                raise StationTimeout(f"{self.name}: still records {GRACE_S:g} s after the end; check the recorder")
-            self.clock.sleep(POLL_S)
-        self.make_safe()
+        try:
+            state = self._burst(volts, frequency, seconds)
+        finally:
+            self.make_safe()
         if state == "FAULT":
             raise OperatorNeeded(
                 f"{self.name}: the amplifier reports a fault; remove its cause, reset it, and give the command again"
@@ -129,15 +156,30 @@ class ScpiGenerator(Equipment):
         units = VOLT if self.values.profile.kind == "step_generator" else STANDARD_GRAVITY
         return read_recording(Path(path), list(slots), self.name, units)
 
-    def _level(self, recording: Recording, axis: int) -> float:
-        """Peak level in g of the reference; a clipped reference is refused."""
+    def _burst(self, volts: float, frequency: float, seconds: float) -> str:
+        """Starts a burst and waits for its end: the recorder's last state. The caller switches the output off."""
+        self.values.write("output", "ON")
+        self.values.write("start", "NOW")
+        self._refuse_error(f"{volts:.4g} V at {frequency:.4g} Hz")
+        end = self.clock.now() + seconds + GRACE_S
+        while (state := self.values.text("state")) == "RUN":
+            if self.clock.now() > end:
+                raise StationTimeout(f"{self.name}: still records {GRACE_S:g} s after the end; check the recorder")
+            self.clock.sleep(POLL_S)
+        return state
+
+    def _level(self, recording: Recording, axis: int, frequency: float) -> float:
+        """Peak level in g of the tone in the reference, 0 where noise hides it; a clipped reference is refused."""
         driven = recording.reference[:, axis] - recording.reference[:, axis].mean()
+        found, noise = tone_level(driven, recording.reference_rate_hz, frequency)
+        if found <= SEEN * noise * np.sqrt(2.0 / driven.size):
+            return 0.0
         top = float(np.max(np.abs(driven)))
         if float(np.mean(np.abs(driven) > 0.999 * top)) > FLAT_SHARE:
             raise RecordingSpoilt(
                 f"{self.name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
             )
-        return float(np.sqrt(2.0 * np.mean(driven**2)))
+        return found
 
     def _refuse_error(self, what: str) -> None:
         code = self.values.number("error")

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 NOMINAL = 1.0  # the memory that holds the nominal setting
 SETTLE_S = 1.0
 FARTHEST = 0.5  # share of the nominal voltage by which an order may differ from it, as procedures may ask
+ABOVE = 0.2  # share above it where the station's file states no absolute maximum
 REACHED = 0.01  # share of the order by which the measured voltage may differ
 
 
@@ -50,6 +51,18 @@ class ScpiSupply(Equipment):
             raise StationRefused(
                 f"{self.name}: {volt:g} V was ordered, at most {100.0 * FARTHEST:g} % from the nominal {self._nominal_V:g} V of "
                 "the devices (memory 1) is allowed; correct supplies_V of the recipe"
+            )
+        stated = self.values.profile.stated.get("voltage")
+        most = (1.0 + ABOVE) * self._nominal_V if stated is None else stated
+        if not volt <= most:
+            raise StationRefused(
+                f"{self.name}: {volt:g} V was ordered, at most {most:.4g} V is allowed"
+                + (
+                    f" (a fifth above the nominal {self._nominal_V:g} V, since the station's file states no absolute maximum); "
+                    "add maximum = { voltage = … } to its power supply, or correct supplies_V of the recipe"
+                    if stated is None
+                    else " by maximum.voltage in the station's file; correct supplies_V of the recipe"
+                )
             )
         self._changed = True
         self.values.write("voltage", volt)

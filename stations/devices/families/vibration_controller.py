@@ -10,6 +10,7 @@ import numpy as np
 
 from schemas.errors import OperatorNeeded, StationTimeout
 from stations.devices.equipment import Equipment
+from stations.devices.exciter_limits import refuse_clipped_random, refuse_motion, refuse_random_motion
 from stations.devices.recording import Recording, RecordingSpoilt
 from stations.devices.result_files import read_recording
 
@@ -45,8 +46,9 @@ class VibrationController(Equipment):
         RecordingSpoilt
             Missed trigger, clipped reference, or a level that was not reached.
         OperatorNeeded
-            The controller has aborted: its interlock or a limit must be looked after first.
+            The controller has aborted: its interlock or a limit must be looked after first; or the order is beyond the exciter.
         """
+        refuse_motion(self.values.profile, self.name, frequency, level)
         for name, value in (("frequency", frequency), ("level", level), ("duration", seconds), ("axis", float(axis))):
             self.values.write(name, value)
         recording = self._run("SINE", seconds, slots)
@@ -65,6 +67,7 @@ class VibrationController(Equipment):
         RecordingSpoilt, OperatorNeeded
             As for :meth:`sine`.
         """
+        refuse_motion(self.values.profile, self.name, frequency, level)
         for name, value in (("frequency", frequency), ("level", level), ("duration", seconds), ("axis", float(axis))):
             self.values.write(name, value)
         self.values.write("turn", angle_deg)
@@ -77,13 +80,21 @@ class VibrationController(Equipment):
         return recording
 
     def random(self, profile: str, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
-        """Random vibration by a profile that the controller has, ``level`` in g rms."""
+        """Random vibration by a profile that the controller has, ``level`` in g rms.
+
+        Raises
+        ------
+        RecordingSpoilt, OperatorNeeded
+            As for :meth:`sine`; the exciter must follow peaks of three sigma.
+        """
+        refuse_random_motion(self.values.profile, self.name, profile, level)
         self.values.write("profile", profile)
         for name, value in (("level", level), ("duration", seconds), ("axis", float(axis))):
             self.values.write(name, value)
         recording = self._run("RANDOM", seconds, slots)
         driven = recording.reference[:, axis]
         n = len(driven)
+        refuse_clipped_random(driven, self.name)
         reached = float(np.std(driven[n // 4 : 3 * n // 4]))
         if not abs(reached / level - 1.0) <= LEVEL_SHARE:
             raise RecordingSpoilt(

@@ -33,7 +33,7 @@ class Centrifuge:
     def __init__(self, world: World) -> None:
         self._world = world
         self._from, self._to, self._since_us = 0.0, 0.0, 0
-        self._closed, self._direction = False, 1.0
+        self._closed, self._direction, self._asked = False, 1.0, 0.0
         self._heard_us, self._tripped = 0, ""
         self._number, self._seconds, self._start_us = 0, 0.0, 0
         self._files = ResultFiles()
@@ -57,6 +57,7 @@ class Centrifuge:
         except ValueError:
             return UNKNOWN, False
         if head == ":dem:rate 1":
+            self._asked = number
             self._go(number if self._closed and not self._tripped else 0.0)
         elif head == ":mount 1":
             self._direction = 1.0 if number > 0.0 else -1.0
@@ -85,6 +86,8 @@ class Centrifuge:
             self._go(0.0)
         elif not found:
             self._tripped = ""
+        if "drive_runaway" in conditions and self._to > 0.0 and self._to == self._asked:
+            self._go(1.5 * self._asked)
         if self._to > 0.0 and self._world.now_us - self._heard_us > round(1e6 * IDLE_S):
             self._go(0.0)
 
@@ -106,10 +109,10 @@ class Centrifuge:
         arm = (RADIUS_M + rig.arm_radius_error_m) * (1.0 + rig.arm_stretch * omega**2)
         offsets = np.array([unit.mass_offset_m for unit in bench.units])
         force = self._direction * (arm + self._direction * offsets) * omega**2 / STANDARD_G
-        wobble = np.random.Generator(np.random.Philox(key=self._start_us + 10)).standard_normal()
+        wobble = bench.stream_at(self._start_us, 10).standard_normal()
         force = force * (1.0 + 2e-6 * float(wobble))
         outputs = bench.steady(force, 2, self._seconds, RECORD_HZ, self._start_us)
-        rng = np.random.Generator(np.random.Philox(key=self._start_us + 9))
+        rng = bench.stream_at(self._start_us, 9)
         reference = np.zeros((round(self._seconds * 10.0), 3))
         reference[:, 0] = self._to * (1.0 + 1e-6 * rng.standard_normal(len(reference)))
         return Waveforms(outputs, RECORD_HZ, reference, 10.0)

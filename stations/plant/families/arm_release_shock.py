@@ -76,7 +76,7 @@ class Machine:
         self._refused = "guard_door" in world.bench.conditions
         if self._refused:
             return "OK", True
-        rng = np.random.Generator(np.random.Philox(key=world.now_us + 5))
+        rng = world.bench.stream_at(world.now_us, 5)
         share = 0.33 if "level_not_reached" in world.bench.conditions else 1.0
         self._shape = (
             share * self._set["PEAK"] * (1.0 + JITTER * float(rng.standard_normal())),

@@ -110,6 +110,6 @@ class Controller:
         """Gaussian vibration along the axis at the fine rate, at rest at both ends."""
         from stations.plant.densities import random_force  # noqa: PLC0415 - read from files when it is needed
 
-        rng = np.random.Generator(np.random.Philox(key=tick + 1))
+        rng = self._world.bench.stream_at(tick, 6)
         share = 0.3 if "level_not_reached" in self._conditions else 1.0
         return random_force(self._density, share * self._set["LEVEL"], seconds, RANDOM_FINE_HZ, rng)

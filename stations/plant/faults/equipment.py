@@ -77,3 +77,15 @@ class CurrentLimit(_BenchCondition):
     """The current limit of the power supply holds a raised voltage a tenth too low."""
 
     kind: ClassVar[str] = "current_limit"
+
+
+class ReferenceCableOff(_BenchCondition):
+    """The cable of the reference sensor on the exciter or shock machine is loose: its channel shows noise alone."""
+
+    kind: ClassVar[str] = "reference_cable_off"
+
+
+class DriveRunaway(_BenchCondition):
+    """The drive of the centrifuge turns half as fast again as it is told, and its speed monitor does not trip."""
+
+    kind: ClassVar[str] = "drive_runaway"
