@@ -9,6 +9,7 @@ from pipelines.cli.next_commands import command_line, print_extension, print_nex
 from pipelines.cli.options import console, print_table, short, short_values
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from rich.console import Console
@@ -219,6 +220,8 @@ def _classes(document: dict[str, Any]) -> None:
         "residual: with the effect added · cross-validated: on dwells not fitted, the worst of poses, soaks, stretches of "
         "time"
     )
+    if any(group.get("nonlinear_interval") for group in document["classes"]):
+        legend += " · in brackets: 68 % interval"
     console().print(legend, style="dim", markup=False)
 
 
@@ -228,8 +231,17 @@ def _parameters_of(group: dict[str, Any], effects: Any) -> str:
     if group["scope"] == "data" or not group["nonlinear"]:
         return ""
     known = [p for p in effects.get(name).nonlinear if group["nonlinear"].get(p.name) is not None]
-    values = ", ".join(f"{p.name} = {short_values(group['nonlinear'][p.name])} {p.unit}".rstrip() for p in known)
+    between = group.get("nonlinear_interval") or {}
+    values = ", ".join(
+        f"{p.name} = {short_values(group['nonlinear'][p.name])}{_within(between.get(p.name))} {p.unit}".rstrip()
+        for p in known
+    )
     return f"{name}: {values}" if values and len(group["effects"]) > 1 else values
+
+
+def _within(interval: Sequence[float] | None) -> str:
+    """The 68 % interval behind a value."""
+    return f" ({short(interval[0])} to {short(interval[1])})" if interval else ""
 
 
 def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -185,8 +184,10 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
 
 def _continue_command() -> str:
     """The command that measures the proposed follow-up."""
+    from pipelines.cli.next_commands import command_line
+
     given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
-    return shlex.join(["tumbleline", *given, "--yes"])
+    return command_line(*given, "--yes")
 
 
 def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
     from rich.console import Console
@@ -26,6 +26,7 @@ class JudgedData:
     source : dwells, a file or a run · history : the file of temperatures against time that was read; empty where there was none
     fresh, fresh_history : the same units measured again; empty where no such data are known
     measure : the words of the command that measures ``fresh``; none where it is there
+    refusal : why the recipe of a run cannot fit a model; None where the data are not from a recipe
     archive : as it was given; None for the default one
     """
 
@@ -35,6 +36,7 @@ class JudgedData:
     fresh_history: str = ""
     archive: str | None = None
     measure: tuple[str, ...] = ()
+    refusal: Callable[[Sequence[str]], str] | None = None
 
     @property
     def options(self) -> list[str]:
@@ -71,18 +73,23 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
         return JudgedData(source, history, fresh, history_beside(fresh) if fresh and history else "", archive)
     from pipelines.archive import Archive
     from pipelines.chain.runner import decisive
+    from pipelines.cli.fit_refusal import fit_refusal
     from pipelines.jobs.fresh_run import fresh_repeat, fresh_run_of, repeatable
     from pipelines.jobs.job import OF_RUN, job_of_run, measured_again
 
     store = Archive(archive)
     run = store.run(source)
+    if not repeatable(run):
+        return JudgedData(run.id, history, archive=archive)
+    refusal = partial(fit_refusal, run)
     found = fresh_run_of(store, run)
-    if found is not None or not repeatable(run):
-        return JudgedData(run.id, history, found.id if found else "", archive=archive)
+    if found is not None:
+        return JudgedData(run.id, history, found.id, archive=archive, refusal=refusal)
     repeat = fresh_repeat(store, run)
     job = measured_again(job_of_run(run), repeat)
     words = ("run", f"{OF_RUN}{run.id}", "--repeat", str(repeat), *archive_words(archive))
-    return JudgedData(run.id, history, store.run_name(job.recipe.name, decisive(job)), archive=archive, measure=words)
+    fresh = store.run_name(job.recipe.name, decisive(job))
+    return JudgedData(run.id, history, fresh, archive=archive, measure=words, refusal=refusal)
 
 
 def extension(
@@ -137,6 +144,8 @@ def print_extension(out: Console, document: dict[str, Any], find: FindData, mode
     data = find()
     file = model or free_name()
     new = not (model and model.exists())
+    if data.refusal is not None and (why := data.refusal([*document["effects"], *document["recommended"]])):
+        out.print(why, style="yellow", markup=False, soft_wrap=True)
     print_next(out, extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
         its_own = " and its temperatures with --fresh-history" if data.history else ""

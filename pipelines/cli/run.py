@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +14,7 @@ from pipelines.cli.options import (
     RepeatOption,
     SeedOption,
     StationOption,
+    console,
     error_console,
     print_json,
 )
@@ -73,6 +74,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import library_remarks
+    from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
     from pipelines.jobs.job import OF_RUN, Request
@@ -106,7 +108,21 @@ def command(
     else:
         for document in documents:
             print_summary(document)
+        print_next(
+            console(),
+            [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
+        )
     raise typer.Exit(max(exit_status(document) for document in documents))
+
+
+def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
+    """The commands after a run: is its model adequate, and its certificates where they can be given."""
+    from pipelines.cli.next_commands import archive_words, command_line
+
+    own = [run.id, *archive_words(archive)]
+    lines = [command_line("diagnose", *own)] if len(document["effects"]) and "dwells" in run.tables() else []
+    certain = any(unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"])
+    return [*lines, command_line("certify", *own)] if certain else lines
 
 
 def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -> Run:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects as catalogue
+from inertial.criticism.refinement import intervals, settled
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -42,7 +43,17 @@ def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Rows of all classes: handling errors first, because they must be corrected before effects are judged."""
     rows = [_class(n, names) for n in diagnosis.handled]
     rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed if not d.tail]
-    return [*rows, *(_class(n, names) for n in diagnosis.named)]
+    return [*rows, *(_class(n, names) | _fitted_parameters(diagnosis, n) for n in diagnosis.named)]
+
+
+def _fitted_parameters(diagnosis: Diagnosis, named: Named) -> dict[str, Any]:
+    """Nonlinear parameters of a named effect as a fit of the resulting model has them, with their intervals."""
+    term = named.effects.simplest
+    if named.effects.of_data or not term.values or all(t.effect.id != term.effect.id for t in diagnosis.final.terms):
+        return {}
+    model = settled(diagnosis.final)
+    fitted = next(t for t in model.terms if t.effect.id == term.effect.id)
+    return {"nonlinear": dict(fitted.values), "nonlinear_interval": intervals(model).get(term.effect.id, {})}
 
 
 def _class(named: Named, names: Names) -> dict[str, Any]:
