@@ -90,7 +90,7 @@ def command(
     table, left_out = without_dwells(table, leave_out)
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
     document, report_text = diagnosed(
-        table, temperatures, judged, dwells, with_report=report is not None, left_out=left_out
+        table, temperatures, judged, _kept_name(dwells, archive), with_report=report is not None, left_out=left_out
     )
     document["history"] = beside or None
     if report is not None:
@@ -107,6 +107,14 @@ def command(
 
         print_diagnosis(document, data=partial(judged_data, dwells, beside, archive), model=model)
     raise typer.Exit(DONE if document["adequate"] else PART_FAILED)
+
+
+def _kept_name(dwells: str, archive: str | None) -> str:
+    """The name of the data for a page that is kept: what 'latest' means changes."""
+    from pipelines.archive import Archive
+    from pipelines.importers.exchange import is_file
+
+    return dwells if is_file(dwells) else Archive(archive).run(dwells).id
 
 
 def diagnosed(

@@ -121,7 +121,17 @@ def _imported(given: Given, folder: Path) -> tuple[int, str, str]:
         "--rows",
         "dwells",
     )
-    return given("import", folder / "norms.csv", *words, "--fit", "norm", "--archive", folder / "kept runs")
+    return given(
+        "import",
+        folder / "norms.csv",
+        *words,
+        "--fit",
+        "norm",
+        "--local-g",
+        "9.80665",
+        "--archive",
+        folder / "kept runs",
+    )
 
 
 CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_": _imported}
