@@ -106,13 +106,13 @@ class Command(Strict):
     """One value of a device with a text protocol.
 
     ``ask`` is the question whose answer's comma-separated part ``field`` is the value; ``tell`` is the line that sets it, with
-    the value in braces. What has no ``tell`` is never written.
+    one pair of braces for the value. What has no ``tell`` is never written.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
     ask: str
     field: Annotated[int, Field(ge=0, le=1000)] = 0
-    tell: str = ""
+    tell: Annotated[str, Field(pattern=r"^([^{}]*\{[^{}]*\}[^{}]*)?$")] = ""
     manual: str = ""
     type: Literal["number", "text"] = "number"
     unit: str = ""

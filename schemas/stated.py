@@ -37,9 +37,12 @@ class StandardUncertainty(NamedTuple):
 
 
 class Entry(Strict):
-    """One entry of the budget."""
+    """One entry of the budget.
 
-    parts: ClassVar[tuple[str, ...]] = ("",)
+    rectangular : key of a half-width whose distribution is rectangular unless another one is stated; empty for none
+    """
+
+    rectangular: ClassVar[str] = ""
 
     k: Annotated[Number, Field(ge=1.0, le=4.0)] | None = None
     dof: Positive | None = None
@@ -65,6 +68,13 @@ class Entry(Strict):
         else:
             divisor, kind = 1.0, self.distribution or "normal"
         return StandardUncertainty(value * TO_SI[unit] / divisor, unit, value, kind, divisor)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _assume_rectangular(cls, given: Any) -> Any:
+        if isinstance(given, dict) and cls.rectangular in given and "distribution" not in given:
+            return {**given, "distribution": "rectangular"}
+        return given
 
     @model_validator(mode="after")
     def _stated_once(self) -> Entry:
@@ -118,6 +128,14 @@ def _part_of(name: str) -> str:
 
 
 Stated = NotNegative | None
+
+
+class RelativeEntry(Entry):
+    """A share of the quantity: gravity, supply."""
+
+    u_ppm: Stated = None
+    U_ppm: Stated = None
+    half_width_ppm: Stated = None
 
 
 class AngleEntry(Entry):

@@ -6,13 +6,13 @@ stands in the key (``u_urad``, ``U_K``, ``half_width_arcsec``). It names the ref
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from schemas.bounds import Degrees, NotNegative, Number, Positive
 from schemas.gravity import STANDARD_GRAVITY, formula_gravity
-from schemas.stated import TO_SI, AngleEntry, Entry, Scope, StandardUncertainty, Stated
+from schemas.stated import TO_SI, AngleEntry, Entry, RelativeEntry, Scope, StandardUncertainty, Stated
 from schemas.strict import Strict
 
 __all__ = ["NEEDED", "TO_SI", "Entry", "StandardUncertainty", "Uncertainty"]
@@ -32,7 +32,7 @@ class PoseEntry(AngleEntry):
     seen_in_residuals: bool = False
 
 
-class Gravity(Entry):
+class Gravity(RelativeEntry):
     """Local gravity: surveyed, or by the formula of 1980 from latitude and height (standard uncertainty 60 ppm)."""
 
     value_m_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] | None = None
@@ -40,9 +40,6 @@ class Gravity(Entry):
     height_m: Annotated[Number, Field(ge=-500.0, le=9000.0)] | None = None
     source: Literal["survey", "formula"] = "survey"  # pyright: ignore[reportIncompatibleVariableOverride] - frozen
     standard_gravity_meant: bool = False
-    u_ppm: Stated = None
-    U_ppm: Stated = None
-    half_width_ppm: Stated = None
     u_m_s2: Stated = None
     U_m_s2: Stated = None
 
@@ -126,18 +123,17 @@ class Settling(Entry):
         return False
 
 
-class Supply(Entry):
+class Supply(RelativeEntry):
     """Supply of a device whose output follows it; nothing remains where the ratio is measured and divided out."""
 
     ratio_measured: bool = False
     scope: Scope = "run"
-    u_ppm: Stated = None
-    U_ppm: Stated = None
-    half_width_ppm: Stated = None
 
 
 class Reader(Entry):
     """Converter and amplifier: gain, offset, integral nonlinearity."""
+
+    rectangular: ClassVar[str] = "inl_half_width_ug"
 
     scope: Scope = "slot"
     gain_u_ppm: Stated = None
@@ -146,27 +142,15 @@ class Reader(Entry):
     offset_U_ug: Stated = None
     inl_half_width_ug: Stated = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _rectangular(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "inl_half_width_ug" in given and "distribution" not in given:
-            return {**given, "distribution": "rectangular"}
-        return given
-
 
 class Timing(Entry):
     """Time between the reading of a temperature and that of the output, and the creep after a move."""
 
+    rectangular: ClassVar[str] = "creep_half_width_ug"
+
     scope: Scope = "run"
     wait_u_s: Stated = None
     creep_half_width_ug: Stated = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _rectangular(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "creep_half_width_ug" in given and "distribution" not in given:
-            return {**given, "distribution": "rectangular"}
-        return given
 
 
 class Vibration(Entry):

@@ -15,7 +15,7 @@ from inertial.criticism.decisions import CLASS_WIDTH, RISES
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
-from inertial.criticism.handling.base import Handling, Misfit
+from inertial.criticism.handling.base import Exchangeable, Handling, Misfit
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import Carried, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
@@ -179,17 +179,18 @@ def _happened(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
     """The description of a handling error, and its dwells: at each place that explains the run equally well."""
-    lot, place = fields.problem.lot, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
+    lot, place = fields.problem.lot, {k: v for k, v in term.keytexts.items() if isinstance(v, float)}
     best = judge(fields, beside, term).cost
-    words: list[str] = []
+    texts: list[str] = []
     dwells = list(alternative.dwells(lot, **place))
-    for other in alternative.instead(lot, **place):
-        rival = judge(fields, beside, Term(alternative, tuple(other.items())))
-        if rival.cost < best + CLASS_WIDTH:
-            words.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
-            dwells += alternative.dwells(lot, **other)
+    if isinstance(alternative, Exchangeable):
+        for other in alternative.instead(lot, **place):
+            rival = judge(fields, beside, Term(alternative, tuple(other.items())))
+            if rival.cost < best + CLASS_WIDTH:
+                texts.append(alternative.short(beside.with_term(rival.term).shared_sizes(rival.term), **other))
+                dwells += alternative.dwells(lot, **other)
     evidence = alternative.describe(lot, size, **place)
-    evidence += f"; these dwells cannot separate it from {' or '.join(words)}" if words else ""
+    evidence += f"; these dwells cannot separate it from {' or '.join(texts)}" if texts else ""
     return evidence, tuple(sorted(dwells))
 
 

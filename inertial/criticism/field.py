@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.handling.base import Handling, by_block
+from inertial.criticism.handling.base import Handling, OfOneDwell, by_block
 from inertial.criticism.problem import Problem
 from inertial.criticism.space import Candidate, Gain, Space
 from inertial.design import grid_of
@@ -68,13 +68,13 @@ class Candidates:
         return found
 
     def _gain(self, space: Space, effect: AnyEffect | Handling, first: int | None) -> Gain:
-        if isinstance(effect, Handling) and effect.single and not self.problem.lot.radial:
+        if isinstance(effect, OfOneDwell) and not self.problem.lot.radial:
             places = np.array([int(place["at"]) for place in self.grids[effect.id]])
             return space.gain_of_dwells(self._every_dwell(effect), places)
         pieces = self.problem.pieces(effect, self.grids[effect.id], first=first)
         return Gain.joined([space.gain(piece) for piece in pieces])
 
-    def _every_dwell(self, effect: Handling) -> Array:
+    def _every_dwell(self, effect: OfOneDwell) -> Array:
         """Columns (blocks, n, p) of an alternative of one dwell, for each dwell in turn."""
         if effect.id not in self._single:
             units, n = self.problem.lot.state.time.shape

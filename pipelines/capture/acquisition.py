@@ -12,7 +12,8 @@ from pipelines.capture.plausibility import Plausibility
 from pipelines.capture.power_cycling import Power
 from pipelines.capture.record import Record, TemperatureLog, readings_row
 from pipelines.capture.supervision import Supervisor, short_of_samples
-from pipelines.procedures import PROCEDURES
+from pipelines.procedures import procedure_of
+from pipelines.procedures.base import OnEquipment, SetsEquipment
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
 from stations.devices.recording import RecordingSpoilt
@@ -189,8 +190,8 @@ class Acquisition:
                 equipment.stand_by()
         ratio = 1.0
         if step is not None and own is not None:
-            procedure = PROCEDURES[self.recipe.procedures[step.procedure or 0]["kind"]]
-            ratio = procedure.prepare(self.station.equipment[own.role], own).get("supply_ratio", 1.0)
+            procedure = procedure_of(self.recipe, step.procedure, SetsEquipment)
+            ratio = procedure.set_equipment(self.station.equipment[own.role], own).get("supply_ratio", 1.0)
         self.supervisor.expect_supply(ratio)
 
     def measure_on_equipment(self, step: Step) -> tuple[Record, pd.DataFrame, pd.DataFrame]:
@@ -204,7 +205,7 @@ class Acquisition:
             raise LookupError(f"record {step.record} has no order for equipment")
         station, order = self.station, step.order
         self.supervisor.check_before(self.slots)
-        procedure = PROCEDURES[self.recipe.procedures[step.procedure or 0]["kind"]]
+        procedure = procedure_of(self.recipe, step.procedure, OnEquipment)
         powered, start = station.reader.since_power(), station.clock.now()
         try:
             recording = procedure.measure(station.equipment[order.role], order, self.slots)

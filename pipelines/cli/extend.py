@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import EffectFileOption, JsonOption, console, print_json
+from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, console, print_json
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -40,9 +40,7 @@ def command(
     why: Annotated[
         str, typer.Option("--why", metavar="TEXT", help="Reason for the change; needed with --remove.")
     ] = "",
-    by: Annotated[
-        str, typer.Option("--by", metavar="NAME", help="Author of the change; the user's name by default.")
-    ] = "",
+    by: ByOption = "",
     run: Annotated[str, typer.Option("--run", metavar="RUN", help="Run or file with the evidence.")] = "",
     output: Annotated[
         Path | None,

@@ -10,6 +10,8 @@ import typer
 from pipelines.cli.next_commands import archive_words, command_line, print_next
 from pipelines.cli.options import (
     ArchiveOption,
+    GroupOption,
+    JoinOption,
     JsonOption,
     console,
     error_console,
@@ -111,13 +113,8 @@ def command(
             "--faulty", metavar="refuse|leave-out|keep", help="Constant axes and torn words; refuse by default."
         ),
     ] = "",
-    join: Annotated[
-        str,
-        typer.Option("--join", metavar="rows|columns", help="Join several files into one recording."),
-    ] = "",
-    group: Annotated[
-        str, typer.Option("--group", metavar="NAME", help="Group of channels, if the file has several.")
-    ] = "",
+    join: JoinOption = "",
+    group: GroupOption = "",
     list_dwells: Annotated[
         bool, typer.Option("--list-dwells", help="List every dwell: start, end, mean, sd, residual, influence.")
     ] = False,

@@ -11,6 +11,7 @@ import typer
 
 from pipelines.cli.options import (
     ArchiveOption,
+    ByOption,
     EffectFileOption,
     EffectsOption,
     FreshHistoryOption,
@@ -62,9 +63,7 @@ def command(
     fresh: FreshOption = "",
     fresh_history: FreshHistoryOption = "",
     leave_out: LeaveOutOption = "",
-    by: Annotated[
-        str, typer.Option("--by", metavar="NAME", help="Author of the change; the user's name by default.")
-    ] = "",
+    by: ByOption = "",
     effect_file: EffectFileOption = None,
     archive: ArchiveOption = None,
     *,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, error_console, print_json, print_table
+from pipelines.cli.options import GroupOption, JoinOption, JsonOption, console, error_console, print_json, print_table
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
@@ -28,13 +28,8 @@ PICTURES = (".svg", ".png", ".pdf")
 
 def command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings in any format that import reads.")],
-    join: Annotated[
-        str,
-        typer.Option("--join", metavar="rows|columns", help="Join several files into one recording."),
-    ] = "",
-    group: Annotated[
-        str, typer.Option("--group", metavar="NAME", help="Group of channels, if the file has several.")
-    ] = "",
+    join: JoinOption = "",
+    group: GroupOption = "",
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE", help="Draw the record: .svg, .png or .pdf.")
     ] = None,

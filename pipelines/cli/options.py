@@ -53,6 +53,15 @@ ModelOption = Annotated[Path | None, typer.Option("--model", metavar="FILE", hel
 HistoryOption = Annotated[
     str, typer.Option("--history", metavar="FILE", help="Temperatures against time; a run of the archive has its own.")
 ]
+JoinOption = Annotated[
+    str, typer.Option("--join", metavar="rows|columns", help="Join several files into one recording.")
+]
+GroupOption = Annotated[
+    str, typer.Option("--group", metavar="NAME", help="Group of channels, if the file has several.")
+]
+ByOption = Annotated[
+    str, typer.Option("--by", metavar="NAME", help="Author of the change; the user's name by default.")
+]
 FreshOption = Annotated[
     str, typer.Option("--fresh", metavar="DWELLS2", help="The same units measured again: never fitted, only predicted.")
 ]

@@ -16,7 +16,7 @@ from pipelines.importers import files
 from pipelines.importers.content import unit_in
 from pipelines.importers.documents import WaveformFigure, WaveformImport
 from pipelines.procedures import PROCEDURES
-from pipelines.procedures.base import REFERENCE, Device, ProcedureRecord, ProcedureStep, UnitRecord
+from pipelines.procedures.base import REFERENCE, Device, FromWaveforms, ProcedureRecord, ProcedureStep, UnitRecord
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Run
     from pipelines.importers.content import Content
-    from pipelines.procedures import Part, Procedure
 
 ACCELERATION = {"g": 1.0, "m/s^2": 1.0 / 9.80665, "m/s²": 1.0 / 9.80665, "m/s2": 1.0 / 9.80665, "mg": 1e-3}
 VOLT = {"V": 1.0, "mV": 1e-3}
@@ -70,8 +69,7 @@ def import_waveforms(
     DataRejected
         A file has no sample interval, no unit, or samples that cannot be used.
     """
-    own, content, full_scale = _part(procedure, part)
-    one = PROCEDURES[procedure]
+    one, own, content, full_scale = _part(procedure, part)
     out_unit = ""
     records: list[ProcedureRecord] = []
     sources: list[files.SourceFile] = []
@@ -128,9 +126,9 @@ def import_waveforms(
     }
 
 
-def _part(procedure: str, path: Path | None) -> tuple[Any, dict[str, Any], float]:
-    """The part of the procedure, the content of its file, and the full scale of the output (infinite where it is not given)."""
-    can = [name for name, one in PROCEDURES.items() if one.from_waveforms]
+def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[str, Any], float]:
+    """The procedure, its part, the content of its file, and the full scale of the output (infinite where it is not given)."""
+    can = {name: one for name, one in PROCEDURES.items() if isinstance(one, FromWaveforms)}
     if procedure not in can:
         what = f"--procedure: found '{shown(procedure)}', {', '.join(can)} can be imported"
         raise WrongUse(f"{what}; {did_you_mean(procedure, can)}")
@@ -141,15 +139,15 @@ def _part(procedure: str, path: Path | None) -> tuple[Any, dict[str, Any], float
         raise WrongUse(
             f"{path}: full_scale is {full_scale!r}, a number above 0 in the unit of the output is needed; correct it"
         )
-    part: type[Part] = PROCEDURES[procedure].part
+    part = can[procedure].part
     try:
-        return part.model_validate(content), content, float(full_scale)
+        return can[procedure], part.model_validate(content), content, float(full_scale)
     except ValidationError as problem:
         raise explain(problem, str(path or "--part"), part) from None
 
 
 def _recording(
-    path: Path, layout: RecordingLayout, part: Any, procedure: Procedure
+    path: Path, layout: RecordingLayout, part: Any, procedure: FromWaveforms
 ) -> tuple[UnitRecord, UnitRecord, str, files.SourceFile]:
     """The unit and the reference of one file, the unit of the output, and the source."""
     first, _, second = (piece.strip() for piece in layout.group.partition(","))

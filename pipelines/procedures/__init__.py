@@ -8,11 +8,21 @@ from __future__ import annotations
 
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import ValidationError
 
-from pipelines.procedures.base import FigureSpec, Part, Procedure, ProcedureStep
+from pipelines.procedures.base import (
+    Evaluated,
+    FigureSpec,
+    InG,
+    NominalScale,
+    OnEquipment,
+    Part,
+    Procedure,
+    ProcedureStep,
+    SetsEquipment,
+)
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.toml_files import explain
 
@@ -32,13 +42,17 @@ __all__ = [
     "ProcedureStep",
     "figures_of_recipe",
     "parts_of",
+    "procedure_of",
     "refuse_unusable",
     "roles_of",
     "steps_of",
 ]
 
 MULTI_POSITION = "multi_position"
-SHARED = ("base", "columns", "recorded", "shock_waves", "transfer_figures", "transfer_plots")
+SHARED = (
+    *("base", "columns", "recorded", "shock_bias", "shock_waves", "sweep_plan", "sweep_points"),
+    *("transfer_figures", "transfer_plots"),
+)
 
 
 class IncompleteProcedure(Exception):
@@ -51,7 +65,7 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     Raises
     ------
     IncompleteProcedure
-        A module has no PROCEDURE, or two have one name, or one figure.
+        A module has no PROCEDURE, or one that declares what it cannot do, or two have one figure.
     """
     found: list[Procedure] = []
     for info in iter_modules(path):
@@ -62,12 +76,29 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
             raise IncompleteProcedure(
                 f"{package}.{info.name}: no PROCEDURE of this name, one is needed; define PROCEDURE = … with name = '{info.name}'"
             )
+        _refuse_half(f"{package}.{info.name}", one)
         found.append(one)
     figures = [figure.name for one in found for figure in one.figures]
     twice = sorted({name for name in figures if figures.count(name) > 1})
     if twice:
         raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
     return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
+
+
+def _refuse_half(module: str, one: Procedure) -> None:
+    """Refuse a procedure that declares what it cannot do; abstract methods that are missing are refused by Python."""
+    on_station = isinstance(one, OnEquipment | SetsEquipment)
+    if one.roles and not on_station:
+        raise IncompleteProcedure(
+            f"{module}: roles {', '.join(one.roles)}, OnEquipment or SetsEquipment is needed; inherit one, or leave out the roles"
+        )
+    if on_station and not one.roles:
+        raise IncompleteProcedure(f"{module}: no roles, the equipment of its steps is needed; declare roles = (…,)")
+    if isinstance(one, Evaluated) != bool(one.figures):
+        what = "no figures, one is needed for Evaluated" if not one.figures else "figures, Evaluated is needed for them"
+        raise IncompleteProcedure(f"{module}: {what}; declare both, or neither")
+    if isinstance(one, InG) and not issubclass(one.part, NominalScale):
+        raise IncompleteProcedure(f"{module}: part {one.part.__name__}, a NominalScale is needed for InG; inherit it")
 
 
 PROCEDURES: Mapping[str, Procedure] = find_procedures(__name__, __path__)
@@ -98,6 +129,24 @@ def parts_of(recipe: Recipe) -> list[Part]:
         except ValidationError as problem:
             raise explain(problem, f"{where} ({kind})", PROCEDURES[kind].part) from None
     return parts
+
+
+Ability = TypeVar("Ability", bound=Procedure)
+
+
+def procedure_of(recipe: Recipe, number: int | None, ability: type[Ability]) -> Ability:
+    """The procedure of a step, by its number in the recipe's list, with the ability that the step asks for.
+
+    Raises
+    ------
+    IncompleteProcedure
+        The procedure plans such a step but does not have the ability.
+    """
+    kind = recipe.procedures[number or 0]["kind"]
+    procedure = PROCEDURES[kind]
+    if not isinstance(procedure, ability):
+        raise IncompleteProcedure(f"procedure {kind}: it plans steps for {ability.__name__}; inherit it in its module")
+    return procedure
 
 
 def steps_of(recipe: Recipe) -> list[tuple[int, ProcedureStep]]:

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from schemas.errors import RecipeInvalid
+from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.recipe import Strict
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     import pandas as pd
     from matplotlib.figure import Figure as Drawing
@@ -113,6 +113,13 @@ class FigureValue:
     identified: bool = True
     note: str = ""
 
+    @classmethod
+    def not_determined(
+        cls, figure: str, axis: str, note: str, low: float = float("nan"), high: float = float("nan")
+    ) -> FigureValue:
+        """A figure without a value, with the reason."""
+        return cls(figure, axis, float("nan"), float("nan"), low, high, identified=False, note=note)
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -148,6 +155,13 @@ class ProcedureRecord:
     readings: pd.DataFrame
     samples: Mapping[str, UnitRecord]
 
+    def by_unit(self) -> Iterator[tuple[str, dict[str, Any], UnitRecord]]:
+        """Unit, its readings and its samples, of all that were recorded."""
+        for reading in self.readings.to_dict("records"):
+            unit = str(reading["unit"])
+            if unit in self.samples:
+                yield unit, {str(name): value for name, value in reading.items()}, self.samples[unit]
+
 
 @dataclass(frozen=True)
 class Device:
@@ -174,10 +188,11 @@ class Outcome:
 class Procedure(ABC):
     """A test procedure. Each module of this package defines one as PROCEDURE.
 
+    A subclass lists its steps. What else it can do is stated by the classes below that it inherits, each with abstract methods:
+    :class:`Evaluated`, :class:`InG`, :class:`OnEquipment`, :class:`SetsEquipment`, :class:`FromWaveforms`.
+
     name : of the module, and ``kind`` in recipes · title : heading in the report · order : place in the reference
     roles : equipment that a station must have · source : standard, edition and part · states : its results in one line
-    rows : of plots in its picture · from_waveforms : recordings made elsewhere can be imported, one file a record
-    reference_unit : of the reference channel of such a recording, g or V
     """
 
     name: ClassVar[str]
@@ -188,9 +203,6 @@ class Procedure(ABC):
     roles: ClassVar[tuple[str, ...]] = ()
     part: ClassVar[type[Part]]
     figures: ClassVar[tuple[FigureSpec, ...]] = ()
-    rows: ClassVar[int] = 1
-    from_waveforms: ClassVar[bool] = False
-    reference_unit: ClassVar[str] = "g"
 
     @abstractmethod
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
@@ -199,29 +211,71 @@ class Procedure(ABC):
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:  # noqa: B027 - most have nothing to refuse
         """Refuse what the station cannot perform; :class:`schemas.errors.RecipeInvalid` names the key."""
 
-    def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
-        """The recording of a step on the equipment of its role; steps without a role are recorded on the tilt table."""
-        raise NotImplementedError
 
-    def prepare(self, equipment: Any, step: ProcedureStep) -> Mapping[str, float]:
-        """Sets the equipment of a step with ``on_table``; ``supply_ratio`` of the result is over the nominal supply."""
-        raise NotImplementedError
+class Evaluated(Procedure):
+    """A procedure with figures of its own; those of others come from the stages ``fit``, ``noise`` and ``grade``.
 
-    def setting_of(self, part: Any, reference: UnitRecord) -> dict[str, float]:
-        """The setting of a step that was recorded elsewhere, from its reference channel."""
-        raise NotImplementedError
+    rows : of plots in its picture
+    """
+
+    rows: ClassVar[int] = 1
 
     @abstractmethod
     def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
-        """Points of the procedure: see the table ``procedure_points``; empty for procedures whose stages reduce elsewhere."""
+        """Points of the procedure: see the table ``procedure_points``."""
 
     @abstractmethod
     def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
         """Figures and findings of every unit, from the points alone."""
 
+    @abstractmethod
     def draw(self, drawing: Drawing, part: Any, points: pd.DataFrame) -> None:
         """Draw the points of one unit into an empty drawing."""
-        raise NotImplementedError
+
+
+class InG(Procedure):
+    """A procedure whose figures are in g: a recipe without a scale is refused. Its part is a :class:`NominalScale`."""
+
+    def check(self, part: NominalScale, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse a list without a scale."""
+        del station
+        part.require_scale(recipe)
+
+
+class OnEquipment(Procedure):
+    """A procedure with steps that are recorded on the equipment of their role, not on the tilt table."""
+
+    @abstractmethod
+    def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
+        """The recording of a step with a role."""
+
+
+class SetsEquipment(Procedure):
+    """A procedure with steps ``on_table``: equipment is set, then the record is taken on the tilt table."""
+
+    @abstractmethod
+    def set_equipment(self, equipment: Any, step: ProcedureStep) -> Mapping[str, float]:
+        """Set the equipment of the role; ``supply_ratio`` of the result is over the nominal supply."""
+
+
+class FromWaveforms(Evaluated):
+    """A procedure whose recordings may be made elsewhere and imported, one file a record.
+
+    reference_unit : of the reference channel of such a recording, g or V
+    """
+
+    reference_unit: ClassVar[str] = "g"
+
+    @abstractmethod
+    def setting_of(self, part: Any, reference: UnitRecord) -> dict[str, float]:
+        """The setting of a step that was recorded elsewhere, from its reference channel."""
+
+
+def refuse_unknown_effects(names: Sequence[str], known: Collection[str], test: str) -> None:
+    """Refuse effects that the catalogue of a test does not have; ValueError, for validators of parts."""
+    for name in names:
+        if name not in known:
+            raise ValueError(f"effects: no effect '{name}' of {test}; {did_you_mean(name, known)}")
 
 
 def worst(values: Sequence[FigureValue]) -> FigureValue:

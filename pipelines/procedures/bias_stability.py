@@ -10,13 +10,14 @@ from pydantic import Field
 from inertial.dynamics.stability import block_means, stability
 from pipelines.procedures.base import (
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
     Finding,
+    InG,
     NominalScale,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     scale_of,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 
 class BiasStabilityPart(NominalScale):
@@ -47,7 +47,7 @@ class BiasStabilityPart(NominalScale):
     pose_deg: tuple[float, float] = (0.0, 0.0)
 
 
-class BiasStability(Procedure):
+class BiasStability(InG, Evaluated):
     """A bias record of an hour."""
 
     name: ClassVar[str] = "bias_stability"
@@ -72,20 +72,12 @@ class BiasStability(Procedure):
         pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
         return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
 
-    def check(self, part: BiasStabilityPart, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a list without a scale."""
-        del station
-        part.require_scale(recipe)
-
     def reduce(self, part: BiasStabilityPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Means of 1 s in µg from the start of the record; the points keep those of 10 s besides."""
         rows: list[dict[str, Any]] = []
         for record in records:
-            for unit in record.readings["unit"]:
-                own = record.samples.get(str(unit))
-                if own is None:
-                    continue
-                scale = scale_of(part, device, str(unit))
+            for unit, _, own in record.by_unit():
+                scale = scale_of(part, device, unit)
                 for i, axis in enumerate(AXES):
                     second = block_means(own.output[:, i], round(part.rate_hz)) / scale[i] * MICRO
                     time = own.time[0] + np.arange(second.size) * round(part.rate_hz) / part.rate_hz

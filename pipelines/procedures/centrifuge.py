@@ -16,20 +16,22 @@ from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
     Finding,
+    InG,
     NominalScale,
+    OnEquipment,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
+    refuse_unknown_effects,
     scale_of,
 )
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive
-from schemas.errors import did_you_mean
 from schemas.recipe import Pose
 from schemas.units import MICRO
 
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 INPUT = 2  # the input axis is z, radial
 NAMED_P = 1e-3
@@ -70,13 +71,11 @@ class CentrifugePart(NominalScale):
 
     @model_validator(mode="after")
     def _known(self) -> CentrifugePart:
-        for name in self.effects:
-            if name not in EFFECTS:
-                raise ValueError(f"effects: no effect '{name}' of centrifuges; {did_you_mean(name, EFFECTS)}")
+        refuse_unknown_effects(self.effects, EFFECTS, "centrifuges")
         return self
 
 
-class CentrifugeTest(Procedure):
+class CentrifugeTest(InG, OnEquipment, Evaluated):
     """Constant speeds on a centrifuge."""
 
     name: ClassVar[str] = "centrifuge"
@@ -121,11 +120,6 @@ class CentrifugeTest(Procedure):
             for force in way
         ]
 
-    def check(self, part: CentrifugePart, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a list without a scale."""
-        del station
-        part.require_scale(recipe)
-
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """One constant speed."""
         one = step.setting
@@ -138,12 +132,9 @@ class CentrifugeTest(Procedure):
         for k, record in enumerate(records):
             rate = np.radians(record.samples[REFERENCE].output[:, 0].mean())
             force = record.step.setting["direction"] * part.radius_m * rate**2 / 9.80665
-            for unit in record.readings["unit"]:
-                own = record.samples.get(str(unit))
-                if own is None:
-                    continue
+            for unit, _, own in record.by_unit():
                 raw = own.output[:, INPUT]
-                output = raw / scale_of(part, device, str(unit))[INPUT]
+                output = raw / scale_of(part, device, unit)[INPUT]
                 clipped = bool(np.max(np.abs(raw)) >= device.full_scale)
                 error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
                 rows.append(
@@ -173,19 +164,15 @@ class CentrifugeTest(Procedure):
             elif _responds(rows) < 0.5:
                 note = "the output does not follow the acceleration; check cable and mounting"
             if note:
-                figures[name] = [
-                    FigureValue(f.name, "z", np.nan, np.nan, identified=False, note=note) for f in self.figures
-                ]
+                figures[name] = [FigureValue.not_determined(f.name, "z", note) for f in self.figures]
                 continue
             try:
                 fit = fitted(part, rows)
             except NotIdentified as problem:
-                figures[name] = [
-                    FigureValue(f.name, "z", np.nan, np.nan, identified=False, note=str(problem)) for f in self.figures
-                ]
+                figures[name] = [FigureValue.not_determined(f.name, "z", str(problem)) for f in self.figures]
                 continue
             figures[name] = _figures(part, fit)
-            texts = [*_texts(part, fit), *diagnosis_text(part, judged(part, rows))]
+            texts = [*_texts(part, fit), *diagnosis_text(judged(part, rows))]
             findings += [Finding(name, subject, text) for subject, text in texts]
         return Outcome(figures, findings)
 
@@ -227,7 +214,7 @@ def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
     return diagnose_spins(spins, value, error, part.effects)
 
 
-def diagnosis_text(part: CentrifugePart, found: SpinDiagnosis) -> list[tuple[str, str]]:
+def diagnosis_text(found: SpinDiagnosis) -> list[tuple[str, str]]:
     """The diagnosis in sentences: subject and text."""
     model = " + ".join(("bias", "scale", *found.fit.effects))
     if found.adequate is None:
@@ -250,7 +237,6 @@ def diagnosis_text(part: CentrifugePart, found: SpinDiagnosis) -> list[tuple[str
         out.append(("with the missing effects", text))
     if found.unexplained:
         out.append(("unexplained", "no known effect explains the residual; look at it over the acceleration"))
-    del part
     return [*out, *(("next measurement", step) for step in found.next_steps)]
 
 

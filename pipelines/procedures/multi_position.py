@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import pandas as pd
-
-from pipelines.procedures.base import Device, Outcome, Part, Procedure, ProcedureRecord, ProcedureStep
-from pipelines.procedures.columns import points
+from pipelines.procedures.base import Part, Procedure, ProcedureStep
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from schemas.recipe import Recipe
 
 
@@ -50,16 +45,6 @@ class MultiPosition(Procedure):
                 for pose in recipe.verification_at(soak)
             ]
         return found
-
-    def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
-        """Nothing: the stages ``reduce``, ``fit`` and ``verify`` do it."""
-        del part, records, device
-        return points([])
-
-    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
-        """Nothing: the stage ``grade`` computes the figures of the calibration."""
-        del part, points, device
-        return Outcome({})
 
 
 PROCEDURE = MultiPosition()

@@ -13,13 +13,15 @@ from inertial.dynamics.spectra import HANN_HALF, density_confidence, hann_mean
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
     Finding,
+    InG,
     NominalScale,
+    OnEquipment,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     scale_of,
@@ -37,7 +39,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 REST_S = 0.8  # used of the second of rest before and after
 GUARD_S = 0.2  # left out at the ends of the vibration
@@ -66,7 +67,7 @@ class RandomVibrationPart(NominalScale):
         return name
 
 
-class RandomVibration(Procedure):
+class RandomVibration(InG, OnEquipment, Evaluated):
     """Gaussian vibration by a profile."""
 
     name: ClassVar[str] = "random_vibration"
@@ -108,11 +109,6 @@ class RandomVibration(Procedure):
             for level in part.levels_g
         ]
 
-    def check(self, part: RandomVibrationPart, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a list without a scale."""
-        del station
-        part.require_scale(recipe)
-
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """One level of the controller's profile."""
         one = step.setting
@@ -130,11 +126,8 @@ class RandomVibration(Procedure):
                 round((1.0 + GUARD_S) * rate) : round((1.0 + part.seconds - GUARD_S) * rate), axis
             ]
             level = float(np.sqrt(np.mean((driven - driven.mean()) ** 2)))
-            for unit in record.readings["unit"]:
-                own = record.samples.get(str(unit))
-                if own is None:
-                    continue
-                scale = scale_of(part, device, str(unit))[axis]
+            for unit, _, own in record.by_unit():
+                scale = scale_of(part, device, unit)[axis]
                 shift, error = _shift(own.output[:, axis] / scale, own.rate_hz, part.seconds)
                 clipped = int(np.count_nonzero(np.abs(own.output[:, axis]) >= device.full_scale))
                 silent = float(np.std(own.output[:, axis])) < 0.2 * level * scale
@@ -166,7 +159,7 @@ class RandomVibration(Procedure):
             elif bool(rows["value"].isna().any()):
                 note = "the output does not follow the vibration; check cable and mounting"
             if note:
-                figures[str(unit)] = [FigureValue(name, part.axis, np.nan, np.nan, identified=False, note=note)]
+                figures[str(unit)] = [FigureValue.not_determined(name, part.axis, note)]
                 continue
             level, shift, error = (rows[one].to_numpy(dtype=float) for one in ("setting", "value", "uncertainty"))
             value, spread, chi_square = rectification(level, shift, error)

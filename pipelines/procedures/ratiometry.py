@@ -11,14 +11,15 @@ from inertial.dynamics.ratiometry import Follows, departures, zero_and_sensitivi
 from inertial.dynamics.stability import difference_error, white_and_flicker
 from pipelines.procedures.base import (
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
     Finding,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
+    SetsEquipment,
     worst,
 )
 from pipelines.procedures.columns import points as point_table
@@ -76,7 +77,7 @@ class RatiometryPart(Part):
         return self
 
 
-class Ratiometry(Procedure):
+class Ratiometry(SetsEquipment, Evaluated):
     """Zero and sensitivity at several supply voltages."""
 
     name: ClassVar[str] = "ratiometry"
@@ -135,7 +136,7 @@ class Ratiometry(Procedure):
                     key="supplies_V",
                 )
 
-    def prepare(self, equipment: Any, step: ProcedureStep) -> dict[str, float]:
+    def set_equipment(self, equipment: Any, step: ProcedureStep) -> dict[str, float]:
         """Sets the supply; returns the ratio to its nominal voltage, which the monitor of the slots expects then."""
         return {"supply_ratio": equipment.set_voltage(step.setting["supply_V"])}
 
@@ -144,15 +145,12 @@ class Ratiometry(Procedure):
         rows: list[dict[str, Any]] = []
         for k, record in enumerate(records):
             axis = int(record.step.setting["axis"])
-            for reading in record.readings.to_dict("records"):
-                own = record.samples.get(str(reading["unit"]))
-                if own is None:
-                    continue
+            for unit, reading, own in record.by_unit():
                 output = own.output[:, axis]
                 white, flicker = white_and_flicker(output, own.rate_hz)
                 rows.append(
                     {
-                        "unit": reading["unit"], "axis": AXES[axis], "series": "face", "point": k,
+                        "unit": unit, "axis": AXES[axis], "series": "face", "point": k,
                         "setting": record.step.setting["supply_V"], "value": float(output.mean()),
                         "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": record.step.setting["side"],
                         "white": white, "flicker": flicker, "window_s": output.size / own.rate_hz,
@@ -170,9 +168,7 @@ class Ratiometry(Procedure):
             name = str(unit)
             if bool((rows["constant"] > 0.0).any()):
                 note = "the output is constant; check cable and supply"
-                figures[name] = [
-                    FigureValue(f.name, "*", np.nan, np.nan, identified=False, note=note) for f in self.figures
-                ]
+                figures[name] = [FigureValue.not_determined(f.name, "*", note) for f in self.figures]
                 continue
             found = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
             figures[name] = [
@@ -231,7 +227,7 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
 def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:
     if not np.all(np.isfinite(one.sensitivity)):
         note = "a face was not recorded at a voltage; measure again"
-        return FigureValue(name, axis, np.nan, np.nan, identified=False, note=note)
+        return FigureValue.not_determined(name, axis, note)
     if name == SENSITIVITY:
         k = int(np.argmax(np.abs(one.sensitivity)))
         return FigureValue(name, axis, 100.0 * float(one.sensitivity[k]), 100.0 * float(one.sensitivity_error[k]))

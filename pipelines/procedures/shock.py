@@ -6,12 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.signal import butter, sosfiltfilt
 
 from inertial.dynamics.pulses import Pulse, measured_pulse, velocity_change
 from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
-from inertial.dynamics.stability import difference_error, white_and_flicker
 from inertial.errors import NotIdentified
 from pipelines.procedures import shock_waves
 from pipelines.procedures.base import (
@@ -20,20 +18,23 @@ from pipelines.procedures.base import (
     FigureSpec,
     FigureValue,
     Finding,
+    FromWaveforms,
+    InG,
     NominalScale,
+    OnEquipment,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     UnitRecord,
+    refuse_unknown_effects,
     scale_of,
 )
 from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.shock_bias import STUCK, bias_points, bias_shift
 from schemas.bounds import NotNegative, Positive, Wait
-from schemas.errors import did_you_mean
 from schemas.recipe import Pose
-from schemas.units import AXES, MICRO
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,11 +43,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 BEFORE_S = 0.04
-CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D
-STUCK = 1e-9
 
 
 class ShockPart(NominalScale):
@@ -71,13 +69,11 @@ class ShockPart(NominalScale):
 
     @model_validator(mode="after")
     def _known(self) -> ShockPart:
-        for name in self.effects:
-            if name not in EFFECTS:
-                raise ValueError(f"effects: no effect '{name}' of shocks; {did_you_mean(name, EFFECTS)}")
+        refuse_unknown_effects(self.effects, EFFECTS, "shocks")
         return self
 
 
-class ShockTest(Procedure):
+class ShockTest(InG, OnEquipment, FromWaveforms):
     """Half-sine shocks with the bias before and after."""
 
     name: ClassVar[str] = "shock"
@@ -89,7 +85,6 @@ class ShockTest(Procedure):
     source: ClassVar[str] = "ISO 16063-22 (comparison), IEC 60068-2-27 (pulse), ISO 18431-4 (shock response spectrum)"
     roles: ClassVar[tuple[str, ...]] = ("shock_machine",)
     part: ClassVar[type[Part]] = ShockPart
-    from_waveforms: ClassVar[bool] = True
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec(
             "shock_sensitivity_percent",
@@ -135,11 +130,6 @@ class ShockTest(Procedure):
         ]
         return [bias("before"), *shocks, bias("after")]
 
-    def check(self, part: ShockPart, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a list without a scale."""
-        del station
-        part.require_scale(recipe)
-
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """One shock."""
         one = step.setting
@@ -157,24 +147,22 @@ class ShockTest(Procedure):
     def reduce(self, part: ShockPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
         rows: list[dict[str, Any]] = []
+        axis, duration = AXES.index(part.axis), 1e-3 * part.duration_ms
         first = next((k for k, record in enumerate(records) if record.step.role), -1)
         for k, record in enumerate(records):
-            for unit in record.readings["unit"]:
-                own = record.samples.get(str(unit))
-                if own is None:
-                    continue
-                scale = scale_of(part, device, str(unit))
+            for unit, _, own in record.by_unit():
+                scale = scale_of(part, device, unit)
                 if not record.step.role:
-                    rows += _bias(str(unit), k, record, own, scale)
+                    rows += bias_points(unit, k, record, own, scale)
                 else:
-                    found = _pulse(part, k, record, own, scale, device)
+                    pair = shock_waves.filtered_pair(record.samples[REFERENCE], own, axis, scale[axis], duration)
+                    found = _pulse(k, record, own.output[:, axis], pair, device)
                     rows += [one | {"unit": unit, "axis": part.axis} for one in found]
-                    pair = _both(part, record, own, scale)
-                    noise = _noise(part, record, own, scale)
+                    noise = shock_waves.noise_before(pair, BEFORE_S)
                     found = shock_waves.waves(k, pair, record.step.setting["direction"], settings_of(part), noise)
                     rows += [one | {"unit": unit, "axis": part.axis} for one in found]
                     if k == first:
-                        found = shock_waves.curves(pair, 1e-3 * part.duration_ms, BEFORE_S)
+                        found = shock_waves.curves(pair, duration, BEFORE_S)
                         rows += [one | {"unit": unit, "axis": part.axis} for one in found]
         return point_table(rows)
 
@@ -187,7 +175,7 @@ class ShockTest(Procedure):
             name = str(unit)
             ratio = rows[rows["series"] == "ratio"]
             good = ratio[np.isfinite(ratio["value"])]
-            figures[name] = [*_ratio_figures(part, ratio, good), _shift(rows)]
+            figures[name] = [*_ratio_figures(part, ratio, good), bias_shift(rows)]
             bias = rows[rows["series"] == "bias"]
             if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
                 findings.append(
@@ -231,36 +219,16 @@ def settings_of(part: ShockPart) -> shock_waves.WaveSettings:
     return shock_waves.WaveSettings(1e-3 * part.duration_ms, BEFORE_S, part.waveform_percent)
 
 
-def _noise(part: ShockPart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray) -> float:
-    """Standard deviation of the difference of both channels before the pulse, behind their low-pass, g."""
-    (first, rate), (second, unit_rate) = _both(part, record, own, scale)
-    quiet = first[: int(BEFORE_S * rate)], second[: int(BEFORE_S * unit_rate)]
-    return float(np.hypot(quiet[0].std(ddof=1), quiet[1].std(ddof=1)))
-
-
-def _filtered(record: np.ndarray, rate_hz: float, duration_s: float) -> np.ndarray:
-    """The record through the equal, phaseless low-pass of both channels."""
-    corner = min(CUT / duration_s, 0.4 * rate_hz)
-    return np.asarray(sosfiltfilt(butter(2, corner, fs=rate_hz, output="sos"), record))
-
-
-def _both(
-    part: ShockPart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
-) -> tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]:
-    """Filtered reference and unit in g along the axis, with their rates."""
-    axis, duration = AXES.index(part.axis), 1e-3 * part.duration_ms
-    reference = record.samples[REFERENCE]
-    first = _filtered(reference.output[:, axis], reference.rate_hz, duration)
-    second = _filtered(own.output[:, axis] / scale[axis], own.rate_hz, duration)
-    return (first, reference.rate_hz), (second, own.rate_hz)
-
-
 def _pulse(
-    part: ShockPart, number: int, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray, device: Device
+    number: int, record: ProcedureRecord, raw: np.ndarray, pair: shock_waves.Pair, device: Device
 ) -> list[dict[str, Any]]:
-    """Reference pulse and the unit's ratio to it; no value where a pulse is not found or the unit clips."""
-    axis = AXES.index(part.axis)
-    (reference, rate), (unit, unit_rate) = _both(part, record, own, scale)
+    """Reference pulse and the unit's ratio to it; no value where a pulse is not found or the unit clips.
+
+    Parameters
+    ----------
+    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
+    """
+    (reference, rate), (unit, unit_rate) = pair
     drive = measured_pulse(reference, rate, before_s=BEFORE_S)
     rows = [
         {
@@ -269,7 +237,6 @@ def _pulse(
         }
     ]  # fmt: skip
     answer: Pulse | None = None
-    raw = own.output[:, axis]
     limit = device.full_scale
     clipped = bool(
         np.max(np.abs(raw - np.median(raw[: int(BEFORE_S * unit_rate)]))) >= limit or np.max(np.abs(raw)) >= limit
@@ -293,22 +260,6 @@ def _pulse(
     return [*rows, row]
 
 
-def _bias(unit: str, number: int, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray) -> list[dict[str, Any]]:
-    """Mean of every axis in µg, its uncertainty from the scatter of ten parts; ``setting`` is 0 before, 1 after."""
-    output = own.output / scale * MICRO
-    tenths = np.array([piece.mean(axis=0) for piece in np.array_split(output, 10)])
-    error = tenths.std(axis=0, ddof=1) / np.sqrt(10.0)
-    noise = [white_and_flicker(output[:, i], own.rate_hz) for i in range(3)]
-    after = 0.0 if record.step.name == "before" else 1.0
-    return [
-        {
-            "unit": unit, "axis": axis, "series": "bias", "point": number, "setting": after, "value": float(output[:, i].mean()),
-            "uncertainty": float(error[i]), "white": noise[i][0], "flicker": noise[i][1], "window_s": len(output) / own.rate_hz,
-        }
-        for i, axis in enumerate(AXES)
-    ]  # fmt: skip
-
-
 def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> list[FigureValue]:
     names = ("shock_sensitivity_percent", "shock_undershoot_percent")
     if len(good) < len(ratio) or ratio.empty:
@@ -319,7 +270,7 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
             else f"{len(ratio) - len(good)} of {len(ratio)} shocks show no pulse"
         )
         note = f"{why}; lower the peak, or choose a wider range" if clipped else f"{why}; check cable and mounting"
-        return [FigureValue(name, part.axis, np.nan, np.nan, identified=False, note=note) for name in names]
+        return [FigureValue.not_determined(name, part.axis, note) for name in names]
     value, each = good["value"].to_numpy(dtype=float), good["uncertainty"].to_numpy(dtype=float)
     scatter = float(value.std(ddof=1) / np.sqrt(value.size)) if value.size > 2 else 0.0
     spread = max(scatter, float(np.sqrt(np.mean(each**2)) / np.sqrt(value.size)))
@@ -339,30 +290,6 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
             float(np.hypot(floor, under.std(ddof=1) if under.size > 1 else 0.0)),
         ),
     ]
-
-
-def _shift(rows: pd.DataFrame) -> FigureValue:
-    """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
-    found: list[FigureValue] = []
-    bias = rows[rows["series"] == "bias"]
-    pooled = (
-        difference_error(float(bias["white"].mean()), float(bias["flicker"].mean()), float(bias["window_s"].mean()))
-        if len(bias)
-        else 0.0
-    )
-    for axis, own in rows[rows["series"] == "bias"].groupby("axis", sort=False):
-        before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]
-        if before.empty or after.empty:
-            continue
-        value = float(after["value"].iloc[0] - before["value"].iloc[0])
-        error = max(pooled, float(np.hypot(after["uncertainty"].iloc[0], before["uncertainty"].iloc[0])))
-        stuck = float(after["uncertainty"].iloc[0]) <= STUCK
-        note = "the output is constant after the shocks: the unit has not survived" if stuck else ""
-        found.append(FigureValue("shock_bias_shift_ug", str(axis), value, error, identified=not stuck, note=note))
-    if not found:
-        return FigureValue("shock_bias_shift_ug", "*", np.nan, np.nan, identified=False, note="no bias before or after")
-    lost = [one for one in found if not one.identified]
-    return lost[0] if lost else max(found, key=lambda one: abs(one.value) + 2.0 * one.uncertainty)
 
 
 PROCEDURE = ShockTest()

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 from scipy.stats import chi2
 
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from pipelines.procedures.base import UnitRecord
+
+CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D
 DRAWN = 400  # points of a waveform in the picture
 PER_PULSE = 40  # samples of the compared waveforms in a duration of the pulse
 MOST_SAMPLES = 10_000  # of a compared waveform: they number its points
@@ -31,6 +35,24 @@ class WaveSettings(NamedTuple):
     duration_s: float
     before_s: float
     floor_percent: float
+
+
+def filtered_pair(reference: UnitRecord, own: UnitRecord, axis: int, scale: float, duration_s: float) -> Pair:
+    """Reference and unit along an axis in g, each through the same phaseless low-pass, with their rates."""
+    both = (reference.output[:, axis], reference.rate_hz), (own.output[:, axis] / scale, own.rate_hz)
+    (first, rate), (second, unit_rate) = both
+    return (_filtered(first, rate, duration_s), rate), (_filtered(second, unit_rate, duration_s), unit_rate)
+
+
+def _filtered(wave: np.ndarray, rate_hz: float, duration_s: float) -> np.ndarray:
+    corner = min(CUT / duration_s, 0.4 * rate_hz)
+    return np.asarray(sosfiltfilt(butter(2, corner, fs=rate_hz, output="sos"), wave))
+
+
+def noise_before(pair: Pair, before_s: float) -> float:
+    """Standard deviation of the difference of both channels before the pulse, g."""
+    quiet = [wave[: int(before_s * rate)] for wave, rate in pair]
+    return float(np.hypot(quiet[0].std(ddof=1), quiet[1].std(ddof=1)))
 
 
 def waves(number: int, pair: Pair, direction: float, settings: WaveSettings, noise_g: float) -> list[dict[str, Any]]:

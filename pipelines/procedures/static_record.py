@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import pandas as pd
-
-from pipelines.procedures.base import Device, Outcome, Part, Procedure, ProcedureRecord, ProcedureStep
-from pipelines.procedures.columns import points
+from pipelines.procedures.base import Part, Procedure, ProcedureStep
 from schemas.errors import RecipeInvalid
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
@@ -46,16 +41,6 @@ class StaticRecord(Procedure):
                 "recipe: procedures lists static_record and static_record_s is 0 s, a duration is needed; set static_record_s",
                 key="static_record_s",
             )
-
-    def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
-        """Nothing: the stage ``noise`` does it."""
-        del part, records, device
-        return points([])
-
-    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
-        """Nothing: the stage ``grade`` computes the figures of noise."""
-        del part, points, device
-        return Outcome({})
 
 
 PROCEDURE = StaticRecord()

@@ -15,9 +15,10 @@ from pipelines.procedures.base import (
     FigureSpec,
     FigureValue,
     Finding,
+    FromWaveforms,
+    OnEquipment,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     UnitRecord,
@@ -57,7 +58,7 @@ class StepPart(Part):
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
-class StepResponse(Procedure):
+class StepResponse(OnEquipment, FromWaveforms):
     """Steps of force by the self-test of the devices."""
 
     name: ClassVar[str] = "step_response"
@@ -69,7 +70,6 @@ class StepResponse(Procedure):
     )
     roles: ClassVar[tuple[str, ...]] = ("step_generator",)
     part: ClassVar[type[Part]] = StepPart
-    from_waveforms: ClassVar[bool] = True
     reference_unit: ClassVar[str] = "V"
     figures: ClassVar[tuple[FigureSpec, ...]] = (
         FigureSpec(
@@ -133,7 +133,7 @@ class StepResponse(Procedure):
                 except NotIdentified as problem:
                     note = f"axis {axis}: {problem}"
                     for name, values in found.items():
-                        values.append(FigureValue(name, str(axis), np.nan, np.nan, identified=False, note=note))
+                        values.append(FigureValue.not_determined(name, str(axis), note))
                     continue
                 for value in _values(part, str(axis), one):
                     found[value.figure].append(value)

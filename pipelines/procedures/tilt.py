@@ -10,12 +10,12 @@ from pydantic import Field, model_validator
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from pipelines.procedures.base import (
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
     Finding,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     worst,
@@ -63,7 +63,7 @@ class TiltPart(Part):
         return self
 
 
-class Tilt(Procedure):
+class Tilt(Evaluated):
     """The output of the axes that lie in one plane, over a whole turn."""
 
     name: ClassVar[str] = "tilt"
@@ -99,14 +99,11 @@ class Tilt(Procedure):
         """Mean output of every axis at every angle; the angle is the encoder's."""
         rows: list[dict[str, Any]] = []
         for k, record in enumerate(records):
-            for reading in record.readings.to_dict("records"):
-                own = record.samples.get(str(reading["unit"]))
-                if own is None:
-                    continue
+            for unit, reading, own in record.by_unit():
                 mean, sd = own.output.mean(axis=0), own.output.std(axis=0, ddof=1) / np.sqrt(len(own.output))
                 rows += [
                     {
-                        "unit": reading["unit"],
+                        "unit": unit,
                         "axis": axis,
                         "series": "output",
                         "point": k,
@@ -130,16 +127,7 @@ class Tilt(Procedure):
             if part.orders == 3:
                 found.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
             else:
-                found.append(
-                    FigureValue(
-                        "tilt_second_order_ug_g2",
-                        "*",
-                        np.nan,
-                        np.nan,
-                        identified=False,
-                        note="orders = 1; set orders = 3",
-                    )
-                )
+                found.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
             figures[str(unit)] = found
         inside, turned = " and ".join(_plane(part)), part.about
         open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))

@@ -35,7 +35,7 @@ def figures_of_transfer(part: Any, found: Diagnosis, points: Points, static: Arr
     if found.adequate is None or found.unexplained:
         why = found.reason or "the model, also with the effects found, does not describe the points"
         lost = [
-            FigureValue(name, axis, np.nan, np.nan, identified=False, note=why)
+            FigureValue.not_determined(name, axis, why)
             for name in ("sweep_bandwidth_hz", "sweep_natural_hz", "sweep_damping")
         ]
         return [*lost, _flatness(part, points), _sensitivity(part, fit, static)]
@@ -51,9 +51,7 @@ def figures_of_transfer(part: Any, found: Diagnosis, points: Points, static: Arr
 
 def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: TransferFit | None = None) -> FigureValue:
     if not fit.has(name):
-        return FigureValue(
-            figure, axis, np.nan, np.nan, identified=False, note=f"the model has no {WORD.get(name, name)}"
-        )
+        return FigureValue.not_determined(figure, axis, f"the model has no {WORD.get(name, name)}")
     value, error, low, high = fit.of(name)
     if other is not None:
         ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
@@ -61,10 +59,10 @@ def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: Trans
             f"two solutions fit equally well, {value:.4g} and {other.of(name)[0]:.4g}: the sprung mass and the two-pole "
             "low-pass can be exchanged; state the low-pass, or excite the mass alone"
         )
-        return FigureValue(figure, axis, np.nan, np.nan, ends[0], ends[-1], identified=False, note=note)
+        return FigureValue.not_determined(figure, axis, note, ends[0], ends[-1])
     if not fit.identified(name):
         note = f"not identified by this sweep: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
-        return FigureValue(figure, axis, np.nan, np.nan, low, high, identified=False, note=note)
+        return FigureValue.not_determined(figure, axis, note, low, high)
     return FigureValue(figure, axis, value, error, low, high)
 
 
@@ -107,7 +105,7 @@ def _bandwidth(axis: str, fit: TransferFit, points: Points) -> FigureValue:
     value = bandwidth_of(fit, fit.values, top)
     if not np.isfinite(value):
         note = "the model does not fall by 3 dB; sweep to higher frequencies"
-        return FigureValue("sweep_bandwidth_hz", axis, np.nan, np.nan, identified=False, note=note)
+        return FigureValue.not_determined("sweep_bandwidth_hz", axis, note)
     gradient = np.zeros(len(fit.values))
     for k, parameter in enumerate(fit.parameters):
         step = 1e-4 if parameter.log else 1e-4 * max(abs(fit.values[k]), float(fit.errors[k]), 1e-12)
@@ -118,9 +116,7 @@ def _bandwidth(axis: str, fit: TransferFit, points: Points) -> FigureValue:
     low, high = value * np.exp(-1.96 * error / value), value * np.exp(1.96 * min(error / value, 10.0))
     if error > IDENTIFIED_SHARE * value or value > 2.5 * top:
         note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
-        return FigureValue(
-            "sweep_bandwidth_hz", axis, np.nan, np.nan, float(low), float(high), identified=False, note=note
-        )
+        return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, float(low), float(high))
     return FigureValue("sweep_bandwidth_hz", axis, value, error, float(low), float(high))
 
 
@@ -143,7 +139,7 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
     nominal = part.nominal_scale if static is None else float(static["xyz".index(part.axis)])
     if nominal is None:
         note = "no static scale and no nominal_scale to compare with"
-        return FigureValue("sweep_sensitivity_percent", part.axis, np.nan, np.nan, identified=False, note=note)
+        return FigureValue.not_determined("sweep_sensitivity_percent", part.axis, note)
     value = 100.0 * (abs(fit.sensitivity) / nominal - 1.0)
     error = float(np.hypot(100.0 * fit.sensitivity_error, part.reference_percent))
     return FigureValue("sweep_sensitivity_percent", part.axis, value, error)

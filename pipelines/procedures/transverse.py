@@ -13,13 +13,15 @@ from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
     Finding,
+    InG,
     NominalScale,
+    OnEquipment,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     UnitRecord,
@@ -37,7 +39,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 FEWEST_ANGLES = 8
 SILENT = 8.0  # standard uncertainties by which a tone must exceed the noise to give the clock
@@ -72,7 +73,7 @@ class TransversePart(NominalScale):
         return self
 
 
-class TransverseTest(Procedure):
+class TransverseTest(InG, OnEquipment, Evaluated):
     """The output of the sensitive axis under motion across it, over the angle of the unit about that axis."""
 
     name: ClassVar[str] = "transverse"
@@ -107,11 +108,6 @@ class TransverseTest(Procedure):
             for k in range(round(360.0 / part.step_deg))
         ]
 
-    def check(self, part: TransversePart, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a list without a scale."""
-        del station
-        part.require_scale(recipe)
-
     def measure(self, equipment: Any, step: ProcedureStep, slots: Sequence[int]) -> Any:
         """The dwell on the exciter."""
         one = step.setting
@@ -140,7 +136,7 @@ class TransverseTest(Procedure):
             try:
                 found = fitted(rows)
             except NotIdentified as problem:
-                figures[name] = [FigureValue(FIGURE, part.axis, np.nan, np.nan, identified=False, note=str(problem))]
+                figures[name] = [FigureValue.not_determined(FIGURE, part.axis, str(problem))]
                 continue
             value = 100.0 * found.value
             error = float(np.hypot(100.0 * found.error, 1e-2 * part.reference_percent * value))

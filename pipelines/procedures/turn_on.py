@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from inertial.dynamics.stability import repeatability
+from inertial.dynamics.stability import error_of_mean, repeatability
 from pipelines.procedures.base import (
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
+    InG,
     NominalScale,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     scale_of,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 
 class TurnOnPart(NominalScale):
@@ -47,7 +47,7 @@ class TurnOnPart(NominalScale):
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
-class TurnOn(Procedure):
+class TurnOn(InG, Evaluated):
     """Power cycles in one pose."""
 
     name: ClassVar[str] = "turn_on"
@@ -79,22 +79,13 @@ class TurnOn(Procedure):
             for k in range(part.cycles)
         ]
 
-    def check(self, part: TurnOnPart, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a list without a scale."""
-        del station
-        part.require_scale(recipe)
-
     def reduce(self, part: TurnOnPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Mean of every cycle in µg; its uncertainty from the scatter of ten parts of the window."""
         rows: list[dict[str, Any]] = []
         for k, record in enumerate(records):
-            for unit in record.readings["unit"]:
-                own = record.samples.get(str(unit))
-                if own is None:
-                    continue
-                output = own.output / scale_of(part, device, str(unit)) * MICRO
-                tenths = np.array([piece.mean(axis=0) for piece in np.array_split(output, 10)])
-                error = tenths.std(axis=0, ddof=1) / np.sqrt(10.0)
+            for unit, _, own in record.by_unit():
+                output = own.output / scale_of(part, device, unit) * MICRO
+                error = error_of_mean(output)
                 rows += [
                     {
                         "unit": unit, "axis": axis, "series": "mean", "point": k, "setting": float(k + 1),

@@ -11,12 +11,13 @@ from inertial.dynamics.stability import block_means, warm_up_time
 from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     Device,
+    Evaluated,
     FigureSpec,
     FigureValue,
+    InG,
     NominalScale,
     Outcome,
     Part,
-    Procedure,
     ProcedureRecord,
     ProcedureStep,
     scale_of,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 
 class WarmUpPart(NominalScale):
@@ -49,7 +49,7 @@ class WarmUpPart(NominalScale):
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
 
 
-class WarmUp(Procedure):
+class WarmUp(InG, Evaluated):
     """A record from power-on."""
 
     name: ClassVar[str] = "warm_up"
@@ -77,20 +77,12 @@ class WarmUp(Procedure):
         )
         return [step]
 
-    def check(self, part: WarmUpPart, recipe: Recipe, station: StationConfig) -> None:
-        """Refuse a list without a scale."""
-        del station
-        part.require_scale(recipe)
-
     def reduce(self, part: WarmUpPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Means of 1 s in µg over the time since power-on."""
         rows: list[dict[str, Any]] = []
         for record in records:
-            for reading in record.readings.to_dict("records"):
-                own = record.samples.get(str(reading["unit"]))
-                if own is None:
-                    continue
-                scale = scale_of(part, device, str(reading["unit"]))
+            for unit, reading, own in record.by_unit():
+                scale = scale_of(part, device, unit)
                 begun = float(reading["since_power_s"]) - 0.5 * float(reading["duration_s"])
                 size = round(part.rate_hz)
                 for i, axis in enumerate(AXES):
@@ -98,7 +90,7 @@ class WarmUp(Procedure):
                     noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
                     rows += [
                         {
-                            "unit": reading["unit"], "axis": axis, "series": "mean_1s", "point": k,
+                            "unit": unit, "axis": axis, "series": "mean_1s", "point": k,
                             "setting": begun + (k + 0.5) * size / part.rate_hz, "value": value, "uncertainty": noise,
                         }
                         for k, value in enumerate(second)
@@ -137,11 +129,11 @@ def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
             f"noise of the smoothed output is {noise:.3g} µg, a third of the band of {part.band_ug:g} µg "
             f"at most is needed; lengthen window_s"
         )
-        return FigureValue("warm_up_s", axis, np.nan, np.nan, identified=False, note=note)
+        return FigureValue.not_determined("warm_up_s", axis, note)
     try:
         found, final = warm_up_time(time, value, band=part.band_ug, window_s=part.window_s)
     except NotIdentified as problem:
-        return FigureValue("warm_up_s", axis, np.nan, np.nan, identified=False, note=str(problem))
+        return FigureValue.not_determined("warm_up_s", axis, str(problem))
     near = np.abs(time - found) <= 5.0 * part.window_s
     slope = abs(float(np.polyfit(time[near], value[near] - final, 1)[0])) if np.count_nonzero(near) > 3 else 0.0
     spread = noise / slope if slope > 0.0 else 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from inertial.errors import InertialError
 from pipelines.procedures import PROCEDURES, parts_of, steps_of
-from pipelines.procedures.base import FigureValue, Outcome
+from pipelines.procedures.base import Evaluated, FigureValue, Outcome
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
 from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.tables.calibration import read_calibration
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from pipelines.procedures.base import Device, Part, Procedure, ProcedureRecord
+    from pipelines.procedures.base import Device, Part, ProcedureRecord
     from schemas.recipe import Recipe
 
 
@@ -51,6 +51,8 @@ def procedures(
     steps = steps_of(recipe)
     for number, part in enumerate(parts_of(recipe)):
         procedure = PROCEDURES[part.kind]
+        if not isinstance(procedure, Evaluated):
+            continue  # its records are those of the stages reduce, fit, verify and noise
         own = [(record, step) for record, (of, step) in enumerate(steps) if of == number and step.kind == "procedure"]
         if not own:
             continue
@@ -75,7 +77,7 @@ def procedures(
 
 
 def analysed(
-    procedure: Procedure, part: Part, records: Any, device: Device, units: list[str]
+    procedure: Evaluated, part: Part, records: Any, device: Device, units: list[str]
 ) -> tuple[pd.DataFrame, Outcome]:
     """Points, figures and findings; a unit for which a declared figure is missing gets it as not determined, with the reason.
 
@@ -97,7 +99,7 @@ def analysed(
         found = list(outcome.figures.get(unit, []))
         there = {one.figure for one in found}
         missing = [spec for spec in procedure.figures if spec.name not in there]
-        found += [FigureValue(spec.name, "*", np.nan, np.nan, identified=False, note=why) for spec in missing]
+        found += [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
         whole[unit] = [one if np.isfinite(one.value) else replace(one, identified=False) for one in found]
     return table, Outcome(whole, outcome.findings)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from stations.clock import Clock
     from stations.codec import Value
@@ -52,11 +53,19 @@ class UnitMemory:
     def status(self) -> MemoryStatus:
         """The state now."""
         values = self._registers.read_group("memory")
-        state = self._registers.profile.register("memory_state").enumeration
-        names = {number: name for name, number in state.items()}
-        found = names.get(int(_number(values["memory_state"])), "unknown")
-        erases: dict[Copy, int] = {copy: int(_number(values[f"erases_{copy}"])) for copy in COPIES}
-        return MemoryStatus(found, erases, int(_number(values["endurance"])))
+        numbers = self._registers.profile.register("memory_state").enumeration
+        names = {number: name for name, number in numbers.items()}
+        state = names.get(self._count(values, "memory_state"), "unknown")
+        erases: dict[Copy, int] = {copy: self._count(values, f"erases_{copy}") for copy in COPIES}
+        return MemoryStatus(state, erases, self._count(values, "endurance"))
+
+    def _count(self, values: Mapping[str, Value], register: str) -> int:
+        value = values[register]
+        if isinstance(value, int | float) and math.isfinite(value):
+            return int(value)
+        raise StationRefused(
+            f"{self.name}: register {register} has {value!r}, a number is needed; check the slot's profile"
+        )
 
     def read(self, copy: Copy) -> bytes:
         """The bytes of a copy."""
@@ -119,9 +128,3 @@ class UnitMemory:
     def set_offsets(self, steps: Sequence[int]) -> None:
         """Writes the offset registers, once, and reads them back."""
         self._registers.set("offset", [float(step) for step in steps])
-
-
-def _number(value: Value) -> float:
-    if isinstance(value, int | float):
-        return value
-    raise StationRefused(f"{value!r} is not a number; check the slot's profile")

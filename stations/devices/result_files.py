@@ -27,7 +27,7 @@ def read_recording(path: Path, slots: list[int], name: str, units: Mapping[str, 
     """
     try:
         content: dict[str, Any] = loadmat(path, simplify_cells=True)
-    except (OSError, ValueError, NotImplementedError) as problem:
+    except (OSError, ValueError, NotImplementedError) as problem:  # the last: files of MATLAB 7.3, which are HDF5
         raise StationRefused(f"{name}: result file {path.name} cannot be read ({problem}); check the share") from None
     missing = [key for key in NEEDED if key not in content]
     if missing:

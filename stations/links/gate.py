@@ -7,6 +7,7 @@ run drives, the run must hold the lease of the station; this is the last check b
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
@@ -145,18 +146,22 @@ class GatedLines:
         return StationRefused(message)
 
 
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
+
+
 def _fits(command: Command, order: str) -> bool:
-    """Whether a line is this command with an allowed value."""
+    """Whether a line is this command with an allowed value; a command that is only asked has none."""
+    if not command.writable:
+        return False
     head, tail = command.tell.split("{", 1)[0], command.tell.rpartition("}")[2]
     if not (order.startswith(head) and order.endswith(tail) and len(order) > len(head) + len(tail)):
         return False
     value = order[len(head) : len(order) - len(tail)]
     if command.type == "text":
         return value in command.values
-    try:
-        number = float(value)
-    except ValueError:
+    if not _NUMBER.fullmatch(value):  # float() also reads "inf", "1_000" and spaces, which controllers read otherwise
         return False
+    number = float(value)
     low = -math.inf if command.minimum is None else command.minimum
     high = math.inf if command.maximum is None else command.maximum
     return low <= number <= high

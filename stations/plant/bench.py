@@ -114,7 +114,7 @@ class Bench:
     station_seed: int
     lot_seed: int
     key: int
-    troubles: set[str] = field(default_factory=set[str])
+    conditions: set[str] = field(default_factory=set[str])
     cable_off: set[int] = field(default_factory=set[int])
     broken: dict[int, str] = field(default_factory=dict[int, str])
 
@@ -164,7 +164,7 @@ class Bench:
         axis: int,
         seconds: float,
         tick: int,
-        troubles: frozenset[str] = frozenset(),
+        conditions: frozenset[str] = frozenset(),
         across_deg: float | None = None,
     ) -> Waveforms:
         """Steady vibration along an axis, which points up: the record of ``seconds`` from a common trigger.
@@ -173,7 +173,7 @@ class Bench:
         """
         rng, rig = self._rng(tick, 1), self.rig
         a = level * (1.0 + 0.02 * rng.standard_normal())
-        if "level_not_reached" in troubles:
+        if "level_not_reached" in conditions:
             a *= 0.3
         phase = 2.0 * math.pi * rng.uniform()
         share, skew = rig.repeatability * rng.standard_normal(), rig.repeatability * rng.standard_normal()
@@ -196,7 +196,7 @@ class Bench:
         rate = min(self.rate_hz, recorder) if self.preset.output_unit == "V" else self.rate_hz
         n_ref = round(seconds * recorder)
         reference = self._harmonics(np.fft.rfft(base, axis=0), frequency, np.arange(n_ref) / recorder)
-        reference = self._as_reference(reference, rng, troubles)
+        reference = self._as_reference(reference, rng, conditions)
         felt = base + np.outer(share * along, driven)
         felt[:, axis] += self.gravity
         spectrum = np.fft.rfft(felt, axis=0)
@@ -220,7 +220,7 @@ class Bench:
         tick: int,
         fine_hz: float = FINE_HZ,
         slow_hz: float = 0.0,
-        troubles: frozenset[str] = frozenset(),
+        conditions: frozenset[str] = frozenset(),
     ) -> Waveforms:
         """Response to a force (n,) in g along an axis at a fine rate, which begins and ends at rest.
 
@@ -240,7 +240,7 @@ class Bench:
         reference = np.zeros((n, 3))
         reference[:, axis] = force
         recorder = slow_hz or ANALOGUE_HZ
-        reference = self._as_reference(reference[:: round(fine_hz / recorder)], rng, troubles)
+        reference = self._as_reference(reference[:: round(fine_hz / recorder)], rng, conditions)
         return Waveforms(self._converted(outputs, rng, rate), rate, reference, recorder)
 
     def _answers(self, force: Array, share: Array, rest: Array, fine_hz: float, rate_hz: float) -> Array:
@@ -271,11 +271,11 @@ class Bench:
         before_s: float,
         seconds: float,
         tick: int,
-        troubles: frozenset[str] = frozenset(),
+        conditions: frozenset[str] = frozenset(),
     ) -> Waveforms:
         """Response to a step of voltage at the self-test inputs, which push all masses; the reference is the drive in V."""
         rng, fine_hz = self._rng(tick, 4), STEP_FINE_HZ
-        volts *= 0.3 if "level_not_reached" in troubles else 1.0
+        volts *= 0.3 if "level_not_reached" in conditions else 1.0
         n = round(seconds * fine_hz)
         time = np.arange(n) / fine_hz - before_s - rng.uniform(0.0, 1.0) / ANALOGUE_HZ
         drive = np.where(time >= 0.0, -np.expm1(-np.maximum(time, 0.0) / DRIVE_RISE_S), 0.0)
@@ -328,10 +328,10 @@ class Bench:
         counts = np.rint((preset.zero_level + preset.scale * inside) / preset.lsb)
         return np.clip(counts, -preset.largest_count - 1, preset.largest_count) * preset.lsb
 
-    def _as_reference(self, reference: Array, rng: np.random.Generator, troubles: frozenset[str]) -> Array:
+    def _as_reference(self, reference: Array, rng: np.random.Generator, conditions: frozenset[str]) -> Array:
         """What the reference sensor reads of (n, 3) g: its error of calibration, noise, and a range that may clip."""
         read = reference * (1.0 + self.rig.reference_error) + 2e-4 * rng.standard_normal(reference.shape)
-        if "clipped_reference" in troubles:
+        if "clipped_reference" in conditions:
             top = 0.6 * float(np.max(np.abs(read)))
             read = np.clip(read, -top, top)
         return read

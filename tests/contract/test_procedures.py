@@ -15,7 +15,16 @@ from pipelines.capture.capture import capture
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job
 from pipelines.jobs.recipes import load_recipe
-from pipelines.procedures import FIGURES, PROCEDURES, figures_of_recipe, parts_of, roles_of
+from pipelines.procedures import (
+    FIGURES,
+    PROCEDURES,
+    IncompleteProcedure,
+    figures_of_recipe,
+    find_procedures,
+    parts_of,
+    roles_of,
+)
+from pipelines.procedures.base import Evaluated, FromWaveforms, OnEquipment, SetsEquipment
 from pipelines.procedures.transfer_figures import bandwidth_of
 from pipelines.report.unit_panels.procedures import picture
 from pipelines.stages.figures import UNITS
@@ -50,7 +59,7 @@ seed = 11
 local_gravity_m_s2 = 9.80665
 temperatures_C = [25.0]
 """
-OWN = [name for name, one in PROCEDURES.items() if one.figures]
+OWN = [name for name, one in PROCEDURES.items() if isinstance(one, Evaluated)]
 
 
 def recipe_of(folder: Path, names: list[str]):
@@ -80,6 +89,60 @@ def run(tmp_path_factory: pytest.TempPathFactory):
     for _ in runner.all():
         pass
     return runner.run
+
+
+HALF = """
+from pipelines.procedures.base import *
+class One({bases}):
+    name, title, order, states, source = "{name}", "One", 1, "s", "s"
+    roles, part = {roles}, Part
+    figures = ({figures})
+    def steps(self, part, recipe): return []
+{methods}
+PROCEDURE = One()
+"""
+METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "evaluate", "draw", "measure"))
+
+
+@pytest.mark.parametrize(
+    ("bases", "roles", "figures", "refused"),
+    [
+        ("Procedure", "('exciter',)", "", "OnEquipment or SetsEquipment is needed"),
+        ("OnEquipment", "()", "", "the equipment of its steps is needed"),
+        ("Evaluated", "()", "", "one is needed for Evaluated"),
+        ("Procedure", "()", "FigureSpec('half_f', 's', 'm'),", "Evaluated is needed for them"),
+        ("InG", "()", "", "a NominalScale is needed"),
+    ],
+)
+def test_a_procedure_that_declares_what_it_cannot_do_is_refused(
+    bases: str, roles: str, figures: str, refused: str, tmp_path: Path, monkeypatch
+) -> None:
+    name = f"half_{abs(hash((bases, roles, figures)))}"
+    (tmp_path / name).mkdir()
+    text = HALF.format(bases=bases, name="one", roles=roles, figures=figures, methods=METHODS)
+    (tmp_path / name / "one.py").write_text(text)
+    (tmp_path / name / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(IncompleteProcedure, match=rf"{name}\.one: .*{refused}"):
+        find_procedures(name, [str(tmp_path / name)])
+
+
+@pytest.mark.parametrize("ability", [Evaluated, OnEquipment, SetsEquipment, FromWaveforms])
+def test_every_ability_has_methods_without_which_a_procedure_cannot_be_made(ability) -> None:
+    bare = type("Bare", (ability,), {"steps": lambda *_: []})
+    with pytest.raises(TypeError, match="abstract method"):
+        bare()
+
+
+@pytest.mark.parametrize("name", PROCEDURES)
+def test_a_procedure_can_do_what_its_steps_ask_for(name: str, tmp_path: Path) -> None:
+    procedure = PROCEDURES[name]
+    own = load_steps(tmp_path, name) if name in PARTS else []
+    orders = [step.order for step in own if step.order is not None and step.kind == "procedure"]
+    assert bool(orders) == isinstance(procedure, Evaluated)
+    assert {one.role for one in orders if one.role} <= set(procedure.roles)
+    assert any(one.role and not one.on_table for one in orders) == isinstance(procedure, OnEquipment)
+    assert any(one.on_table for one in orders) == isinstance(procedure, SetsEquipment)
 
 
 @pytest.mark.parametrize("name", PROCEDURES)
@@ -137,7 +200,7 @@ def test_a_capture_that_stops_goes_on_bit_for_bit(name: str, tmp_path: Path) -> 
 def test_a_procedure_is_drawn(name: str, run) -> None:
     points = run.table("procedure_points")
     own = points[(points["procedure"] == name) & (points["unit"] == "P2")]
-    drawn = picture(name, {**run.about["recipe"]["procedures"][OWN.index(name)]}, own)
+    drawn = picture(PROCEDURES[name], {**run.about["recipe"]["procedures"][OWN.index(name)]}, own)
     assert "<svg" in drawn
     assert len(re.findall(r"<path|<use", drawn)) > 10
     assert PROCEDURES[name].title in run.report.read_text(encoding="utf-8")

@@ -34,7 +34,6 @@ class Handling(Effect):
     Attributes
     ----------
     fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
-    single : whether each of its places is one dwell, ``at``; then :meth:`every_dwell` has the columns of all of them
     """
 
     scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -42,7 +41,6 @@ class Handling(Effect):
     typical_ug: ClassVar[tuple[float, float]] = (0.0, float("inf"))
     simplicity: ClassVar[int] = 0
     fewest_units: ClassVar[int] = 2
-    single: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:
@@ -60,19 +58,6 @@ class Handling(Effect):
         """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""
         del size
         return True
-
-    def every_dwell(self, lot: "Lot") -> Array:
-        """Columns (units or 1, n, 3, k) of an alternative of one dwell, for each dwell in turn."""
-        raise NotImplementedError(self.id)
-
-    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
-        """Other places that may explain the same dwells equally well."""
-        del lot, place
-        return []
-
-    def short(self, size: Array, **place: float) -> str:
-        """A short text for one of :meth:`instead`."""
-        raise NotImplementedError(self.id)
 
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
         """The place and those between it and its neighbours in :meth:`places`."""
@@ -107,6 +92,26 @@ class Handling(Effect):
         else:
             whole[:] = change
         return by_block(whole)
+
+
+class OfOneDwell(Handling):
+    """A handling error each of whose places is one dwell, ``at``: all of them are searched in one pass."""
+
+    @abstractmethod
+    def every_dwell(self, lot: "Lot") -> Array:
+        """Columns (units or 1, n, 3, k) for each dwell in turn."""
+
+
+class Exchangeable(Handling):
+    """A handling error that another place may explain equally well."""
+
+    @abstractmethod
+    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """Other places that may explain the same dwells equally well."""
+
+    @abstractmethod
+    def short(self, size: Array, **place: float) -> str:
+        """A short text for one of :meth:`instead`."""
 
 
 def by_block(change: Array) -> Array:

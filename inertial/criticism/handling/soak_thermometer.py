@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.handling.base import Array, Handling, soaks
+from inertial.criticism.handling.base import Array, Exchangeable, soaks
 from inertial.state import History
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
 
-class SoakThermometer(Handling):
+class SoakThermometer(Exchangeable):
     """An offset of the temperature reading in one soak, for all units."""
 
     id: ClassVar[str] = "soak_thermometer"

@@ -4,14 +4,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from inertial.criticism.handling.base import Array, Handling, soaks
+from inertial.criticism.handling.base import Array, Exchangeable, soaks
 from inertial.criticism.handling.soak_thermometer import SoakThermometer, corrected
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
 
-class UnitThermometer(Handling):
+class UnitThermometer(Exchangeable):
     """An offset of the temperature reading in one soak, for one unit."""
 
     id: ClassVar[str] = "unit_thermometer"

@@ -4,20 +4,19 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from inertial.criticism.handling.base import Array, Handling, tilts, without
+from inertial.criticism.handling.base import Array, OfOneDwell, tilts, without
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
 
-class WrongPose(Handling):
+class WrongPose(OfOneDwell):
     """A pose that the table missed once, for all units."""
 
     id: ClassVar[str] = "wrong_pose"
     symbol: ClassVar[str] = "Δα, Δβ"
     equation: ClassVar[str] = "∂f/∂α·Δα + ∂f/∂β·Δβ in one dwell"
     breaker: ClassVar[str] = "measure that pose again"
-    single: ClassVar[bool] = True
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every dwell; none if the angles are unknown."""

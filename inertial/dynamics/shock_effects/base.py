@@ -47,6 +47,12 @@ class ShockEffect(ABC):
         """Unit of the coefficient or of the first parameter."""
 
 
+def corner(name: str, duration_s: float) -> Parameter:
+    """Corner of a filter, Hz, from half to fifty times the inverse of the duration of the pulse."""
+    starts = (1.5 / duration_s, 5.0 / duration_s)
+    return Parameter(name, "Hz", 0.5 / duration_s, 50.0 / duration_s, starts, log=True)
+
+
 def through(wave: Array, rate_hz: float, numerator: list[float], denominator: list[float]) -> Array:
     """A waveform (n,) that begins at zero, filtered by a transfer function in s; exact for linear interpolation."""
     system: Any = cont2discrete((numerator, denominator), 1.0 / rate_hz, method="foh")

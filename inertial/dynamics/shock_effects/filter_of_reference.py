@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from inertial.dynamics.shock_effects.base import Array, ShockEffect
+from inertial.dynamics.shock_effects.base import Array, ShockEffect, corner
 from inertial.dynamics.transfer_effects.base import Parameter
 
 
@@ -25,16 +25,7 @@ class FilterOfReference(ShockEffect):
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         """The parameters."""
-        return (
-            Parameter(
-                "reference_filter_hz",
-                "Hz",
-                0.5 / duration_s,
-                50.0 / duration_s,
-                (1.5 / duration_s, 5.0 / duration_s),
-                log=True,
-            ),
-        )
+        return (corner("reference_filter_hz", duration_s),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
         """The waveform (n,)."""

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.dynamics.shock_effects.base import Array, ShockEffect, through
+from inertial.dynamics.shock_effects.base import Array, ShockEffect, corner, through
 from inertial.dynamics.transfer_effects.base import Parameter
 
 
@@ -24,11 +24,7 @@ class FilterOfUnit(ShockEffect):
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         """The parameters."""
-        return (
-            Parameter(
-                "filter_hz", "Hz", 0.5 / duration_s, 50.0 / duration_s, (1.5 / duration_s, 5.0 / duration_s), log=True
-            ),
-        )
+        return (corner("filter_hz", duration_s),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
         """The waveform (n,)."""

@@ -32,16 +32,20 @@ _COUNTS_BITS = 48  # of the factor from counts to fixed point
 def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
     """The header as text, in double or single precision or in fixed point (``--arithmetic``)."""
     kind = settings.arithmetic
-    template = (
-        files("pipelines.export").joinpath(f"templates/{'q24' if kind == 'q24' else 'real'}.h").read_text("utf-8")
-    )
+    fixed = kind == "q24"
     real, suffix = ("float", "f") if kind == "float" else ("double", "")
-    head, tail = template.split("@UNITS@\n")
-    blocks = [_fixed_unit(unit) if kind == "q24" else _real_unit(unit, kind) for unit in units]
-    names = {"RUN": run, "OUT_UNIT": units[0].out_unit, "ORDER": str(ORDER), "REAL": real, "F": suffix}
-    names["BYTES"] = str(struct.calcsize(_PACKED[kind]))
-    names["BITS"] = "uint64_t" if kind == "double" else "uint32_t"
+    head, tail = _template("q24" if fixed else "real").split("@UNITS@\n")
+    blocks = [_fixed_unit(unit) if fixed else _real_unit(unit, kind) for unit in units]
+    names = {"CHECKSUM": _template("checksum").rstrip("\n")}  # first: the names below occur in it
+    names |= {"RUN": run, "OUT_UNIT": units[0].out_unit, "ORDER": str(ORDER), "REAL": real, "F": suffix}
+    names |= {"BYTES": str(struct.calcsize(_PACKED[kind])), "BITS": "uint64_t" if kind == "double" else "uint32_t"}
+    names |= {"NUMBER": "int32_t" if fixed else real, "MATRIX": "inverse" if fixed else "response"}
+    names |= {"LOW": "low_mC", "HIGH": "high_mC"} if fixed else {"LOW": "low_C", "HIGH": "high_C"}
     return _filled(head, names) + "\n".join(blocks) + _filled(tail, names)
+
+
+def _template(name: str) -> str:
+    return files("pipelines.export").joinpath(f"templates/{name}.h").read_text("utf-8")
 
 
 def _filled(text: str, names: dict[str, str]) -> str:

@@ -20,37 +20,7 @@ typedef struct {
 
 @UNITS@
 
-/* CRC-32 (ISO-HDLC): 0xCBF43926 for "123456789"; begin with crc = 0. */
-static inline uint32_t tumbleline_crc32(uint32_t crc, const unsigned char *data, size_t length)
-{
-    crc = ~crc;
-    while (length--) {
-        crc ^= *data++;
-        for (int bit = 0; bit < 8; bit++) crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u)));
-    }
-    return ~crc;
-}
-
-static inline uint32_t tumbleline_crc32_number(uint32_t crc, int32_t value)
-{
-    unsigned char data[4];
-    for (int i = 0; i < 4; i++) data[i] = (unsigned char)((uint32_t)value >> (8 * i));
-    return tumbleline_crc32(crc, data, sizeof data);
-}
-
-/* 1 where the coefficients are those that were exported, else 0. */
-static inline int tumbleline_intact(const tumbleline_calibration *c)
-{
-    uint32_t crc = tumbleline_crc32(0, (const unsigned char *)c->unit, strlen(c->unit));
-    crc = tumbleline_crc32_number(tumbleline_crc32_number(crc, c->low_mC), c->high_mC);
-    for (int n = 0; n < @ORDER@; n++)
-        for (int i = 0; i < 3; i++) crc = tumbleline_crc32_number(crc, c->bias[n][i]);
-    for (int n = 0; n < @ORDER@; n++)
-        for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) crc = tumbleline_crc32_number(crc, c->inverse[n][i][j]);
-    return crc == c->crc32;
-}
-
+@CHECKSUM@
 /* The output in units of 2^-24 g, for a device whose output is in counts (@OUT_UNIT@). */
 static inline int32_t tumbleline_from_counts(const tumbleline_calibration *c, int32_t counts)
 {

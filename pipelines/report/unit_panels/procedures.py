@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pipelines.procedures import PROCEDURES
+from pipelines.procedures.base import Evaluated
 from pipelines.report.numbers import plain
 from pipelines.report.plots import STYLE, WIDTH_IN, svg
 from pipelines.report.templates import fill
@@ -53,7 +54,7 @@ def _procedure(unit: UnitContext, number: int, content: dict[str, Any]) -> dict[
     figures, points = (unit.tables[name] for name in ("procedure_figures", "procedure_points"))
     figures, points = figures[figures["number"] == number], points[points["number"] == number]
     procedure = PROCEDURES.get(str(content.get("kind")))
-    if procedure is None or figures.empty:
+    if not isinstance(procedure, Evaluated) or figures.empty:
         return None
     whole = unit.report.tables["procedure_findings"]
     findings = whole[(whole["number"] == number) & whole["unit"].isin([unit.unit, ""])]
@@ -61,13 +62,12 @@ def _procedure(unit: UnitContext, number: int, content: dict[str, Any]) -> dict[
         "title": procedure.title,
         "lines": [_line(unit, row, {f.name: f.meaning for f in procedure.figures}) for row in rows_of(figures)],
         "findings": [f"{row['subject']}: {row['text']}" for row in rows_of(findings)],
-        "picture": picture(procedure.name, content, points) if len(points) else "",
+        "picture": picture(procedure, content, points) if len(points) else "",
     }
 
 
-def picture(name: str, content: dict[str, Any], points: pd.DataFrame) -> str:
+def picture(procedure: Evaluated, content: dict[str, Any], points: pd.DataFrame) -> str:
     """The procedure's picture of one unit as SVG."""
-    procedure = PROCEDURES[name]
     with mpl.rc_context(STYLE):
         drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN * procedure.rows), layout="constrained")
         procedure.draw(drawing, procedure.part.model_validate(content), points)

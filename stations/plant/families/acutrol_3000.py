@@ -61,7 +61,7 @@ class Centrifuge:
         elif head == ":mount 1":
             self._direction = 1.0 if number > 0.0 else -1.0
         elif head == ":rec 1":
-            if "missed_trigger" not in self._world.bench.troubles:
+            if "missed_trigger" not in self._world.bench.conditions:
                 self._number += 1
                 self._seconds, self._start_us = number, self._world.now_us
         else:
@@ -78,8 +78,8 @@ class Centrifuge:
 
     def _watch(self) -> None:
         """Trips by door and overspeed, and the stop after a silence; all follow from the plant's time."""
-        troubles = self._world.bench.troubles
-        found = "guard door" if "guard_door" in troubles else "overspeed" if "overspeed" in troubles else ""
+        conditions = self._world.bench.conditions
+        found = "guard door" if "guard_door" in conditions else "overspeed" if "overspeed" in conditions else ""
         if found and not self._tripped:
             self._tripped = found
             self._go(0.0)

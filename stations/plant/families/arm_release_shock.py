@@ -34,7 +34,7 @@ class Machine:
         self._set = {"PEAK": 50.0, "DUR": 11.0, "AXIS": 2.0, "DIR": 1.0}
         self._armed, self._number, self._start_us, self._until_us = False, 0, 0, 0
         self._recorded_one, self._refused = False, False
-        self._shape, self._troubles = (0.0, 0.0), frozenset[str]()
+        self._shape, self._conditions = (0.0, 0.0), frozenset[str]()
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:
@@ -58,7 +58,7 @@ class Machine:
     def _report(self, what: str) -> str:
         world = self._world
         if what == "DOOR":
-            return "OPEN" if "guard_door" in world.bench.troubles else "CLOSED"
+            return "OPEN" if "guard_door" in world.bench.conditions else "CLOSED"
         if what == "STAT":
             if self._refused:
                 return "DOOR"
@@ -73,19 +73,19 @@ class Machine:
         if not self._armed:
             return REFUSED, False
         self._armed, self._recorded_one = False, False
-        self._refused = "guard_door" in world.bench.troubles
+        self._refused = "guard_door" in world.bench.conditions
         if self._refused:
             return "OK", True
         rng = np.random.Generator(np.random.Philox(key=world.now_us + 5))
-        share = 0.33 if "level_not_reached" in world.bench.troubles else 1.0
+        share = 0.33 if "level_not_reached" in world.bench.conditions else 1.0
         self._shape = (
             share * self._set["PEAK"] * (1.0 + JITTER * float(rng.standard_normal())),
             1e-3 * self._set["DUR"] * (1.0 + JITTER * float(rng.standard_normal())),
         )
-        self._start_us, self._troubles = world.now_us, frozenset(world.bench.troubles)
+        self._start_us, self._conditions = world.now_us, frozenset(world.bench.conditions)
         self._until_us = world.now_us + round(1e6 * FALL_S)
         world.bench.hit(self._shape[0])
-        if "missed_trigger" not in world.bench.troubles:
+        if "missed_trigger" not in world.bench.conditions:
             self._number += 1
             self._recorded_one = True
         return "OK", True
@@ -95,5 +95,5 @@ class Machine:
         t = np.arange(round((BEFORE_S + duration + AFTER_S) * FINE_HZ)) / FINE_HZ - BEFORE_S
         pulse = np.where((t >= 0.0) & (t <= duration), peak * np.sin(np.pi * t / duration), 0.0)
         return self._world.bench.transient(
-            self._set["DIR"] * pulse, int(self._set["AXIS"]), self._start_us, troubles=self._troubles
+            self._set["DIR"] * pulse, int(self._set["AXIS"]), self._start_us, conditions=self._conditions
         )

@@ -51,7 +51,7 @@ class Generator:
         }  # fmt: skip
         self._function, self._on, self._error = "SIN", False, 0
         self._number, self._start_us, self._until_us, self._fault = 0, 0, 0, False
-        self._there, self._troubles = False, frozenset[str]()
+        self._there, self._conditions = False, frozenset[str]()
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:
@@ -111,15 +111,15 @@ class Generator:
 
     def _begin(self) -> None:
         world, w = self._world, 2.0 * math.pi * self._set["SOUR1:FREQ"]
-        troubles = world.bench.troubles
+        conditions = world.bench.conditions
         reach = min(STROKE_M * w**2 / STANDARD_G, VELOCITY_M_S * w / STANDARD_G, ACCELERATION_G)
-        self._fault = "controller_abort" in troubles or (not self._steps and self._level() > reach)
+        self._fault = "controller_abort" in conditions or (not self._steps and self._level() > reach)
         self._there = False
         if self._fault:
             return
-        self._start_us, self._troubles = world.now_us, frozenset(troubles)
+        self._start_us, self._conditions = world.now_us, frozenset(conditions)
         self._until_us = world.now_us + round(1e6 * (self._set["ACQ:LENG"] + SETTLE_S))
-        if self._on and "missed_trigger" not in troubles:
+        if self._on and "missed_trigger" not in conditions:
             self._number += 1
             self._there = True
 
@@ -128,7 +128,7 @@ class Generator:
         if self._steps:
             hold = 0.5 / self._set["SOUR1:FREQ"]
             return bench.self_test(
-                self._set["SOUR1:VOLT"], hold, self._set["ACQ:BEF"], seconds, self._start_us, self._troubles
+                self._set["SOUR1:VOLT"], hold, self._set["ACQ:BEF"], seconds, self._start_us, self._conditions
             )
         axis = int(self._set["ROUT:AXIS"])
-        return bench.sine(self._set["SOUR1:FREQ"], self._level(), axis, seconds, self._start_us, self._troubles)
+        return bench.sine(self._set["SOUR1:FREQ"], self._level(), axis, seconds, self._start_us, self._conditions)

@@ -66,7 +66,7 @@ class Supply:
         self._set = volt
 
     def _voltage(self) -> float:
-        limited = "current_limit" in self._world.bench.troubles and self._set > self._nominal
+        limited = "current_limit" in self._world.bench.conditions and self._set > self._nominal
         return (DROP if limited else 1.0) * self._set if self._on else 0.0
 
     def _apply(self) -> None:

@@ -33,7 +33,7 @@ class Controller:
         self._set = {"FREQ": 160.0, "LEVEL": 1.0, "DUR": 1.0, "AXIS": 2.0, "TURN": 0.0}
         self._density = "flat_20_2000"
         self._kind, self._start_us, self._until_us, self._number = "", 0, 0, 0
-        self._aborted, self._troubles = "", frozenset[str]()
+        self._aborted, self._conditions = "", frozenset[str]()
         self._files = ResultFiles()
 
     def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one return an order
@@ -68,21 +68,21 @@ class Controller:
         return "OK", True
 
     def _run(self, kind: str) -> tuple[str, bool]:
-        world, troubles = self._world, self._world.bench.troubles
+        world, conditions = self._world, self._world.bench.conditions
         if world.now_us < self._until_us:
             return BUSY, False
         w = 2.0 * np.pi * self._set["FREQ"]
         reach = min(STROKE_M * w**2 / STANDARD_G, VELOCITY_M_S * w / STANDARD_G, ACCELERATION_G)
         self._aborted = ""
-        if "controller_abort" in troubles:
+        if "controller_abort" in conditions:
             self._aborted = "interlock open"
-        elif "amplifier_overload" in troubles or (kind in {"SINE", "ACROSS"} and self._set["LEVEL"] > 1.001 * reach):
+        elif kind in {"SINE", "ACROSS"} and self._set["LEVEL"] > 1.001 * reach:
             self._aborted = "limit of stroke velocity or acceleration"
         if self._aborted:
             return "OK", True
-        self._kind, self._start_us, self._troubles = kind, world.now_us, frozenset(troubles)
+        self._kind, self._start_us, self._conditions = kind, world.now_us, frozenset(conditions)
         self._until_us = world.now_us + round(1e6 * (self._set["DUR"] + SETTLE_S))
-        if "missed_trigger" in troubles:
+        if "missed_trigger" in conditions:
             self._kind = ""
         else:
             self._number += 1
@@ -103,13 +103,13 @@ class Controller:
         tick = self._start_us
         if self._kind in {"SINE", "ACROSS"}:
             angle = self._set["TURN"] if self._kind == "ACROSS" else None
-            return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick, self._troubles, angle)
-        return bench.transient(self._random(seconds, tick), axis, tick, RANDOM_FINE_HZ, RANDOM_HZ, self._troubles)
+            return bench.sine(self._set["FREQ"], self._set["LEVEL"], axis, seconds, tick, self._conditions, angle)
+        return bench.transient(self._random(seconds, tick), axis, tick, RANDOM_FINE_HZ, RANDOM_HZ, self._conditions)
 
     def _random(self, seconds: float, tick: int) -> np.ndarray:
         """Gaussian vibration along the axis at the fine rate, at rest at both ends."""
         from stations.plant.densities import random_force  # noqa: PLC0415 - read from files when it is needed
 
         rng = np.random.Generator(np.random.Philox(key=tick + 1))
-        share = 0.3 if "level_not_reached" in self._troubles else 1.0
+        share = 0.3 if "level_not_reached" in self._conditions else 1.0
         return random_force(self._density, share * self._set["LEVEL"], seconds, RANDOM_FINE_HZ, rng)

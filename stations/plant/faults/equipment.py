@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from stations.plant.faults.base import UNIT, Fault
@@ -11,62 +10,54 @@ if TYPE_CHECKING:
     from stations.plant.world import World
 
 
-@dataclass
-class _Trouble(Fault):
-    """A condition of the bench while the fault lasts."""
+class _BenchCondition(Fault):
+    """A condition of the bench, named as the fault, while it lasts; the simulated controllers look for it."""
 
     def begins(self, world: World) -> None:
         """Sets the condition."""
-        world.bench.troubles.add(self.kind)
+        world.bench.conditions.add(self.kind)
 
     def ends(self, world: World) -> None:
         """Clears the condition."""
-        world.bench.troubles.discard(self.kind)
+        world.bench.conditions.discard(self.kind)
 
 
-@dataclass
-class MissedTrigger(_Trouble):
+class MissedTrigger(_BenchCondition):
     """The recorder misses its trigger: the test leaves no recording."""
 
     kind: ClassVar[str] = "missed_trigger"
 
 
-@dataclass
-class ClippedReference(_Trouble):
+class ClippedReference(_BenchCondition):
     """The conditioner of the reference sensor clips."""
 
     kind: ClassVar[str] = "clipped_reference"
 
 
-@dataclass
-class ControllerAbort(_Trouble):
+class ControllerAbort(_BenchCondition):
     """The controller aborts every test: its interlock is open."""
 
     kind: ClassVar[str] = "controller_abort"
 
 
-@dataclass
-class LevelNotReached(_Trouble):
+class LevelNotReached(_BenchCondition):
     """The exciter reaches a third of its level, the shock machine a third of its peak."""
 
     kind: ClassVar[str] = "level_not_reached"
 
 
-@dataclass
-class GuardDoor(_Trouble):
+class GuardDoor(_BenchCondition):
     """The guard door of shock machine or centrifuge is open: it does not start, and stops."""
 
     kind: ClassVar[str] = "guard_door"
 
 
-@dataclass
-class Overspeed(_Trouble):
+class Overspeed(_BenchCondition):
     """The centrifuge's speed monitor trips."""
 
     kind: ClassVar[str] = "overspeed"
 
 
-@dataclass
 class CableOff(Fault):
     """The cable of a unit on the test equipment is off: noise alone is recorded."""
 
@@ -82,8 +73,7 @@ class CableOff(Fault):
         world.bench.cable_off.discard(self.unit)
 
 
-@dataclass
-class CurrentLimit(_Trouble):
+class CurrentLimit(_BenchCondition):
     """The current limit of the power supply holds a raised voltage a tenth too low."""
 
     kind: ClassVar[str] = "current_limit"

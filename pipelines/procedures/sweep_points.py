@@ -1,0 +1,122 @@
+"""Reduction of a sweep: transfer function at every point, clock of the devices, and conditions of the exciter."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.dynamics.sine_fit import fit_tone, fit_tone_and_frequency, harmonic_distortion
+from inertial.dynamics.transfer_effects import Conditions
+from inertial.dynamics.transfer_model import Points
+from pipelines.procedures.base import REFERENCE, Array, Device, Finding, ProcedureRecord, UnitRecord
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
+
+    from pipelines.procedures.sweep_plan import SweepPart
+
+SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise
+
+
+def clocks_of(records: Sequence[ProcedureRecord], axis: int) -> dict[str, tuple[float, float]]:
+    """Departure of each device's clock from the reference's as a share, and its standard uncertainty, over all points."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for record in records:
+        frequency = record.step.setting["frequency_hz"]
+        for unit, own in record.samples.items():
+            if unit == REFERENCE:
+                continue
+            y = own.output[:, axis : axis + 1]
+            if not np.all(np.isfinite(y)) or float(np.ptp(y)) == 0.0:
+                continue
+            tone = fit_tone_and_frequency(y, own.rate_hz, frequency)
+            if abs(tone.value[0]) > SILENT * tone.amplitude_error[0]:
+                found.setdefault(unit, []).append((frequency / tone.frequency - 1.0, tone.frequency_error / frequency))
+    clocks: dict[str, tuple[float, float]] = {}
+    for unit, values in found.items():
+        value, error = np.array(values).T
+        middle = np.abs(value - np.median(value)) < 5e-3
+        weight = error[middle] ** -2.0
+        clocks[unit] = (float(np.sum(weight * value[middle]) / np.sum(weight)), float(np.sum(weight) ** -0.5))
+    return clocks
+
+
+def response_point(
+    part: SweepPart,
+    number: int,
+    setting: Mapping[str, float],
+    records: tuple[UnitRecord, UnitRecord],
+    axis: int,
+    clock: tuple[float, float],
+    device: Device,
+) -> dict[str, Any]:
+    """One point of one unit: three-parameter fits on both channels, with the device's clock known."""
+    reference, own = records
+    frequency = setting["frequency_hz"]
+    drive = fit_tone(reference.output, reference.rate_hz, frequency)
+    tone = fit_tone(own.output[:, axis : axis + 1], own.rate_hz, frequency / (1.0 + clock[0]))
+    ratio = tone.value[0] / drive.value[axis]
+    size, level = abs(tone.value[0]), float(abs(drive.value[axis]))
+    across = float(np.linalg.norm(np.abs(np.delete(drive.value, axis)))) / level
+    noise = float(np.hypot(tone.amplitude_error[0] / max(size, 1e-300), drive.amplitude_error[axis] / level))
+    transverse = 1e-2 * part.transverse_percent * across / np.sqrt(6.0)
+    skew = 2.0 * np.pi * frequency * clock[1] * len(own.output) / own.rate_hz / 2.0
+    magnitude = float(np.sqrt(noise**2 + transverse**2 + (1e-2 * part.repeatability_percent) ** 2))
+    phase = float(np.sqrt(noise**2 + transverse**2 + np.radians(part.repeatability_deg) ** 2 + skew**2))
+    silent = size < SILENT * tone.amplitude_error[0]
+    clipped = bool(np.max(np.abs(own.output[:, axis])) >= device.full_scale)
+    power = 0.5 * size**2
+    whole = not silent and not clipped and bool(np.isfinite(ratio))
+    return {
+        "axis": part.axis,
+        "series": "response",
+        "point": number,
+        "setting": frequency,
+        "value": float(abs(ratio)) if whole else np.nan,
+        "uncertainty": float(abs(ratio)) * magnitude if whole else np.nan,
+        "phase_deg": float(np.degrees(np.angle(ratio))) if whole else np.nan,
+        "phase_uncertainty_deg": float(np.degrees(phase)),
+        "level_g": level,
+        "record_s": len(own.output) / own.rate_hz,
+        "coherence": power / (power + float(tone.sigma[0]) ** 2),
+        "distortion_percent": 100.0
+        * float(harmonic_distortion(reference.output[:, [axis]], reference.rate_hz, frequency)[0]),
+        "transverse_percent": 100.0 * across,
+        "clock_ppm": 1e6 * clock[0],
+        "clock_uncertainty_ppm": 1e6 * clock[1],
+        "rate_hz": own.rate_hz,
+    }
+
+
+def condition_findings(unit: str, rows: pd.DataFrame) -> list[Finding]:
+    """Own clock, distortion and transverse motion against what is usually held."""
+    found: list[Finding] = []
+    clock, error = float(rows["clock_ppm"].iloc[0]), float(rows["clock_uncertainty_ppm"].iloc[0])
+    if abs(clock) > max(5.0 * error, 5.0):
+        text = f"{clock:+.0f} ± {2.0 * error:.1g} ppm (k = 2) against the reference; the sine fits use it"
+        found.append(Finding(unit, "clock of the device", text))
+    distortion, across = float(rows["distortion_percent"].max()), rows["transverse_percent"]
+    limit = np.where(rows["setting"] <= 1000.0, 10.0, 30.0)
+    if distortion > 5.0:
+        found.append(Finding(unit, "distortion of the exciter", f"{distortion:.1f} %, at most 5 % is usually held"))
+    if bool((across > limit).any()):
+        at = float(rows["setting"].to_numpy(dtype=float)[int(np.argmax(across.to_numpy(dtype=float)))])
+        text = f"{across.max():.0f} % at {at:.4g} Hz, at most 10 % to 1 kHz and 30 % above is usually held"
+        found.append(Finding(unit, "transverse motion of the exciter", text))
+    return found
+
+
+def transfer_points(rows: pd.DataFrame) -> Points:
+    """Points of one unit as arrays of the science."""
+
+    def column(name: str) -> Array:
+        return rows[name].to_numpy(dtype=float)
+
+    conditions = Conditions(column("setting"), column("level_g"), column("temperature_C"), column("record_s"))
+    turn = np.exp(1j * np.radians(column("phase_deg")))
+    value = np.asarray(column("value") * turn, dtype=np.complex128)
+    share = column("uncertainty") / column("value")
+    return Points(conditions, value, share, np.radians(column("phase_uncertainty_deg")))
