@@ -213,7 +213,7 @@ def _classes(document: dict[str, Any]) -> None:
         lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
     columns = ["effect", "scope", "size\nµg", "p", "residual\nµg", "cross-validated\nµg", "parameters"]
     title = "Missing effects; these data cannot separate the effects of one row"
-    print_table(columns, lines, title=title, whole=6)
+    print_table(columns, lines, title=title)
     if any(not group["plausible"] for group in document["classes"]):
         console().print("(!) larger than the usual size of this effect: check other causes, too", markup=False)
     legend = (

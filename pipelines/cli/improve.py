@@ -99,7 +99,8 @@ def command(
     dwells = without_dwells(dwells, named_dwells(leave_out))
     tables = _Tables(dwells, temperatures, again, again_temperatures)
     beside = history or (history_beside(data) if is_file(data) else "")
-    improvement = _Improvement(data, tables, model, target, beside, by, as_json, archive, fresh, measure)
+    may_measure = True if yes and measure is None else measure
+    improvement = _Improvement(data, tables, model, target, beside, by, as_json, archive, fresh, may_measure)
     document = improvement.run(judged, _names(choose), yes=yes)
     if as_json:
         print_json(document)
