@@ -60,16 +60,16 @@ class _OnDemand(TyperCommand):
         from pipelines.cli.candidates import attach
 
         attach(command)
-        command.epilog = _examples(getattr(module, "EXAMPLES", ()))
+        command.epilog = _examples(getattr(module, "EXAMPLES", ()), getattr(module, "EPILOG", ()))
         of_subcommands: dict[str, tuple[str, ...]] = getattr(module, "EXAMPLES_OF", {})
         for name, examples in of_subcommands.items():
             getattr(command, "commands")[name].epilog = _examples(examples)  # noqa: B009 - a command without them has none
         return command
 
 
-def _examples(lines: Sequence[str]) -> str:
-    """The end of a help text: a paragraph for each example."""
-    return "\n\n".join(["Examples:", *lines])
+def _examples(lines: Sequence[str], before: Sequence[str] = ()) -> str:
+    """The end of a help text: a paragraph for each example, after paragraphs of the command's own."""
+    return "\n\n".join([*before, "Examples:", *lines])
 
 
 class _Commands(TyperGroup):

@@ -105,6 +105,9 @@ def test_every_typed_document_is_printed_by_a_test() -> None:
     # lots of other tests' runs; tests/e2e/test_inquiry.py and test_operator.py
     untested = {"run --json (several fillings)", "show RUN --json (no grades)", "investigate --json", "operator --json"}
     untested |= {"certificate --json"}  # tests/unit/test_certificate_document.py
+    untested |= {"verify FILE… --json"}  # tests/unit/test_certificate_check.py
+    untested |= {"certify --json"}  # tests/unit/test_certificate_check.py
+    untested |= {"correct --json", "program --json"}  # tests/e2e/test_correct.py, tests/faults/test_programming.py
     untested |= {"fit --json (an import)"}  # tests/e2e/test_imported_recording.py
     assert set(BY_HEAD) - set(CASES) == untested
 
