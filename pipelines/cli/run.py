@@ -127,6 +127,7 @@ def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
 
 def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -> Run:
     """The run of one filling of the fixture; by the orchestrator where its request is given, else without."""
+    from pipelines.audit.index_growth import add_runs
     from pipelines.chain.attendance import JUDGED, Attendance
     from pipelines.chain.runner import Runner
     from pipelines.cli.terminal import Terminal
@@ -145,6 +146,7 @@ def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -
             report_stage(done)
             if beside is not None and done.stage == JUDGED:
                 beside.unload(runner.run)
+        add_runs(store, [runner.run.id])
         return runner.run
 
 
