@@ -1,21 +1,25 @@
 """The workbench on a large lot: time of a page, of a click, of a search, and memory.
 
-    python benchmarks/workbench.py [--units 200] [--dwells 300] [--calibrations 10000]
+    python benchmarks/workbench.py [--units 200] [--dwells 300] [--calibrations 10000] [--archive DIR]
 
 One run with that many units and dwells is written to an archive in a temporary folder, opened in headless chromium beside its
-own server. The search is timed over runs of eight units each. Times are medians, with the worst in brackets.
+own server. The search is timed over runs of eight units each, or over an archive of ``generated_archive.py``. Ten browsers open
+the unit at once. Times are medians, with the worst in brackets; the load of the machine is printed with them.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import sys
 import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import httpx
 import numpy as np
 import pandas as pd
 
@@ -28,8 +32,12 @@ from inertial import poses  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from pipelines.archive import Archive  # noqa: E402
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 EFFECTS = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 CLICKS = 8
+BROWSERS = 10
 WATCH = """() => {
   window.began = 0;
   window.took = 0;
@@ -120,7 +128,25 @@ def memory_mb(server: Served) -> float:
     return int(next(line for line in status.splitlines() if line.startswith("VmRSS")).split()[1]) / 1024.0
 
 
-def measure(server: Served, units: list[str], run: str, known: str) -> None:
+def processor_s(server: Served) -> float:
+    """Processor time of the server so far, s."""
+    words = Path(f"/proc/{server.process.pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def at_once(browser: Any, server: Served, path: str, count: int) -> float:
+    """Seconds until so many browsers, told at once, have drawn a page."""
+    with ExitStack() as open_ones:
+        tabs = [open_ones.enter_context(tab(browser, server.address)) for _ in range(count)]
+        start = time.perf_counter()
+        for one in tabs:
+            one.page.goto(server.address + path, wait_until="commit")
+        for one in tabs:
+            one.ready()
+        return time.perf_counter() - start
+
+
+def measure(server: Served, units: list[str], run: str, known: Callable[[int], str]) -> None:
     """Open, click and search; print what it took."""
     with chromium() as browser, tab(browser, server.address) as one:
         one.open(f"/unit?run={run}&unit={units[0]}")
@@ -138,10 +164,17 @@ def measure(server: Served, units: list[str], run: str, known: str) -> None:
             clicks.append(one.page.evaluate("() => window.took"))
             one.page.goto(one.page.url.split("&dwell")[0])
             one.ready()
-        search = timed(lambda number: one.open(f"/units?search={known[:-1]}{number}"), 6)
+        before = processor_s(server)
+        search = timed(lambda number: one.open(f"/units?search={known(number)}"), 6)
+        searching = (processor_s(server) - before) / 6
+        answer = timed(lambda number: httpx.get(f"{server.address}/units?search={known(number)}", timeout=60.0), 6)
+        rows = one.page.locator("[aria-label=Calibrations] tbody tr").count()
+        together = at_once(browser, server, f"/unit?run={run}&unit={units[0]}", BROWSERS)
         print(f"page of a unit, drawn       {page[0]:.2f} s ({page[1]:.2f})")
         print(f"click to its dwell          {statistics.median(clicks):.0f} ms ({max(clicks):.0f})")
-        print(f"search, page drawn          {search[0]:.2f} s ({search[1]:.2f})")
+        print(f"search, page drawn          {search[0]:.2f} s ({search[1]:.2f}); {rows} rows")
+        print(f"search, answer of the server {answer[0]:.2f} s ({answer[1]:.2f}); {searching:.2f} s of its processor")
+        print(f"{BROWSERS} browsers at once, all drawn {together:.1f} s")
         print(f"memory of the server        {memory_mb(server):.0f} MB")
         if one.outside or one.errors:
             print(f"asked for outside: {one.outside}; errors: {one.errors}")
@@ -153,25 +186,32 @@ def main() -> None:
     parser.add_argument("--units", type=int, default=200)
     parser.add_argument("--dwells", type=int, default=300)
     parser.add_argument("--calibrations", type=int, default=2000, help="in further runs of eight, for the search")
+    parser.add_argument(
+        "--archive", type=Path, default=None, help="an archive to search in; the big run is added to it"
+    )
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        archive = Archive(f"{folder}/archive")
+        place = given.archive or Path(folder) / "archive"
+        archive = Archive(str(place))
         units = [f"BIG{k:04d}" for k in range(given.units)]
-        for number in range(given.calibrations // 8):
+        for number in range(0 if given.archive else given.calibrations // 8):
             few = [f"SN{8 * number + k:06d}" for k in range(8)]
             made = tables(few, 24, number)
             write(archive, number, few, {name: made[name] for name in ("coefficients", "grades")})
         run = write(archive, 10**7, units, tables(units, given.dwells, 0))
-        with served(Path(f"{folder}/archive"), Path(folder) / "bench") as server:
+        with served(place, Path(folder) / "bench") as server:
             start = time.perf_counter()
             until(server.answers, "the server answers")
-            import httpx
-
-            httpx.get(f"{server.address}/units", timeout=600.0)  # the index is made once
+            httpx.get(f"{server.address}/units", timeout=3000.0)  # the index is made once
             first = time.perf_counter() - start
-            print(f"{given.units} units × {given.dwells} dwells, {given.calibrations} further calibrations")
+            found = httpx.get(f"{server.address}/units?order=unit", timeout=600.0).text
+            count = found.partition('<div class="card"><b>')[2].partition("<")[0]
+            print(
+                f"{given.units} units × {given.dwells} dwells among {count} calibrations; load {os.getloadavg()[0]:.1f}"
+            )
             print(f"first search, with index    {first:.1f} s")
-            measure(server, units, run, "SN000012")
+            measure(server, units, run, lambda number: f"N000{number}" if given.archive else f"SN00001{number}")
+            print(f"load at the end             {os.getloadavg()[0]:.1f}")
 
 
 if __name__ == "__main__":

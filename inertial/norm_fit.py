@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from inertial import design
 from inertial.correction import correct
@@ -270,9 +271,10 @@ class _Work:
                 share = used[unit] * (1.0 if weights is None else np.nan_to_num(weights[unit]))
                 share = share if share.sum() > 0.0 else used[unit].astype(np.float64)
                 own = [self._bias_place(axis) for axis in range(3)]
+                gain = _Solved(every[unit], left[unit], 1.0, self.whiten[unit]).gain
                 square = [
                     one.weight
-                    * one.of_record(own, direction[unit], other.slow[unit], share, response[unit], int(dof[unit]))
+                    * one.of_record(own, direction[unit], other.slow[unit], share, response[unit], int(dof[unit]), gain)
                     for one, other in zip(noises, plausible, strict=True)
                 ]
                 record[unit] = np.sqrt(np.sum(square, axis=0))
@@ -315,7 +317,7 @@ class _Solved:
     """
 
     def __init__(self, rows: Array, left: Array, weight: float, whiten: Array, least: float = 0.0) -> None:
-        self.weight, self.least = weight, least
+        self.weight, self.least, self.whiten = weight, least, whiten
         white = whiten[:, None] * rows if whiten.ndim == 1 else whiten @ rows
         rest = whiten * left if whiten.ndim == 1 else whiten @ left
         size = np.linalg.norm(white, axis=0)
@@ -336,25 +338,38 @@ class _Solved:
         return max(self.chi2 / dof, self.least)
 
     def of_record(
-        self, places: Sequence[int], direction: Array, slow: Array, share: Array, response: Array, dof: int
+        self,
+        places: Sequence[int],
+        direction: Array,
+        slow: Array,
+        share: Array,
+        response: Array,
+        dof: int,
+        gain: Array,
     ) -> Array:
-        """The same of the bias (3,) less the mean of the wander over the record.
+        """Mean square error (3,), under this noise, of the bias of a fit as that of its record, the mean wander included.
+
+        The bias of one noise's own fit is another quantity than that of another's: at the first dwell, or about the mean. The
+        steps between them are no error of the record.
 
         Parameters
         ----------
         places : of the bias of each axis among the coefficients; share : (n,), of each dwell in the mean
+        gain : (k, n), of the fit whose bias is stated
         """
         share = share / share.sum()
         level = student(dof) ** 2 * self._level(dof)
         common = slow @ share  # of the wander of an axis at each dwell with its mean
         mean = float(share @ common)
+        used = np.any(self.whiten != 0.0, axis=-1)
+        root = self.whiten[np.ix_(used, used)]
         found = np.zeros(3)
         for axis, place in enumerate(places):
             # the norm of a dwell shows the wander of an axis as far as the force points along it
-            shown = -self.gain[place] @ (direction * common[:, None])
-            own = self.inverse[place, place] + self.step[place] ** 2 / max(level, 1e-300)
+            shown = -gain[place] @ (direction * common[:, None])
+            noise = solve_triangular(root.T, gain[place, used])
             square = (
-                own / self.size[place] ** 2
+                float(noise @ noise)
                 - 2.0 * float(response[axis] @ shown)
                 + mean * float(response[axis] @ response[axis])
             )

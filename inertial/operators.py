@@ -47,12 +47,15 @@ def play(signal: ArrayLike, half_width: float, start: float = 0.0) -> Array:
     start : position before the first point, −1 … 1
     """
     x = np.asarray(signal, dtype=float)
-    out = np.empty_like(x)
-    out[..., 0] = start
-    step = np.diff(x, axis=-1) / half_width
-    for k in range(step.shape[-1]):
-        out[..., k + 1] = np.clip(out[..., k] + step[..., k], -1.0, 1.0)
-    return out
+    # times first: a row is contiguous, and the loop is the cost of a search over half widths on a long history
+    step = np.ascontiguousarray(np.diff(x.reshape(-1, x.shape[-1]), axis=-1).T / half_width)
+    out = np.empty((x.shape[-1], step.shape[1]))
+    out[0] = start
+    for before, after, change in zip(out[:-1], out[1:], step, strict=True):
+        np.add(before, change, out=after)
+        np.maximum(after, -1.0, out=after)
+        np.minimum(after, 1.0, out=after)
+    return np.ascontiguousarray(out.T).reshape(x.shape)
 
 
 def play_memory(signal: ArrayLike, half_width: float) -> Array:

@@ -22,7 +22,8 @@ PATIENCE_S = float(os.environ.get("TUMBLELINE_PATIENCE_S", "120"))
 READY = """() => Boolean(document.body.dataset.ready) && !document.querySelector('.work progress')
     && [...document.querySelectorAll('[data-figure]')].every((e) => {
         const r = e.getBoundingClientRect();
-        return r.top > innerHeight + 150 || e.dataset.drawn === e.dataset.figure || e.querySelector('p.note'); })"""
+        return !e.checkVisibility() || r.top > innerHeight + 150
+            || e.dataset.drawn === e.dataset.figure || e.querySelector('p.note'); })"""
 
 
 @dataclass
@@ -31,13 +32,13 @@ class Served:
 
     archive: Path
     folder: Path
-    station: Path | None = None
+    stations: tuple[Path, ...] = ()
     port: int = 0
     process: subprocess.Popen[str] | None = None
 
     def begin(self) -> None:
         command = [sys.executable, "-m", "pipelines.cli", "workbench", str(self.archive), "--folder", str(self.folder)]
-        command += ["--port", str(self.port), *(["--station", str(self.station)] if self.station else [])]
+        command += ["--port", str(self.port), *(word for one in self.stations for word in ("--station", str(one)))]
         own = {
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",
@@ -81,9 +82,9 @@ def until(true: Any, what: str, patience_s: float = PATIENCE_S) -> None:
 
 
 @contextmanager
-def served(archive: Path, folder: Path, station: Path | None = None) -> Iterator[Served]:
+def served(archive: Path, folder: Path, *stations: Path) -> Iterator[Served]:
     folder.mkdir(parents=True, exist_ok=True)
-    one = Served(archive, folder, station)
+    one = Served(archive, folder, stations)
     one.begin()
     try:
         yield one
@@ -111,6 +112,11 @@ class Tab:
 
     def ready(self) -> None:
         until(lambda: self.page.evaluate(READY), f"{self.page.url} is drawn")
+
+    @property
+    def href(self) -> str:
+        """The address as the page has it; ``page.url`` is told of later."""
+        return str(self.page.evaluate("() => location.href"))
 
     def press(self, selector: str) -> None:
         self.page.locator(selector).first.click()

@@ -1,4 +1,4 @@
-"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults hidden loop part --runs 10`.
+"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults small hidden loop part --runs 10`.
 
 Prints for every world how many runs were called inadequate, named physics, and told the fault that was made, each with its 95 %
 Clopper-Pearson interval. `--seeds development` are for setting constants, `judging` (the default) only for measuring.
@@ -73,6 +73,7 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         "named": [g["effects"] for g in groups],
         "stray": stray,
         "unexplained": document["unexplained"] is not None,
+        "left_out": _left_out(made, document),
         "blocked": [(b["fault"], b["units"], b["dwells"]) for b in document["blocked_by"]],
         "found": all(any(_agrees(told, *one) for one in said) for told in made.faults) if made.faults else None,
         "false": [(sorted(one[0]), *one[1:]) for one in said if not any(_agrees(told, *one) for told in made.faults)],
@@ -85,6 +86,13 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         "said": [(sorted(a), b, c) for a, b, c in said],
         "truth": [(told.names, told.units, told.dwells) for told in made.faults],
     }
+
+
+def _left_out(made: Made, document: dict[str, Any]) -> bool | None:
+    """Whether every spoilt dwell was left out, named or not; None where none was spoilt."""
+    spoilt = [(told.units[0], dwell) for told in made.faults if told.names == ("bad_dwell",) for dwell in told.dwells]
+    gone = {(d["unit"], d["dwell"]) for d in (document.get("removed") or {"dwells": []})["dwells"]}
+    return set(spoilt) <= gone if spoilt else None
 
 
 def _agrees(told: Any, names: set[str], units: list[str], dwells: list[int]) -> bool:
@@ -176,6 +184,8 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
     parts.append(f"names physics beside the truth {interval(sum(bool(r['stray']) for r in whole), n)}")
     if whole[0]["found"] is not None:
         parts.append(f"fault told {interval(sum(r['found'] for r in whole), n)}")
+        if whole[0].get("left_out") is not None:
+            parts.append(f"spoilt dwells left out {interval(sum(r['left_out'] for r in whole), n)}")
         parts.append(f"another fault told {sum(bool(_other(r)) for r in whole)}")
     if whole[0]["held"] is not None:
         parts.append(

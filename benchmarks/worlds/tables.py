@@ -62,6 +62,14 @@ FAULTS |= {
 }
 """What goes wrong, one at a time and two at once."""
 
+SMALL: dict[str, World] = {
+    "dwell_5sd": World(fault="bad_dwell", floors=5.0),
+    "dwell_5sd_white": World(fault="bad_dwell", floors=5.0, noise=Noise(white=100.0, flicker=0.0)),
+    "dwell_7sd": World(fault="bad_dwell", floors=7.0),
+    "dwell_5sd_one_unit": World(units=1, fault="bad_dwell", floors=5.0),
+}
+"""Dwells so little off that some of them cannot be told from noise."""
+
 _HIDDEN = (
     "third_order", "second_order", "cross_coupling", "bias_temperature_quadratic", "scale_temperature_quadratic",
     "misalignment_temperature", "aging_linear", "warm_up", "step_change", "level_error",
@@ -76,7 +84,7 @@ HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name 
 HIDDEN |= {f"adc_nonlinearity_{size:g}": World(hidden=(("adc_nonlinearity", size),)) for size in (1.0, 2.0, 5.0)}
 HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
 HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
-TABLES = {"nulls": NULLS, "faults": FAULTS, "hidden": HIDDEN}
+TABLES = {"nulls": NULLS, "faults": FAULTS, "small": SMALL, "hidden": HIDDEN}
 WRONG = (
     "bias_temperature_quadratic", "scale_temperature_quadratic", "aging_linear", "aging_log", "step_change", "warm_up",
     "thermal_hysteresis", "third_order", "cross_coupling",

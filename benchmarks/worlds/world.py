@@ -22,6 +22,7 @@ class World:
 
     durations : shortest and longest dwell, s; hidden : (effect, size), size = RMS that the plain model leaves of it over the
     noise of a dwell; fault, amount : what goes wrong and by how much
+    floors : the amount in place of ``amount``, over the RMS noise of a dwell about the mean of its record, for faults in mg
     beside : further faults and their amounts
     rest : RMS of the table's rest position, µrad, alike for all; lsb : resolution over the noise of a dwell's samples
     turn_on : RMS of the bias shift between the run and the fresh one, µg; unsoaked : dwells begin when the chamber arrives
@@ -35,6 +36,7 @@ class World:
     hidden: tuple[tuple[str, float], ...] = ()
     fault: str = ""
     amount: float = 0.0
+    floors: float = 0.0
     beside: tuple[tuple[str, float], ...] = ()
     rest: float = 0.0
     lsb: float = 0.0
@@ -114,7 +116,8 @@ def make(world: World, seed: int) -> Made:
         true = replace(s, outer=s.outer + rest[0], inner=s.inner + rest[1])
         noise, turned, readings = drawn, None, s.temperature + 0.003 * rng.standard_normal(s.temperature.shape)
         if k == 0:
-            for fault, amount in ((world.fault, world.amount), *world.beside) if world.fault else ():
+            own = 1e3 * world.floors * floor if world.floors else world.amount
+            for fault, amount in ((world.fault, own), *world.beside) if world.fault else ():
                 true, more, readings, noise, one = FAULTS[fault](true, readings, noise, amount, third)
                 turned = more if turned is None else turned if more is None else turned + more
                 told += one if isinstance(one, tuple) else () if one is None else (one,)

@@ -28,6 +28,12 @@ MOST = 0.1
 BAD_NORM = 0.005
 """Probability over all dwells of a recording below which a dwell is called bad."""
 
+SECOND = 0.05
+"""Probability over the dwells of a recording below which each dwell of a pair must be bad beside the other.
+
+At one half a sound dwell was named beside a single bad one of 5 to 8 standard deviations in a quarter of the recordings.
+"""
+
 RECORDED_DOF = 30
 """Degrees of freedom that the noise of the samples counts for, where what the dwells leave agrees with it."""
 
@@ -158,6 +164,6 @@ def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | Non
     if size > 1:
         # each must be bad by itself beside the other
         each = stats.f.logsf((off / error) ** 2, 1, dof) + _looks(model, 1)
-        if not bool(np.all(each < np.log(0.5))):
+        if not bool(np.all(each < np.log(SECOND))):
             return None
     return Suspicion(unit, dwells, tuple(off.tolist()), tuple(np.abs(off / error).tolist()), log_p)

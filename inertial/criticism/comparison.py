@@ -120,7 +120,9 @@ def residuals_of(problem: Problem, found: Estimate) -> Array:
 
 def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
     own = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
-    return np.concatenate([*own, *(problem.start(t.effect, t.keywords) for t in terms)], axis=-1)
+    # as in the model: a memory that was at rest has no unknown state
+    started = [problem.start(t.effect, t.keywords) for t in terms if not t.rest]
+    return np.concatenate([*own, *started], axis=-1)
 
 
 def rms(values: Array) -> float:

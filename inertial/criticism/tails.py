@@ -1,9 +1,11 @@
 """Tails of the noise: the limit for bad dwells where large deviations are frequent.
 
 The noise of a dwell is modelled as a normal part plus a Student t part of three degrees of freedom, which has an unknown share of
-the variance; few noises have heavier tails. The posterior distribution of the share uses the likelihood of the deletion residuals
-of the kept dwells, truncated at the smallest value that was left out: it holds whether or not the dwells left out belong to the
-tail of the noise. Whitened residuals cannot be used, because whitening spreads the error of one dwell over the dwells after it.
+the variance; few noises have heavier tails. Before the data every share is as likely as any other: small ones, which no number of
+dwells excludes, then count little in a lot whose dwells show no tails. The posterior distribution of the share uses the
+likelihood of the deletion residuals of the kept dwells, truncated at the smallest value that was left out: it holds whether or
+not the dwells left out belong to the tail of the noise. Whitened residuals cannot be used, because whitening spreads the error of
+one dwell over the dwells after it.
 A dwell counts as tail of the noise where such noise gives a deviation as large in one of the dwells of the run with more than a
 stated probability. The size of a deviation is its length, and the product of the probabilities of its axes: noise that is
 independent on three axes is seldom large on two of them at once.
@@ -27,6 +29,9 @@ Array = NDArray[np.float64]
 
 _SHARES = (0.0, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
 """Shares of the variance that heavy tails may have."""
+
+_WEIGHTS = np.array(_SHARES) / sum(_SHARES)
+"""Their probabilities where there are heavy tails: a flat density of the share."""
 
 _DOF = 3.0
 """Degrees of freedom of the heavy part: P(|x| > z) falls off as z⁻³."""
@@ -86,7 +91,7 @@ class _Noise:
                 kept = 1.0 - float(_beyond(k, np.array([below / s]))[0])
                 each = np.log(np.maximum(np.interp(inside / s, grid, density), 1e-300))
                 log[k, j] = float(each.sum()) - inside.size * np.log(s * max(kept, 1e-12))
-        prior = np.where(np.array(_SHARES) > 0.0, TAILS / (len(_SHARES) - 1), 1.0 - TAILS)
+        prior = np.where(_WEIGHTS > 0.0, TAILS * _WEIGHTS, 1.0 - TAILS)
         weight = np.exp(log - log.max()) * prior[:, None]
         return _Noise(weight / weight.sum(), scale)
 

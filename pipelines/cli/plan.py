@@ -105,6 +105,15 @@ def command(
     model: ModelOption = None,
     noise: NoiseOption = None,
     wander: WanderOption = None,
+    pose: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--pose",
+            metavar="NAME=OUTER,INNER",
+            help="Plan with a pose at other angles, in degrees: p05 is the fifth of the fit, v1 the first of the "
+            "verification; may be repeated.",
+        ),
+    ] = None,
     page: PageOption = None,
     archive: ArchiveOption = None,
     pictures: Annotated[
@@ -118,6 +127,7 @@ def command(
 
     For effects that are not visible: the reason, and what to add to the recipe.
     """
+    from pipelines.jobs.moved_poses import moves_of, with_moved_poses
     from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.terms import planned_terms
     from pipelines.planning.plan import plan, plan_context
@@ -125,7 +135,9 @@ def command(
     from schemas.station import load_station
 
     config = load_station(station)
-    found = with_model(recipe, effects, model, archive, config.name)
+    found = with_moved_poses(
+        with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
+    )
     context = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
     limits = _limits(found, folder_of(recipe))
     document = plan(context, planned_terms(found, config, limits), limits)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from pipelines.cli.options import StationOption, console, error_console
+from pipelines.cli.options import console, error_console
 from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
@@ -30,7 +30,14 @@ def command(
         Path,
         typer.Option("--folder", metavar="DIR", help="Folder for files of dwells, recipes, models, uploads and lots."),
     ] = Path("workbench"),
-    station: StationOption = None,
+    station: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--station",
+            metavar="FILE",
+            help="A station of the operator's page; may be repeated. The built-in simulated one by default.",
+        ),
+    ] = None,
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: a free one.")] = 8321,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Interface to listen on.")] = "127.0.0.1",
     name: Annotated[
@@ -45,6 +52,13 @@ def command(
     ] = None,
     workers: Annotated[int, typer.Option("--workers", min=1, max=32, help="Processes for diagnoses and fits.")] = 2,
     *,
+    pause_lots: Annotated[
+        bool,
+        typer.Option(
+            "--pause-lots",
+            help="Pause lots when the workbench ends, for a service manager that ends their processes with it.",
+        ),
+    ] = False,
     behind_proxy: Annotated[
         bool,
         typer.Option("--behind-proxy", help="A proxy in front encrypts; needed on other hosts without a certificate."),
@@ -63,6 +77,7 @@ def command(
     from pipelines.archive import Archive
     from pipelines.workbench.application import create_app
     from pipelines.workbench.settings import Settings
+    from schemas.station import load_station
 
     if (certificate is None) != (key is None):
         raise WrongUse("workbench: a certificate and its key are needed together; give both or neither")
@@ -73,10 +88,12 @@ def command(
     )
     listening = place.getsockname()[1] if place is not None else port
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
+    for one in station or ():
+        load_station(one)  # a broken file is refused now, not when the page is opened
     settings = Settings(
         archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
-        tls=certificate is not None, proxied=behind_proxy, station=station, workers=workers,
-        **({"token": given} if given else {}),
+        tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
+        pause_lots=pause_lots, **({"token": given} if given else {}),
     )  # fmt: skip
     app = create_app(settings)
     console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)

@@ -26,6 +26,10 @@ METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {
 }
 
 
+_NORM_NEEDS = 9
+"""Bias, scale and the angles between the axes."""
+
+
 def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     """The fit called ``method``, one of :data:`METHODS`, of one unit's import, with a verdict on its own adequacy."""
     silent = silent_axis(data.dwells) if method == "norm" and data.dwells is not None else ""
@@ -34,5 +38,10 @@ def judge(method: str, data: Imported, mapping: Mapping) -> FitAnswer:
     if silent:  # more poses, which the fit requests, do not help
         raise DataRejected(
             f"import: axis {silent}; three axes that respond to gravity are needed for --fit norm; correct --map {silent[0]}=…"
+        )
+    if method == "norm" and data.dwells is not None and not mapping.poses and len(data.dwells) <= _NORM_NEEDS:
+        raise DataRejected(
+            f"import: {len(data.dwells)} dwells of unknown orientation, more than {_NORM_NEEDS} are needed for --fit norm; add "
+            "positions; or, if faces were up, name them with --poses LABEL=+x,LABEL=-x,… and give --fit faces"
         )
     return METHODS[method](data, mapping)

@@ -28,6 +28,8 @@ USUAL_HZ = (0.5, 5e4)
 _NAMED = re.compile(r"(?:^|[_\s.\-\[(])(s|sec|secs|second|seconds|ms|msec|milli|millis|milliseconds?|us|µs|μs|usec|micros|"
                     r"microseconds?|ns|nsec|nanos|nanoseconds?)[\])]?\s*$", re.IGNORECASE)  # fmt: skip
 _CLOCK = re.compile(r"^\s*(\d{1,2}:\d{2}:\d{2}(?:[.,:]\d+)?)\s*$")
+_MINUTES = re.compile(r"^\s*(\d{1,3}):([0-5]\d[.,]\d+)\s*$")
+"""Minutes and seconds, as a spreadsheet shows a time of day with fractions: without hours, 59:59.9 is followed by 00:00.0."""
 _FRACTION = re.compile(r"(:\d{2}),(\d+)")
 _FORMATS = (
     *("ISO8601", "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d-%b-%Y %H:%M:%S.%f", "%d-%b-%Y %H:%M:%S"),
@@ -36,6 +38,7 @@ _FORMATS = (
 _DAY_FIRST = ("%d/%m/%Y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S")
 _MONTH_FIRST = ("%m/%d/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%m/%d/%Y %I:%M:%S.%f %p")
 _HALF_DAY_S = 43_200.0
+_HOUR_S = 3600.0
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,11 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
         seconds = np.asarray(spans.dt.total_seconds(), dtype=np.float64)
         midnights = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -_HALF_DAY_S]))
         return seconds + 86_400.0 * midnights - seconds[0]
+    if column.notna().all() and bool(text.str.match(_MINUTES).all()):
+        parts = text.str.replace(",", ".", regex=False).str.split(":", expand=True).astype(float).to_numpy()
+        seconds = 60.0 * parts[:, 0] + parts[:, 1]
+        hours = np.cumsum(np.concatenate([[0.0], np.diff(seconds) < -0.5 * _HOUR_S]))
+        return seconds + _HOUR_S * hours - seconds[0]
     for form in _FORMATS:
         parsed = _parsed(text, form)
         if parsed is not None:

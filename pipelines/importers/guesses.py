@@ -31,6 +31,7 @@ _FASTEST_K_S = 2.0
 _HEAT = re.compile(r"temp|heat|^t_?c$|degc|°c", re.IGNORECASE)
 _MOST_COLUMNS = 24
 _SOME = 20_000
+_MOST_POSITIONS = 500
 _LIKELY_HZ = 100.0
 
 
@@ -46,17 +47,19 @@ class Guess:
 class Guesses:
     """Guesses of a file.
 
-    columns : column → guess · time_unit, output : units with their reasons; empty if unknown
+    columns : column → guess · time_unit, output : units with their reasons; empty if unknown · sheet : whether each row has a
+    label of its own, as in a sheet of positions
     """
 
     columns: dict[str, Guess]
     time_unit: Guess
     output: Guess
+    sheet: bool = False
 
     @property
     def dwells(self) -> bool:
-        """Whether rows look like dwells, with standard deviations beside the means."""
-        return all(self.column(f"sd_{axis}") for axis in "xyz")
+        """Whether rows look like dwells: standard deviations beside the means, or a label of its own in each row."""
+        return self.sheet or all(self.column(f"sd_{axis}") for axis in "xyz")
 
     def column(self, meaning: str) -> str:
         """The column with a meaning; empty if there is none."""
@@ -71,7 +74,20 @@ def guesses(content: Content) -> Guesses:
     _time(table, numeric, found)
     _axes(content, numeric, found)
     _others(content, table, numeric, found)
-    return Guesses(found, _time_unit(content, numeric, found), _output(content, numeric, found))
+    sheet = _sheet(table, numeric, found)
+    return Guesses(found, _time_unit(content, numeric, found), _output(content, numeric, found), sheet)
+
+
+def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> bool:
+    """Whether the rows are positions, each with a label of its own; the labels are then those of the dwells."""
+    meanings = {one.meaning for one in found.values()}
+    if "time" in meanings or not {"x", "y", "z"} <= meanings or len(table) > _MOST_POSITIONS:
+        return False
+    for name in table.columns:
+        if str(name) not in numeric and table[name].notna().all() and table[name].nunique() == len(table) > 1:
+            found[str(name)] = Guess("dwell", "a label of its own in each row")
+            return True
+    return False
 
 
 def measurable(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -101,7 +117,7 @@ def _time(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: d
     if named:
         found[named[0]] = Guess("time", "its name, and it only increases")
         return
-    even = [name for name in growing if not _COUNT.search(name)]
+    even = [name for name in growing if not _COUNT.search(name) and not _AXIS.search(name)]
     if even:
         found[even[0]] = Guess("time", "the first column that only increases")
 

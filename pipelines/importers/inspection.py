@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial import change_of_level, record_faults, static_intervals
-from pipelines.importers import clocks, files, sample_faults, sources, values
+from pipelines.importers import clocks, files, sample_faults, sources, unit_check, values
 from pipelines.importers.guesses import Guesses, guesses, measurable
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.record_time import GAP
 from pipelines.importers.stated_units import TEMPERATURE
+from schemas.units import AXES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +62,19 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     rate = _rate(own)
     intervals = _intervals(kept, own, rate) if kept is not None and rate else []
     if output is None:
-        open_.append("three columns of acceleration were not recognised: map x, y and z by name or number")
+        missing = [axis for axis in "xyz" if not guessed.column(axis)]
+        open_.append(f"columns of acceleration were not recognised: map {' and '.join(missing)} by name or number")
+        few = len([one for one in guessed.columns.values() if one.meaning != "time"])
+        if few < len(AXES):
+            open_.append(
+                f"{few} column{'s' if few > 1 else ''} beside the time: an import needs three axes; a record at rest of fewer "
+                "has its noise by 'tumbleline allan' and 'tumbleline psd'"
+            )
+    bits = 0 if output is None else unit_check.unsigned_bits(output[np.isfinite(output).all(axis=1)])
+    if bits:
+        open_.append(
+            f"signed words of {bits} bits were read without their sign: subtract {2**bits} from {2 ** (bits - 1)} on"
+        )
     if guessed.output.meaning == "" and output is not None:
         open_.append("the unit of the output: --units output=g|mg|m/s^2|V|mV|LSB")
     positions = (
@@ -208,7 +221,9 @@ def _command(
     """The import command that is proposed; values that the file does not state are in capitals."""
     names = list(guessed.columns)
     pairs = [(meaning, guessed.column(meaning)) for meaning in _NAMED if guessed.column(meaning)]
-    mapped = ",".join(f"{meaning}={_mapped(name, names)}" for meaning, name in pairs)
+    words = [f"{meaning}={_mapped(name, names)}" for meaning, name in pairs]
+    words += [f"{axis}=COLUMN" for axis in "xyz" if not guessed.column(axis)]
+    mapped = ",".join(words)
     units = [f"output={guessed.output.meaning or 'UNIT'}"]
     time = guessed.column("time")
     if time and guessed.time_unit.meaning:

@@ -48,7 +48,16 @@ def ramp(data: Imported, mapping: Mapping) -> FitAnswer:
         f"({fit.noise[k]:.3g}, from first differences)"
         for k in range(3)
     )
-    advice = "something other than temperature itself drives this output; look at its rate and lag with 'tumbleline diagnose'"
+    face = (
+        ""
+        if mapping.face
+        else "import it again with --face FACE (the face that is up) --local-g M/S2 --blocks 60, then "
+    )
+    advice = [
+        "something other than temperature itself drives this output, such as its rate or a lag",
+        f"to look further: {face}'tumbleline diagnose RUN'",
+    ]
     if fit.adequate is None:
-        advice = "cannot be judged: the noise of a sample or the residual is undefined; check the record for constant channels"
-    return FitAnswer("temperature", fit.adequate, document, lines if fit.adequate else (*lines, advice))
+        reason = "the noise of a sample or the residual is undefined; check the record for constant channels"
+        advice = [f"cannot be judged: {reason}"]
+    return FitAnswer("temperature", fit.adequate, document, lines if fit.adequate else (*lines, *advice))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from pipelines.importers import exchange, held_out, pose_check, sample_faults, unit_check, values
+from pipelines.importers import clocks, exchange, held_out, pose_check, sample_faults, unit_check, values
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
@@ -83,8 +83,15 @@ def imported(
             f"{where}: samples of {len(set(serials))} units in one file, one unit is needed; divide the file"
         )
     time = clock.seconds - clock.seconds[0]
+    twice = _twice(time, raw)
     faults = sample_faults.look(raw)
-    remarks = (*remarks, *clock.remarks, *wide, *sample_faults.refuse_or_remark(faults, raw, time, mapping, where))
+    remarks = (
+        *remarks,
+        *clock.remarks,
+        *twice,
+        *wide,
+        *sample_faults.refuse_or_remark(faults, raw, time, mapping, where),
+    )
     bad = faults.bad if mapping.faulty == "leave-out" else np.zeros(len(raw), dtype=bool)
     samples = pd.DataFrame({"unit": serials, "slot": 0, "record": 0, "kind": "dwell", "time_s": time})
     samples[list(AXES)] = raw * factor
@@ -144,7 +151,7 @@ def _with_numbers(
         if (
             meaning in {"unit", "dwell"}
             or column.dtype.kind in "mM"
-            or (meaning == "time" and column.dtype.kind not in "fiu")
+            or (meaning == "time" and clocks.is_stamps(column))
         ):
             whole &= column.notna().to_numpy()
         else:
@@ -159,6 +166,17 @@ def _with_numbers(
         f"{count - kept.size} of {count} rows without a number left out, the first is row {first}; dwells end there"
     )
     return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
+
+
+def _twice(time: NDArray[np.float64], raw: NDArray[np.float64]) -> tuple[str, ...]:
+    """A remark on rows that repeat the row before, with its time: they count twice in the means and their noise."""
+    same = (np.diff(time) == 0.0) & np.all(np.diff(raw, axis=0) == 0.0, axis=1)
+    if not same.any():
+        return ()
+    first = int(np.flatnonzero(same)[0]) + 2
+    return (
+        f"CHECK THE ROWS: {int(same.sum())} rows repeat the row before them with its time and values, the first is row {first}",
+    )
 
 
 def _behind(kept: NDArray[np.int64]) -> set[int]:

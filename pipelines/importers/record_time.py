@@ -60,8 +60,9 @@ def seconds(
         return clock
     time = clock.seconds
     if "dwell" in columns:  # dwells may have been recorded one by one, each with a clock of its own
-        backwards(time, columns["dwell"].astype(str).tolist(), where, together=False)
-        return clock
+        labels = columns["dwell"].astype(str).tolist()
+        backwards(time, labels, where, together=False)
+        return _continued(clock)
     del breaks
     backwards(time, [""] * len(time), where, together=False)
     if len(time) < 2 or time[-1] <= time[0]:
@@ -71,6 +72,18 @@ def seconds(
             "--rate HZ without one, or say --rows dwells"
         )
     return clock
+
+
+def _continued(clock: Clock) -> Clock:
+    """A clock without steps back: where it restarts, it goes on one usual step after the sample before."""
+    steps = np.diff(clock.seconds)
+    back = steps < 0.0
+    if not back.any():
+        return clock
+    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    time = clock.seconds[0] + np.concatenate([[0.0], np.cumsum(np.where(back, usual, steps))])
+    remark = f"the clock restarts {int(back.sum())} times between dwells; it is continued, so the time between them is unknown"
+    return Clock(time, clock.unit, (*clock.remarks, remark))
 
 
 def _clock(

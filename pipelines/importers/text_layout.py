@@ -65,6 +65,11 @@ def is_comment(line: str) -> bool:
     return not stripped or stripped.startswith(COMMENTS)
 
 
+def filled_lines(lines: Sequence[str], first: int = 0) -> list[int]:
+    """Indices, from one on, of the lines that are neither empty nor comments; without a call per line, for long records."""
+    return [k for k in range(first, len(lines)) if (words := lines[k].lstrip()) and words[0] not in COMMENTS]
+
+
 def fields_of(line: str, divider: str) -> list[str]:
     """The fields of a line, without the blanks about them and without quotes."""
     if divider == BLANKS:
@@ -85,7 +90,7 @@ def is_number(word: str, decimal: str = ".") -> bool:
 
 def layout(lines: Sequence[str]) -> Layout | None:
     """The layout of a text's lines; None if all lines are comments."""
-    filled = [k for k in range(len(lines)) if not is_comment(lines[k])]
+    filled = filled_lines(lines)
     if not filled:
         return None
     sample = _sampled([lines[k] for k in filled])
@@ -151,9 +156,11 @@ def _first_row(
         return filled[1] if len(filled) > 1 else len(lines)  # names alone
     alike = (place for place, k in enumerate(filled) if _is_row(fields_of(lines[k], divider), decimal, numeric))
     place = next(alike, len(filled) - 1)
+    last_number = max(k for k, here in enumerate(numeric) if here)
     while place > 0:
         row = fields_of(lines[filled[place - 1]], divider)
-        if len(row) != width or not any(is_number(word, decimal) for word in row):
+        short = last_number < len(row) < width  # without its last fields, which hold no numbers
+        if not (len(row) == width or short) or not any(is_number(word, decimal) for word in row):
             break
         place -= 1
     return filled[place]

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, unit_in
-from pipelines.importers.text_layout import BLANKS, Layout, is_comment, layout
+from pipelines.importers.text_layout import BLANKS, Layout, filled_lines, is_comment, layout
+from pipelines.importers.thousands import without_thousands
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
 
@@ -22,13 +23,14 @@ _MORE = "\0more"
 MOST_COLUMNS = 10_000
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
 _OPEN = re.compile(r'(?:^|[,;\t|]) *"[^"]*$')
+_FEW_BYTES, _MOSTLY = 16, 0.9
 _MOST_LINES = 10
 """Line breaks of a quoted field, at most: beyond them the quote is a sign such as that of inches."""
 _FORTRAN = re.compile(r"^\s*[+-]?\d*\.?\d+[dD][+-]?\d+\s*$")
 
 
 def decoded(data: bytes, where: str) -> tuple[str, str]:
-    """The text of a file and its encoding: UTF-8, UTF-16 with a byte-order mark, or Windows-1252.
+    """The text of a file and its encoding: UTF-8, UTF-16 with or without a byte-order mark, or Windows-1252.
 
     Raises
     ------
@@ -36,7 +38,7 @@ def decoded(data: bytes, where: str) -> tuple[str, str]:
         It has none of these encodings.
     """
     marked = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-    for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
+    for encoding in ("utf-16",) if marked else _wide(data) or ("utf-8-sig", "cp1252"):
         try:
             text = data.decode(encoding)
         except UnicodeDecodeError:
@@ -46,24 +48,38 @@ def decoded(data: bytes, where: str) -> tuple[str, str]:
     raise DataRejected(f"{where}: neither text (UTF-8) nor a known format of recordings; export it as CSV")
 
 
+def _wide(data: bytes) -> tuple[str, ...]:
+    """UTF-16 without a byte-order mark, as some programs save it: numbers have a zero in every other byte."""
+    head = data[:4000]
+    if len(head) < _FEW_BYTES or len(data) % 2:
+        return ()
+    zeros = [head[start::2].count(0) / len(head[start::2]) for start in (0, 1)]
+    if min(zeros) > 0.0 or max(zeros) < _MOSTLY:
+        return ()
+    return ("utf-16-le",) if zeros[1] > zeros[0] else ("utf-16-be",)
+
+
 def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     """The columns of a text, named as there ("1", "2", … without a header), and its detected layout."""
-    lines = logical_lines(text)
+    lines, grouped = without_thousands(logical_lines(text))
     found = layout(lines)
     if found is None:
         raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
     labels = _labels(found, where)
-    body = [line for line in lines[found.first :] if not is_comment(line)]
+    body = [lines[k] for k in filled_lines(lines, found.first)]
     table = _parsed(body, found, labels, where)
     units = {label: unit for label, unit in zip(labels, found.units, strict=False) if unit} or {
         label: unit for label in labels if (unit := unit_in(label))
     }
     units = {label: unit.strip("[]() ") for label, unit in units.items()}
-    return Content(table, _remarks(found, lines, encoding), units)
+    remarks = _remarks(found, lines, encoding)
+    return Content(table, (*remarks, grouped) if grouped else remarks, units)
 
 
 def logical_lines(text: str) -> list[str]:
     """The rows of a text: a line break inside a quoted field is a part of the field, as in RFC 4180."""
+    if '"' not in text:
+        return text.splitlines()
     rows: list[str] = []
     waiting: list[str] = []  # lines from one that opens a field with a quote and does not close it
     for line in text.splitlines():

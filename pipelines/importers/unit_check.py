@@ -16,6 +16,12 @@ GRAVITY = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2, "mg": 1e3}
 VOLTS_PER_G = (1e-3, 20.0)
 """Sensitivities of analog accelerometers: shock sensors to seismic ones."""
 _MOST = 200_000
+_BITS = (8, 10, 12, 14, 16, 18, 20, 24, 32)
+_STEADY = 0.1
+"""Half-width of the middle half of the norms over their median, below which it is the norm of gravity."""
+_END, _OFTEN, _SELDOM = 1 / 16, 0.03, 0.005
+"""Share of the range at its ends and to either side of its middle; share of the samples in each end, and in the middle: an axis
+without force lies at both ends if its sign was lost, and in the middle if the converter's zero is there."""
 
 
 def size_of(output: NDArray[np.float64]) -> float:
@@ -26,6 +32,30 @@ def size_of(output: NDArray[np.float64]) -> float:
 def looks_like(size: float) -> str:
     """The unit without a sensitivity in which gravity has this size, within a factor of two; empty if there is none."""
     return next((unit for unit, one in GRAVITY.items() if LIKELY[0] < size / one < LIKELY[1]), "")
+
+
+def unsigned_bits(output: NDArray[np.float64]) -> int:
+    """Bits of signed words that were read as unsigned in a record of counts (n, 3): −1 reads as 65535; 0 if there are none.
+
+    Shown by the norm: it is that of gravity only after 2^bits is subtracted from the upper half of the numbers.
+    """
+    x = output[:: max(1, len(output) // _MOST)]
+    if not len(x) or np.any(x < 0.0) or np.any(x != np.rint(x)):
+        return 0
+    bits = next((b for b in _BITS if x.max() < 2.0**b), 0)
+    if not bits or not np.any(x >= 2.0 ** (bits - 1)):
+        return 0
+    whole = 2.0**bits
+    ends = np.mean(x < _END * whole), np.mean(x >= (1.0 - _END) * whole)
+    if min(ends) < _OFTEN or np.mean(np.abs(x - 0.5 * whole) < _END * whole) > _SELDOM:
+        return 0
+    return bits if _scatter(np.where(x >= 0.5 * whole, x - whole, x)) < _STEADY else 0
+
+
+def _scatter(x: NDArray[np.float64]) -> float:
+    """Half-width of the middle half of the norms of samples (n, 3) over their median."""
+    low, middle, high = np.quantile(np.linalg.norm(x, axis=1), (0.25, 0.5, 0.75))
+    return float(0.5 * (high - low) / middle) if middle > 0.0 else np.inf
 
 
 def refuse_other_unit(output: NDArray[np.float64], claimed: str, where: str) -> tuple[str, ...]:
@@ -67,6 +97,13 @@ def refuse_other_unit(output: NDArray[np.float64], claimed: str, where: str) -> 
 
 def _counts(output: NDArray[np.float64], size: float, close: str, where: str) -> tuple[str, ...]:
     whole = bool(np.all(output[:1000] == np.rint(output[:1000])))
+    bits = unsigned_bits(output)
+    if bits:
+        half = 2 ** (bits - 1)
+        raise DataRejected(
+            f"{where}: signed words of {bits} bits were read without their sign: with {2 * half} subtracted from the values of "
+            f"{half} and above the norm is steady, as gravity is, and without it is not; subtract {2 * half} from these values"
+        )
     if close and not whole:
         raise DataRejected(
             f"{where}: the norm of the output is {size:.5g} and its values are not whole numbers, counts are needed if its "

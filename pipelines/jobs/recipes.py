@@ -84,6 +84,19 @@ def resolved(file: RecipeFile, source: str, folder: Path | None = None, line: Li
         raise explain(problem, source, RecipeFile) from None
 
 
+def refuse_unusable_poses(recipe: Recipe, source: str) -> None:
+    """Refuse poses that span too little for a fit, and verification in a direction of the fit.
+
+    Raises
+    ------
+    RecipeInvalid
+        The axis or the poses, and what is needed.
+    """
+    if recipe.tumbles:
+        _refuse_flat_plan(recipe.poses, recipe.span_min_g)
+        _refuse_coincidence(recipe.poses, recipe.verification, source)
+
+
 def units_of(name: str = MAIN_JOB) -> list[str]:
     """The units that a recipe names, whatever its model is."""
     text, source, _ = _recipe_text(name)

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 WARM = 5.0
 """K over which a temperature must move for its own offset of the bias to be part of the point of expansion."""
 
+_ONE_POSE = 0.15
+"""Largest change of the outputs over their norm of a sensor that was not turned: bias over temperature, an uneven shelf."""
+
 _FAR = 8.0
 """Robust standard deviations beyond which a dwell takes no part in finding the point of expansion."""
 
@@ -89,7 +92,11 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
     unknowns = {"six": 6, "nine": 9}[shape] + (3 if warm else 0)
     if warm and int(kept.sum()) <= unknowns + _SPARE:
         warm = False
-    fit = _fitted(readings, unit, kept, shape, warm=warm)
+    try:
+        fit = _fitted(readings, unit, kept, shape, warm=warm)
+    except NotIdentified:
+        refuse_one_pose(readings.output[unit, kept])
+        raise
     for _ in range(_ROUNDS):
         if int(kept.sum()) < unknowns + _SPARE:
             break
@@ -102,6 +109,20 @@ def expansion(readings: Readings, unit: int, *, shape: Shape = "nine") -> Ellips
             break
         kept &= ~far
     return fit
+
+
+def refuse_one_pose(output: Array) -> None:
+    """Refuse dwells that all have one direction: further poses are no remedy for the record of a chamber or a shelf.
+
+    For dwells that a fit could not use: counts of a converter with its zero far away change little beside their norm, too.
+    """
+    spans = np.ptp(output, axis=0)
+    if len(output) > 1 and float(np.linalg.norm(spans)) < _ONE_POSE * float(np.median(np.linalg.norm(output, axis=1))):
+        raise NotIdentified(
+            "fit: the sensor was not turned: all dwells have one direction, in which the norm of gravity shows neither scale nor "
+            "misalignment; turn it; or judge its bias and what drives it: import the record again with --face FACE (+x, -x … "
+            "-z, the face that is up) --local-g M/S2, and with --blocks 60 where it is one long rest"
+        )
 
 
 def _refuse_quiet(output: Array) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import asynccontextmanager
 from importlib import import_module
 from pkgutil import iter_modules
@@ -14,6 +15,7 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from inertial.errors import InertialError
 from pipelines.workbench.pages import Workbench, page
 from pipelines.workbench.security import Guard
+from pipelines.workbench.services import lots
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.lots import Stale
 from pipelines.workbench.state import PageState
@@ -39,6 +41,8 @@ def create_app(settings: Settings) -> ASGIApp:
         del app
         yield
         bench.jobs.close()
+        if settings.pause_lots:
+            await asyncio.to_thread(lots.pause_all, settings)
 
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, lifespan=life)
     app.state.workbench = bench

@@ -10,6 +10,7 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from urllib.parse import parse_qsl, urlsplit
 
 from fastapi import Body, Request
 from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -70,6 +71,12 @@ def workbench_of(request: Request) -> Workbench:
 def state_of(request: Request, kind: type[State]) -> tuple[State, list[str]]:
     """The state of an address, and messages on invalid parts."""
     return kind.parse(request.query_params.multi_items())
+
+
+def state_at(body: Mapping[str, Any], kind: type[State]) -> State:
+    """The state of the page that sent a form: its ``address``."""
+    query = urlsplit(str(body.get("address", ""))).query
+    return kind.parse(parse_qsl(query, keep_blank_values=True))[0]
 
 
 def page(

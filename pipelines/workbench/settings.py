@@ -20,7 +20,9 @@ class Settings:
     """A workbench of an archive.
 
     archive : its address · folder : of files of dwells, models, uploads and the state of jobs and lots
+    pause_lots : whether lots are paused when the server ends
     host, port : interface to listen on · names : further host names
+    stations : files of the stations that lots are measured on; empty for the simulated one
     token : allows a browser to change data · tls : whether it uses HTTPS · proxied : whether a proxy encrypts
     """
 
@@ -32,8 +34,14 @@ class Settings:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
     tls: bool = False
     proxied: bool = False
-    station: Path | None = None
+    stations: tuple[Path, ...] = ()
     workers: int = 2
+    pause_lots: bool = False
+
+    @property
+    def station(self) -> Path | None:
+        """The first station; None for the built-in simulated one."""
+        return self.stations[0] if self.stations else None
 
     @property
     def local(self) -> bool:

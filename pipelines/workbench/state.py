@@ -225,15 +225,21 @@ class ModelsPage(PageState):
 
 
 class PlanPage(PageState):
-    """A recipe: visible effects and station time."""
+    """A recipe: visible effects and station time.
+
+    pose : poses at other angles than in the recipe, ``NAME=OUTER,INNER`` · edit : the pose whose angles are in the form
+    """
 
     PATH: ClassVar[str] = "/plan"
     recipe: Text = "production"
     effects: Texts = ()
+    pose: Texts = ()
+    edit: Text = ""
 
     def words(self) -> list[str]:
         """The plan."""
-        return ["plan", self.recipe, *(["--effects", ",".join(self.effects)] if self.effects else [])]
+        words = ["plan", self.recipe, *(["--effects", ",".join(self.effects)] if self.effects else [])]
+        return words + [word for text in self.pose for word in ("--pose", text)]
 
 
 class StationPage(PageState):
@@ -266,11 +272,14 @@ class AuditPage(PageState):
 
 
 class OperatorPage(PageState):
-    """Lots on the station."""
+    """Lots on the stations.
+
+    lot : id of a lot; empty for the one under way · station : name of a station; empty for the first
+    """
 
     PATH: ClassVar[str] = "/operator"
     lot: Text = ""
-    slots: Annotated[int, Field(ge=1, le=64)] = 8
+    station: Text = ""
 
 
 PAGES: tuple[type[PageState], ...] = (

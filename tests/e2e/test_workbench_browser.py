@@ -1,5 +1,6 @@
 """The workbench in a real browser: pages that are drawn, a hidden effect found, names that stay names, a server that dies."""
 
+import json
 import os
 import signal
 import urllib.parse
@@ -10,14 +11,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from browser import Served, chromium, served, tab, until
-from capture_double import small_run
+from browser import Served, Tab, chromium, served, tab, until
+from capture_double import recipe_file, small_run
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from inertial import poses
 from inertial.frames import force_from_angles
 from pipelines.cli import app
+from pipelines.jobs.recipes import load_recipe
 
 SCRIPT = "<img src=x onerror=window.ran=1>"
 LONG = "L" * 64
@@ -171,6 +173,68 @@ def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
         assert one.outside == []
     assert list((bench.archive / "whatif").glob("*.json"))
     assert not (bench.archive / "releases").exists()
+
+
+def floors_of(one: Tab) -> dict[str, float]:
+    """Smallest detected size of every visible effect on the page of a plan, µg."""
+    found = one.page.evaluate(
+        "() => [...document.querySelectorAll('tr[data-effect]')].map((e) => [e.dataset.effect, e.dataset.floor])"
+    )
+    return {effect: float(floor) for effect, floor in found if floor}
+
+
+def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_written(
+    bench: Served, browser: Any, pictures: Path
+) -> None:
+    recipe = recipe_file(bench.folder)
+    with tab(browser, bench.address) as one:
+        one.open("/plan?" + urllib.parse.urlencode({"recipe": recipe}))
+        as_it_stands = floors_of(one)
+        place = one.page.locator("[data-name=sphere]")
+        place.scroll_into_view_if_needed()
+        start, end = one.page.evaluate(
+            """() => { const e = document.querySelector('[data-name=sphere]'), t = e._fullData.find((d) => d.customdata);
+            const r = e.getBoundingClientRect(), x = e._fullLayout.xaxis, y = e._fullLayout.yaxis;
+            const at = (a, b) => [r.left + x._offset + x.l2p(a), r.top + y._offset + y.l2p(b)];
+            return [at(t.x[7], t.y[7]), at(0.6, 0.3)]; }"""
+        )
+        one.page.mouse.move(*start)
+        one.page.mouse.down()
+        one.page.mouse.move(*end, steps=4)
+        one.page.mouse.up()
+        until(lambda: "pose=" in one.href, "the dropped pose is in the address")
+        until(lambda: one.page.locator("tr[data-effect]").count() > 0, "the plan is computed anew")
+        one.ready()
+        moved = urllib.parse.parse_qs(urllib.parse.urlsplit(one.href).query)["pose"]
+        assert len(moved) == 1
+        floors = floors_of(one)
+        changed = [
+            name for name in as_it_stands if name in floors and abs(floors[name] / as_it_stands[name] - 1.0) > 1e-3
+        ]
+        assert len(changed) > 5
+        done = CliRunner().invoke(app, ["plan", recipe, "--json", "--pose", moved[0], "--archive", str(bench.archive)])
+        told = {row["effect"]: row["floor_size_ug"] for row in json.loads(done.stdout)["effects"] if row["seen"]}
+        assert floors == pytest.approx(told, rel=1e-6)
+        one.page.select_option("select[name=name]", "p2")
+        one.page.fill("input[name=outer]", "75.5")
+        one.page.fill("input[name=inner]", "-20")
+        one.press("text=Move the pose")
+        until(lambda: "p2" in urllib.parse.unquote(one.href), "the second move is in the address")
+        one.sees("tr[data-effect]")
+        one.ready()
+        assert one.findings() == []
+        one.shot(pictures, "plan")
+        one.page.fill("input[name=name]", "moved")
+        one.press("text=Write >> nth=-1")
+        one.sees("text=is written")
+        written = {
+            pose.name: (pose.outer_deg, pose.inner_deg) for pose in load_recipe(str(bench.folder / "moved.toml")).poses
+        }
+        assert written["p2"] == (75.5, -20.0)
+        assert {f"{name}={o:g},{i:g}" for name, (o, i) in written.items()} >= {*moved, "p2=75.5,-20"}
+        one.press("[data-back] >> nth=0")
+        until(lambda: one.page.locator("[data-back]").count() == 1, "the first move is taken back")
+        assert one.errors == [] == one.outside
 
 
 def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, browser: Any) -> None:

@@ -1,6 +1,7 @@
 """Long stories in a real browser: the demonstration's hidden effect, and an operator's lot with a fault, from two stations."""
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -10,6 +11,11 @@ from typing import Any
 import pytest
 from browser import ROOT, chromium, served, tab, until
 from capture_double import recipe_file, small_run
+from served_station import modbus_station, station_file
+from served_station import served as served_station
+from small_station import lot_of
+
+from stations.safety.folder import read_log
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
@@ -134,3 +140,68 @@ def test_a_lot_without_a_fault_ends_with_its_results_before_unloading(tmp_path: 
         one.press("text=Run")
         until(lambda: one.page.locator("h1").inner_text().startswith("small-"), "the run is shown")
         assert one.outside == [] == one.errors
+
+
+SHORT = (
+    ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'),
+    ("temperatures_C = [0.0, 50.0]", "temperatures_C = [23.0]\nsoak_min_s = 1.0\nallow_short_soak = true"),
+    ("settle_s = 2.0", "settle_s = 0.2"),
+    ("static_record_s = 30.0", "static_record_s = 0.0"),
+    ('poses = "nine"', 'poses = "six"'),
+    ('limits = "consumer"', 'limits = "line-quick.limits.toml"'),
+    (', "bias_temperature", "scale_temperature"', ""),
+)
+
+
+def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_station(
+    tmp_path: Path, browser: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    shutil.copy(ROOT / "deploy" / "recipes" / "line-quick.limits.toml", folder)
+    recipe = recipe_file(folder, *SHORT)
+    with served_station(lot_of(2)) as port:
+        config = modbus_station(port, limits={"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0})
+        hardware = station_file(tmp_path, config)
+        with served(tmp_path / "archive", folder, hardware, ROOT / "stations" / "simulated.toml") as server:
+            with tab(browser, server.address) as one:
+                one.open("/operator")
+                assert one.page.locator(".tabs a").count() == 2
+                assert (
+                    one.page.locator("input[name=fault]").count() == 0
+                )  # faults for practice are for simulated stations
+                one.page.select_option("select[name=recipe]", recipe)
+                one.page.fill("#slot-0", "U000")
+                one.page.fill("#slot-1", "U001")
+                one.press("text=Start the lot")
+                one.sees(".question")
+                one.press("[data-answer='go']")
+                until(lambda: len(list(tmp_path.glob("archive/captures/*/[0-9]*/record.json"))) >= 2, "two records")
+                one.press("text=Pause")
+                one.sees("[data-phase=paused]")
+                assert read_log(tmp_path / "state")[-1]["event"] == "left_safe"
+                one.press(".tabs a >> nth=1")
+                until(lambda: "station=simulated" in one.href, "the second station")
+                one.page.select_option("select[name=recipe]", recipe)
+                one.page.fill("#slot-0", "B1")
+                one.press("text=Start the lot")
+                one.sees(".question")
+                one.shot(tmp_path, "two-stations")
+            kept = {path: path.read_bytes() for path in tmp_path.glob("archive/captures/*/[0-9]*/record.json")}
+            with tab(browser, server.address) as again:  # the browser was closed, and is opened again
+                again.open("/operator")
+                again.sees("[data-phase=paused]")
+                again.press("text=Continue this lot")  # the units are seated: it goes on without a question
+                until(
+                    lambda: "remove the units" in again.page.inner_text("main"),
+                    "the results are there before unloading",
+                )
+                assert {path: path.read_bytes() for path in kept} == kept
+                assert again.page.locator(".tabs a").nth(1).inner_text().endswith("Your turn")
+                assert again.errors == [] == again.outside
+                again.press("[data-answer='go']")
+                again.sees("[data-phase=done]")
+                again.open("/operator?station=simulated")
+                again.press("[data-answer='stop']")
+                again.sees("[data-phase=stopped]")

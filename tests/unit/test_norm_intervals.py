@@ -50,7 +50,7 @@ def test_the_error_of_the_bias_of_a_record_is_that_of_a_simulation(rng: np.rando
     rows = np.column_stack([-direction, -(direction**2)])
     own = _Solved(rows, whiten.T @ np.zeros(n), 1.0, whiten)
     own.chi2 = 1e9  # the variance is known
-    stated = np.sqrt(own.of_record((0, 1, 2), direction, slow, np.ones(n), np.eye(3), 10**9))
+    stated = np.sqrt(own.of_record((0, 1, 2), direction, slow, np.ones(n), np.eye(3), 10**9, own.gain))
     root = np.linalg.cholesky(slow)
     drawn = np.einsum("ij,kja->kia", root, rng.standard_normal((4000, n, 3)))
     noise = np.einsum("kia,ia->ki", drawn, direction) + white * rng.standard_normal((4000, n))

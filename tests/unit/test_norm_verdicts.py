@@ -169,3 +169,10 @@ def test_a_class_names_the_effect_that_its_parameters_are_of() -> None:
     assert _parameters_of(group, effects) == "warm_up: tau = 7200 s"
     assert _parameters_of({**group, "nonlinear": {}, "nonlinear_of": None}, effects) == ""
     assert _parameters_of({**group, "effects": ["warm_up"]}, effects) == "tau = 7200 s"
+
+
+def test_a_memory_that_was_at_rest_has_no_column_for_its_state() -> None:
+    """`diagnose` of one recording in 40 with a drift after switching on ended in a traceback."""
+    document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2000.0), 96_005_004).dwells)
+    assert document["adequate"] is False
+    assert any("warm_up" in group["effects"] for group in document["classes"])

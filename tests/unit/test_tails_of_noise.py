@@ -67,6 +67,15 @@ def test_a_dwell_twelve_deviations_off_in_normal_noise_is_named(dwells, monkeypa
     assert hits >= 0.95 * runs
 
 
+def test_a_lot_s_many_dwells_show_that_its_noise_has_no_tails_and_one_seven_deviations_off_is_named(monkeypatch):
+    rng, runs, hits = np.random.default_rng([11, 576]), 12, 0
+    for _ in range(runs):
+        values, way = noise(0.0, 576, rng), rng.standard_normal(3)
+        values[5] += 7.0 * way / np.linalg.norm(way)
+        hits += 5 in named(values, monkeypatch)
+    assert hits >= 11
+
+
 def test_two_bad_dwells_do_not_pass_for_the_tails_of_each_other(monkeypatch):
     values = noise(0.0, 576, np.random.default_rng(9))
     values[5], values[80] = [20.0, -15.0, 20.0], [0.0, 25.0, -20.0]

@@ -2,16 +2,21 @@
 
 import json
 import os
+import subprocess
+import sys
 import time
+from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from capture_double import recipe_file
 
 from pipelines.archive import Archive
 from pipelines.jobs.model_files import read_model
 from pipelines.workbench.services import jobs as job_table
-from pipelines.workbench.services import lots, models, sources, uploads
+from pipelines.workbench.services import lots, models, sources, stations, uploads
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.work import done_in_process
 from pipelines.workbench.settings import Settings
@@ -120,6 +125,75 @@ def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: Settings, un
     with pytest.raises(TumblelineError):
         lots.start(settings, "production", units, list(range(len(units))), [], 0)
     assert not (settings.folder / "lots").exists()
+
+
+@pytest.fixture
+def two(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Settings:
+    """Two stations; the processes that would measure are not started."""
+    monkeypatch.setattr(lots.subprocess, "Popen", lambda *_, **__: None)
+    text = (files("stations") / "simulated.toml").read_text(encoding="utf-8")
+    settings.folder.mkdir(parents=True)
+    places = [settings.folder / f"{name}.station" for name in ("left", "right")]
+    for place in places:
+        place.write_text(text.replace('name = "simulated"', f'name = "{place.stem}"'))
+    return replace(settings, stations=tuple(places))
+
+
+def test_each_station_measures_one_lot_at_a_time(two: Settings) -> None:
+    left, right = stations.stations(two)
+    assert (left.name, right.name, left.simulated) == ("left", "right", True)
+    recipe = recipe_file(two.folder)
+    first = lots.start(two, recipe, ["A1"], [0], [], 0, left.file)
+    second = lots.start(two, recipe, ["B1"], [2], [], 0, right.file)
+    assert (first.station, second.station) == (left.address, right.address)
+    assert first.id != second.id
+    with pytest.raises(WrongUse, match=f"has lot {first.id}"):
+        lots.start(two, recipe, ["A2"], [0], [], 0, left.file)
+    assert lots.start(two, recipe, ["A1"], [0], [], 0, left.file).id == first.id  # the same lot, pressed twice
+    assert stations.named(stations.stations(two), "") == left
+    with pytest.raises(WrongUse, match="middle"):
+        stations.named(stations.stations(two), "middle")
+
+
+def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: Settings) -> None:
+    left = stations.stations(two)[0]
+    recipe = recipe_file(two.folder)
+    lot = lots.start(two, recipe, ["A1"], [0], [], 0, left.file)
+    lots.pause(two, lot.id)
+    place = two.folder / "lots" / lot.id
+    lots.write_state(place, {"phase": "stopped", "since": time.time()})  # what its process writes after the safe state
+    paused = lots.state_of(place)
+    assert (paused.phase, paused.ended, paused.idle) == ("paused", False, True)
+    with pytest.raises(WrongUse, match="paused"):
+        lots.start(two, recipe, ["A2"], [0], [], 0, left.file)
+    assert lots.again(two, lot.id).phase == "starting"
+    lots.pause(two, lot.id)
+    lots.write_state(place, {"phase": "stopped", "since": time.time()})
+    assert lots.stop(two, lot.id).phase == "stopped"
+    assert lots.start(two, recipe, ["A2"], [0], [], 0, left.file).phase == "starting"
+    with pytest.raises(lots.Stale):
+        lots.pause(two, lot.id)
+
+
+def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: Settings) -> None:
+    script = (
+        "import json, pathlib, signal, sys, time\n"
+        "place = pathlib.Path(sys.argv[1]) / 'state.json'\n"
+        "def safe(*_):\n"
+        "    place.write_text(json.dumps({**json.loads(place.read_text()), 'phase': 'stopped'}))\n"
+        "    sys.exit(0)\n"
+        "signal.signal(signal.SIGTERM, safe)\n"
+        "print('ready', flush=True)\n"
+        "time.sleep(60)\n"
+    )
+    place = settings.folder / "lots" / "abc"
+    with subprocess.Popen([sys.executable, "-c", script, str(place)], stdout=subprocess.PIPE) as process:
+        name = lot_of(settings, pid=process.pid, phase="measuring")
+        assert process.stdout.readline() == b"ready\n"
+        assert lots.pause_all(settings) == []
+        assert process.wait(10.0) == 0
+    assert lots.state_of(place).phase == "paused"
+    assert name == "abc"
 
 
 def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Settings) -> None:

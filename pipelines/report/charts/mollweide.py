@@ -40,6 +40,18 @@ def project(direction: Array) -> tuple[Array, Array]:
     return 2.0 * longitude / np.pi * np.cos(angle), np.sin(angle)
 
 
+def direction_at(x: float, y: float) -> Array | None:
+    """The direction at a place of the map, (3,) in g; None outside of the sphere's outline."""
+    if abs(y) > 1.0:
+        return None
+    angle = np.arcsin(y)
+    longitude = np.pi * x / (2.0 * np.cos(angle)) if np.cos(angle) > 0.0 else 0.0
+    if abs(longitude) > np.pi:
+        return None
+    latitude = np.arcsin(np.clip((2.0 * angle + np.sin(2.0 * angle)) / np.pi, -1.0, 1.0))
+    return np.array([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
+
+
 def sphere(title: str, traces: tuple[Trace, ...]) -> Plot:
     """A plot of traces that were projected, on the outline with its meridians, the equator and the axes' letters."""
     return Plot(

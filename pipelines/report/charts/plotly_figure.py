@@ -22,6 +22,7 @@ MANY = 4000
 DAY_MS = 86_400_000.0
 GAP_X, GAP_PX = 0.06, 74.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
+DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
 NARROW_D = 20.0  # closer dates get a margin
 LONGEST = 28
 CONFIG = {
@@ -83,7 +84,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         (plot.y, along, (top - height, top), across),
     ):
         layout[name.replace("x", "xaxis").replace("y", "yaxis")] = {
-            **_axis(axis, plot),
+            **_axis(axis, plot, name[0]),
             "domain": [max(domain[0], 0.0), min(domain[1], 1.0)],
             "anchor": other,
         }
@@ -98,13 +99,17 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         })  # fmt: skip
 
 
-def _axis(axis: PlotAxis, plot: Plot) -> dict[str, Any]:
+def _axis(axis: PlotAxis, plot: Plot, side: str) -> dict[str, Any]:
     title = {"text": _safe(axis.label), "standoff": 8, "font": {"size": 13}}
     out: dict[str, Any] = {"title": title, "automargin": True, "zeroline": False}
     if plot.sphere:
         return {"visible": False, "range": [axis.low, axis.high], "fixedrange": True}
     if axis.log:
         out |= {"type": "log", "exponentformat": "power"}
+        values = np.concatenate([getattr(t, side) for t in plot.traces]) if plot.traces else np.zeros(0)
+        positive = values[values > 0.0]
+        if positive.size and positive.max() > DECADES * positive.min():
+            out["dtick"] = 1  # labels at the decades; between them the digits alone are no numbers
     if axis.dates:
         out["type"] = "date"
         days = np.concatenate([trace.x for trace in plot.traces]) if plot.traces else np.zeros(0)

@@ -8,6 +8,8 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.audit.finding import WHO
+from pipelines.report.diagnosis import chance
+from pipelines.stages.figures import FIGURES
 from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import requests
 from pipelines.workbench.state import AuditPage
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Audit", 70, "/audit"
-DUE = 60
+DUE, FINDINGS = 60, 40
 
 
 @router.get("/audit")
@@ -32,16 +34,38 @@ def audit(request: Request) -> Response:
         found, job = bench.jobs.result("audit", content), bench.jobs.known("audit", content)
     except TumblelineError as problem:
         problems = [*problems, str(problem)]
-    return page(request, "audit.html", state, problems, found=found, job=job, who=WHO, most_due=DUE)
+    return page(
+        request, "audit.html", state, problems, empty=not bench.archive.run_ids(), found=found, job=job, who=WHO, most_due=DUE,
+        most_findings=FINDINGS, chance=chance, labels={name: kind.label for name, kind in FIGURES.items()},
+    )  # fmt: skip
 
 
 @router.get("/audit/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
     found = _found(workbench_of(request), request)
-    if name not in found["charts"]:
+    if name == "evidence":
+        state, _ = state_of(request, AuditPage)
+        chart = found["evidence"].get(state.finding)
+    else:
+        chart = found["charts"].get(name)
+    if chart is None:
         raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
-    return figure(found["charts"][name], ending, f"audit-{name}")
+    return figure(chart, ending, f"audit-{name}")
+
+
+@router.get("/audit/due.csv")
+def due(request: Request) -> Response:
+    """The units that are overdue or due soon."""
+    listed = _found(workbench_of(request), request)["document"]["due"]
+    return table_csv([*listed["overdue"], *listed["soon"]], "due")
+
+
+@router.get("/audit/capability.csv")
+def capability(request: Request) -> Response:
+    """Capability of every figure with a limit, by kind of device."""
+    rows = _found(workbench_of(request), request)["document"]["population"]["capability"]
+    return table_csv([_flat(row) for row in rows], "capability")
 
 
 @router.get("/audit/findings.csv")
@@ -50,6 +74,14 @@ def findings(request: Request) -> Response:
     found = _found(workbench_of(request), request)
     keys = ("who", "kind", "subject", "message")
     return table_csv([{key: row[key] for key in keys} for row in found["document"]["findings"]], "findings")
+
+
+def _flat(row: dict[str, Any]) -> dict[str, Any]:
+    """Value and ends of an interval in columns of their own."""
+    out: dict[str, Any] = {}
+    for key, value in row.items():
+        out |= {f"{key}_{side}": value[side] for side in value} if isinstance(value, dict) else {key: value}
+    return out
 
 
 def _found(bench: Workbench, request: Request) -> dict[str, Any]:

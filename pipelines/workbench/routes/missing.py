@@ -17,6 +17,7 @@ from pipelines.workbench.pages import (
     page_part,
     part_of,
     run_table,
+    state_at,
     state_of,
     table_csv,
     workbench_of,
@@ -87,7 +88,7 @@ def candidates(request: Request) -> Response:
 def save(request: Request, body: RequestBody) -> JSONResponse:
     """Save the model of a page's address as the next version of a model file."""
     bench = workbench_of(request)
-    state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))
+    state = state_at(body, MissingPage)
     found = _diagnosed(bench, state)
     if found is None:
         raise WrongUse("model: the diagnosis of this model is not finished; wait until it is done, then save")
@@ -103,19 +104,13 @@ def formula(body: RequestBody) -> JSONResponse:
     """The address of the page with a formula added to the model; an invalid formula is refused."""
     from inertial import effects
 
-    state, _ = MissingPage.parse(_pairs(str(body.get("address", ""))))
+    state = state_at(body, MissingPage)
     written = str(body.get("formula", "")).strip()
     with effects.additions_forgotten():
         (name,) = use_written_formulas([written], "formula")
     kept = tuple(text for text in state.formula if text.partition("=")[0].strip().lower() != name)
     added = tuple(one for one in state.added if one != name)
     return JSONResponse({"address": state.address(formula=(*kept, written), added=(*added, name))})
-
-
-def _pairs(address: str) -> list[tuple[str, str]]:
-    from urllib.parse import parse_qsl, urlsplit
-
-    return parse_qsl(urlsplit(address).query, keep_blank_values=True)
 
 
 def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:

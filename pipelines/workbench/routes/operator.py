@@ -6,10 +6,9 @@ from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
 from pipelines.workbench.pages import RequestBody, page, state_of, workbench_of
-from pipelines.workbench.services import lots, requests
+from pipelines.workbench.services import lots, requests, stations
 from pipelines.workbench.state import OperatorPage
 from schemas.errors import WrongUse, did_you_mean
-from schemas.station import load_station
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Operator", 40, "/operator"
@@ -27,13 +26,15 @@ def operator(request: Request) -> Response:
     """The newest lot as tiles, or the one of the address; seats to scan if no lot is running."""
     bench = workbench_of(request)
     state, problems = state_of(request, OperatorPage)
-    found = lots.lots(bench.settings)
+    found, known = lots.lots(bench.settings), stations.stations(bench.settings)
     chosen = next((one for one in found if one.id == state.lot), None)
-    shown = chosen or next((one for one in found if not one.ended), None)
-    config = load_station(bench.settings.station)
+    station = stations.at(known, chosen.station) if chosen else stations.named(known, state.station)
+    here = [one for one in found if one.station == station.address]
+    shown = chosen or next((one for one in here if not one.ended), None)
     return page(
-        request, "operator.html", state, problems, lot=shown, lots=found, remedies=REMEDIES, station=config,
-        recipes=requests.recipes(bench.settings), slots=config.devices.slots.count,
+        request, "operator.html", state, problems, lot=shown, lots=here, remedies=REMEDIES, station=station,
+        busy={one.name: next((lot.phase for lot in found if lot.station == one.address and not lot.ended), "") for one in known},
+        stations=known, recipes=requests.recipes(bench.settings), slots=station.slots,
     )  # fmt: skip
 
 
@@ -55,7 +56,8 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
     repeat = str(body.get("repeat", "0") or "0")
     if not repeat.isdecimal() or len(repeat) > 6:
         raise WrongUse(f"lot: repeat '{repeat[:20]}', a whole number from 0 on is needed; correct it")
-    lot = lots.start(bench.settings, recipe, list(filled.values()), list(filled), faults, int(repeat))
+    station = stations.named(stations.stations(bench.settings), str(body.get("station", "")))
+    lot = lots.start(bench.settings, recipe, list(filled.values()), list(filled), faults, int(repeat), station.file)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
 
 
@@ -73,6 +75,13 @@ def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
 def stop(request: Request, name: str) -> JSONResponse:
     """Stop the lot's process after the safe state."""
     lots.stop(workbench_of(request).settings, name)
+    return JSONResponse({"address": OperatorPage(lot=name).address()})
+
+
+@router.post("/operator/{name}/pause")
+def pause(request: Request, name: str) -> JSONResponse:
+    """Stop the lot's process after the safe state; the lot keeps the station."""
+    lots.pause(workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=name).address()})
 
 

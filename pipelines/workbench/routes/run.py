@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.certificates.statement import stated
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import page, run_table, saved_as, state_of, table_csv, workbench_of
-from pipelines.workbench.state import RunPage
+from pipelines.workbench.services import requests
+from pipelines.workbench.state import MissingPage, RunPage
 from schemas.errors import TumblelineError, WrongUse
+
+if TYPE_CHECKING:
+    from pipelines.workbench.pages import Workbench
+    from pipelines.workbench.results import Diagnosed
 
 router = APIRouter()
 SHOWN = (
@@ -43,8 +50,18 @@ def run(request: Request) -> Response:
     events = rows_of(run_table(bench, found.id, "events")) if "events" in tables else []
     return page(
         request, "run.html", state, problems, run=found, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
-        certificates=certificates, events=events,
+        certificates=certificates, events=events, adequate=_adequate(bench, found.id),
     )  # fmt: skip
+
+
+def _adequate(bench: Workbench, run: str) -> bool | None:
+    """The verdict on the run's own model, where it was judged since the server began; None else."""
+    try:
+        _, content = requests.diagnosis(bench.settings, MissingPage(source=run))
+    except TumblelineError:
+        return None
+    found: Diagnosed | None = bench.jobs.result("diagnose", content)
+    return None if found is None else found.document["adequate"]
 
 
 @router.get("/run/table/{name}.csv")

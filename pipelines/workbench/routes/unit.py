@@ -12,7 +12,7 @@ from pipelines.audit.calibrations import day_of
 from pipelines.certificates import Ledger
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import figure, page, page_part, part_of, run_table, state_of, workbench_of
+from pipelines.workbench.pages import figure, page, page_part, part_of, run_table, state_of, table_csv, workbench_of
 from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage
@@ -44,7 +44,7 @@ def unit(request: Request) -> Response:
     tables = run.tables()
     own = {
         name: _own(bench, state, name)
-        for name in ("grades", "figures", "coefficients", "noise", "verdicts")
+        for name in ("grades", "figures", "coefficients", "noise", "verdicts", "uncertainties")
         if name in tables
     }
     grade = next(iter(own.get("grades", [])), None)
@@ -60,6 +60,13 @@ def unit(request: Request) -> Response:
         labels={name: kind.label for name, kind in FIGURES.items()},
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
+
+
+@router.get("/unit/budget.csv")
+def budget(request: Request) -> Response:
+    """The contributions to the uncertainty of every coefficient of a unit."""
+    state, _ = state_of(request, UnitPage)
+    return table_csv(_own(workbench_of(request), state, "budget"), f"{state.unit}-budget")
 
 
 @router.get("/unit/figure/{name}.{ending}")

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,11 @@ if TYPE_CHECKING:
 
 FOLDER = "lots"
 ENDED = frozenset({"done", "stopped", "failed", "interrupted"})
+PAUSED = "paused"
+"""Name of the phase, and of the file that keeps it: a lot that was stopped to be continued holds its station."""
 NEWEST = 12
+SAFE_S, POLL_S = 20.0, 0.1
+"""Time that the processes of lots are given at the end of the server, and how often they are looked at, s."""
 
 
 class Stale(TumblelineError):
@@ -38,7 +42,8 @@ class Stale(TumblelineError):
 class LotState:
     """The state of a lot.
 
-    phase : ``starting``, ``measuring``, ``asks``, ``computing``, ``done``, ``stopped``, ``failed``, ``interrupted``
+    phase : ``starting``, ``measuring``, ``asks``, ``computing``, ``done``, ``paused``, ``stopped``, ``failed``,
+    ``interrupted`` · station : file of the station; empty for the simulated one
     number : of the question, which its answer names · slots : slot, serial, result
     """
 
@@ -56,18 +61,24 @@ class LotState:
     run: str = ""
     since: float = 0.0
     pid: int = 0
-    extra: dict[str, Any] = field(default_factory=dict[str, Any])
+    station: str = ""
 
     @property
     def ended(self) -> bool:
         """Whether the lot has ended."""
         return self.phase in ENDED
 
+    @property
+    def idle(self) -> bool:
+        """Whether no process works on the lot: it has ended, or is paused."""
+        return self.ended or self.phase == PAUSED
+
 
 def start(
-    settings: Settings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int
-) -> LotState:
-    """A new lot, or the continuation of the same stopped lot.
+    settings: Settings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int,
+    station: Path | None = None,
+) -> LotState:  # fmt: skip
+    """A new lot on a station, or the continuation of the same stopped lot.
 
     Raises
     ------
@@ -82,7 +93,7 @@ def start(
         raise WrongUse(f"lot: serial '{twice}' is in two slots, each unit has one; scan the slots again")
     lot_request = Request(
         recipe=recipe,
-        station=settings.station,
+        station=station,
         units=tuple(units),
         slots=tuple(slots),
         repeat=repeat,
@@ -96,15 +107,17 @@ def start(
     }
     name = digest(content)[:12]
     for other in lots(settings):
-        if not other.ended and other.id != name:
+        if not other.ended and other.id != name and other.station == str(station or ""):
             raise WrongUse(
-                f"lot: the station measures lot {other.id}, one lot at a time is possible; finish or stop that one first"
+                f"lot: the station has lot {other.id} ({other.phase}), one lot at a time is possible; finish or stop that one "
+                "first"
             )
     place = settings.folder / FOLDER / name
     known = state_of(place) if (place / "state.json").is_file() else None
-    if known is not None and not known.ended:
+    if known is not None and not known.idle:
         return known
     place.mkdir(parents=True, exist_ok=True)
+    (place / PAUSED).unlink(missing_ok=True)
     for old in place.glob("answer-*.json"):
         old.unlink()
     files.publish(place / "request.json", files.json_bytes(content), "lot", files.ELSEWHERE)
@@ -120,8 +133,15 @@ def start(
 def again(settings: Settings, name: str) -> LotState:
     """The continuation of a stopped lot."""
     request = files.read_json(place_of(settings, name) / "request.json")
+    station = Path(request["station"]) if request["station"] else None
     return start(
-        settings, request["recipe"], request["units"], request["slots"], request["faults"], int(request["repeat"])
+        settings,
+        request["recipe"],
+        request["units"],
+        request["slots"],
+        request["faults"],
+        int(request["repeat"]),
+        station,
     )
 
 
@@ -149,9 +169,37 @@ def answer(settings: Settings, name: str, number: int, reply: str) -> LotState:
 def stop(settings: Settings, name: str) -> LotState:
     """Stop a lot's process after the safe state; it continues when it is started again."""
     place = place_of(settings, name)
+    (place / PAUSED).unlink(missing_ok=True)
+    return _ended(place)
+
+
+def pause(settings: Settings, name: str) -> LotState:
+    """Stop a lot's process after the safe state; the lot keeps its station until it is continued or stopped."""
+    place = place_of(settings, name)
+    if state_of(place).ended:
+        raise Stale(f"lot {name}: it has ended already; the page shows its present state")
+    (place / PAUSED).touch()
+    return _ended(place)
+
+
+def pause_all(settings: Settings) -> list[str]:
+    """Pause every lot that is measured, and wait until its process has made the station safe; the lots that did not in time."""
+    working = [one for one in lots(settings) if not one.idle]
+    for one in working:
+        pause(settings, one.id)
+    end = time.monotonic() + SAFE_S
+    while time.monotonic() < end and any(_alive(one.pid) for one in working if one.pid):
+        time.sleep(POLL_S)
+    return [one.id for one in working if one.pid and _alive(one.pid)]
+
+
+def _ended(place: Path) -> LotState:
+    """Ask the process of a lot to end; the page shows the phase that it writes at its end."""
     now = state_of(place)
-    if not now.ended and now.pid and _alive(now.pid):
+    if not now.idle and now.pid and _alive(now.pid):
         os.kill(now.pid, signal.SIGTERM)
+    else:
+        write_state(place, files.read_json(place / "state.json"))  # open pages look again
     return state_of(place)
 
 
@@ -180,6 +228,8 @@ def state_of(place: Path) -> LotState:
     lost = (pid and not _alive(pid)) or (not pid and time.time() - float(now.get("since", 0.0)) > 60.0)
     if phase not in ENDED and lost:
         phase = "interrupted"
+    if phase == "stopped" and (place / PAUSED).is_file():
+        phase = PAUSED
     results = {int(slot): str(text) for slot, text in now.get("results", [])}
     seats = [(int(slot), str(serial)) for slot, serial in request["seats"]]
     return LotState(
@@ -187,7 +237,7 @@ def state_of(place: Path) -> LotState:
         slots=tuple((slot, serial, results.get(slot, "")) for slot, serial in seats),
         done=int(now.get("done", 0)), total=int(now.get("total", 0)), note=str(now.get("note", "")),
         question=now.get("question"), number=int(now.get("number", 0)), problem=str(now.get("problem", "")),
-        run=str(now.get("run", "")), since=float(now.get("since", 0.0)), pid=pid,
+        run=str(now.get("run", "")), since=float(now.get("since", 0.0)), pid=pid, station=str(request.get("station") or ""),
     )  # fmt: skip
 
 

@@ -87,6 +87,7 @@ def plan(settings: Settings, page: PlanPage) -> Request:
         "archive": settings.archive,
         "recipe": page.recipe,
         "effects": list(page.effects),
+        "pose": list(page.pose),
         "station": station,
         "stamp": stamp,
     }
@@ -95,28 +96,21 @@ def plan(settings: Settings, page: PlanPage) -> Request:
 
 def what_if(settings: Settings, page: ModelsPage) -> Request:
     """The lots of the archive with a model beside their own."""
-    from pipelines.archive import Archive
-
     place = models.place_of(settings, page.model)
-    runs = Archive(settings.archive).root / "runs"
     return f"what if {place.stem}", {
         "archive": settings.archive,
         "model": str(place),
         "stamp": place.stat().st_mtime_ns,
-        "runs": runs.stat().st_mtime_ns if isinstance(runs, Path) and runs.is_dir() else 0,
+        "runs": sources.archive_stamp(settings),
     }
 
 
 def audit(settings: Settings, page: AuditPage) -> Request:
     """The audit of the archive."""
-    from pipelines.archive import Archive
-
-    place = Archive(settings.archive).root / "runs"
-    stamp = place.stat().st_mtime_ns if isinstance(place, Path) and place.is_dir() else 0
     names = ("since", "until", "device", "station")
     return "audit of the archive", {
         "archive": settings.archive,
-        "stamp": stamp,
+        "stamp": sources.archive_stamp(settings),
         **{name: getattr(page, name) for name in names},
     }
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive
+from pipelines.archive.keys import digest
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
@@ -62,6 +64,19 @@ def stamp(settings: Settings, name: str) -> str:
         return f"{about.st_size}.{about.st_mtime_ns}"
     run = Archive(settings.archive).run(name)
     return run.id if "dwells" not in run.tables() else str(run.manifest("dwells")["sha256"])
+
+
+def archive_stamp(settings: Settings) -> str:
+    """A value that changes when a run is added, or a stage of one is finished, in a folder or in an object store."""
+    archive = Archive(settings.archive)
+    runs = archive.root / "runs"
+    if not isinstance(runs, Path):
+        return digest({"runs": [[one.id, list(one.stages)] for one in archive.runs()]})[:20]
+    if not runs.is_dir():
+        return ""
+    with os.scandir(runs) as found:
+        times = [place.stat().st_mtime_ns for place in found]
+    return f"{len(times)}.{max(times, default=0)}"
 
 
 def twin(settings: Settings, name: str) -> str:

@@ -61,12 +61,55 @@ async function paint(place, library) {
   const style = getComputedStyle(document.documentElement), { data, layout, config } = place.figure;
   await library.react(place, themed(data, style), dressed(layout, style), config);
   place.dataset.drawn = place.dataset.figure;
+  if (place.dataset.drag && !place.dataset.listens) dragged(place);
   if (!place.dataset.pick || place.dataset.listens) return;
   place.dataset.listens = "yes";
   place.on("plotly_click", (event) => {
     const chosen = event.points.map((point) => point.customdata).find((one) => typeof one === "string");
     if (chosen) place.dispatchEvent(new CustomEvent("pick", { bubbles: true, detail: { name: place.dataset.pick, value: chosen, part: place.dataset.swapPart } }));
   });
+}
+
+// A point that carries a name is taken along by the pointer; where it is dropped goes out as an event, in the plot's coordinates.
+const NEAR_PX = 14;
+function dragged(place) {
+  place.dataset.listens = "yes";
+  const axes = () => { const l = place._fullLayout, r = place.getBoundingClientRect(); return { x: l.xaxis, y: l.yaxis, left: r.left + l.xaxis._offset, top: r.top + l.yaxis._offset }; };
+  const nearest = (event) => {
+    const a = axes();
+    let best = null, least = NEAR_PX;
+    for (const trace of place._fullData) for (let k = 0; trace.customdata && k < trace.customdata.length; k += 1) {
+      const far = Math.hypot(a.left + a.x.l2p(trace.x[k]) - event.clientX, a.top + a.y.l2p(trace.y[k]) - event.clientY);
+      if (far < least) { least = far; best = trace.customdata[k]; }
+    }
+    return best;
+  };
+  let name = null, ring = null;
+  place.addEventListener("pointermove", (event) => {
+    if (name === null) { place.classList.toggle("grab", nearest(event) !== null); return; }
+    const r = place.getBoundingClientRect();
+    ring.style.translate = `${event.clientX - r.left}px ${event.clientY - r.top}px`;
+  }, { capture: true });
+  place.addEventListener("pointerdown", (event) => {
+    name = event.button === 0 ? nearest(event) : null;
+    if (name === null) return;
+    event.preventDefault(); event.stopPropagation();
+    place.setPointerCapture(event.pointerId);
+    ring = Object.assign(document.createElement("span"), { className: "ring", textContent: name });
+    const r = place.getBoundingClientRect();
+    ring.style.translate = `${event.clientX - r.left}px ${event.clientY - r.top}px`;
+    place.append(ring);
+  }, { capture: true });
+  place.addEventListener("mousedown", (event) => { if (name !== null) { event.preventDefault(); event.stopPropagation(); } }, { capture: true });
+  const end = (event) => {
+    if (name === null) return;
+    const a = axes(), taken = name;
+    ring.remove(); name = null;
+    if (event.type !== "pointerup") return;
+    place.dispatchEvent(new CustomEvent("moved", { bubbles: true, detail: { what: place.dataset.drag, name: taken, x: a.x.p2l(event.clientX - a.left), y: a.y.p2l(event.clientY - a.top) } }));
+  };
+  place.addEventListener("pointerup", end, { capture: true });
+  place.addEventListener("pointercancel", end, { capture: true });
 }
 
 const seen = new IntersectionObserver((entries) => {

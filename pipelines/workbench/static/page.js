@@ -12,7 +12,7 @@ document.addEventListener("pointerdown", () => {
   });
 }, { capture: true });
 
-export async function go(address, { push = true, part = "", focus = false, renews = false } = {}) {
+export async function go(address, { push = true, part = "", focus = false, renews = false, keep = false } = {}) {
   if (renews && going && !going.renews) return;  // a page that the user requested is loading
   going?.abort();
   const now = (going = Object.assign(new AbortController(), { renews }));
@@ -49,7 +49,7 @@ export async function go(address, { push = true, part = "", focus = false, renew
     for (const link of document.querySelectorAll(".bar nav a")) {
       if (link.pathname === location.pathname) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
     }
-    if (push) window.scrollTo(0, 0);
+    if (push && !keep) window.scrollTo(0, 0);
     if (focus) main().focus({ preventScroll: true });
   }
   arrived();
@@ -201,7 +201,10 @@ document.addEventListener("submit", async (event) => {
   if (button) button.disabled = true;
   try {
     const found = await change(form.dataset.post, Object.fromEntries(new FormData(form)));
-    if (found.address) go(found.address); else say(done, found.done ?? "");
+    if (found.address) { go(found.address, { keep: location.pathname === new URL(found.address, location.href).pathname }); } else {
+      say(done, found.done ?? "");
+      if (found.shown && done) done.append(" ", Object.assign(document.createElement("a"), { href: found.shown, textContent: "Show it" }));
+    }
   } catch (failed) {
     say(problem, failed.message);
   }
@@ -217,6 +220,7 @@ function addressOf(form) {
 
 document.addEventListener("change", (event) => {
   if (event.target.matches("[data-submit]")) event.target.form.requestSubmit();
+  if (event.target.matches("[data-angles]")) for (const name of ["outer", "inner"]) event.target.form.elements[name].value = Number(event.target.selectedOptions[0].dataset[name]);
   if (event.target.matches("[data-file]") && event.target.files.length) send(event.target.closest("[data-drop]"), event.target.files[0]);
 });
 
@@ -233,6 +237,17 @@ document.addEventListener("pick", (event) => {
   const address = new URL(location.href);
   address.searchParams.set(event.detail.name, event.detail.value);
   go(address.pathname + address.search, { part: event.detail.part });
+});
+
+document.addEventListener("moved", async (event) => {
+  const { what, name, x, y } = event.detail, form = document.querySelector(`form[data-post$="/${CSS.escape(what)}"]`);
+  const problem = form.querySelector(".problem");
+  say(problem, "");
+  try {
+    go((await change(form.dataset.post, { address: form.elements.address.value, name, x, y })).address, { keep: true });
+  } catch (failed) {
+    say(problem, failed.message);
+  }
 });
 
 // --- files -------------------------------------------------------------------------------------------------------------

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from pipelines.planning.plan import PlanContext
     from pipelines.report.charts.chart import Role
+    from schemas.recipe import Recipe
+    from schemas.station import StationConfig
 
 KINDS = (
     ("dwell", "fit", "accent", "circle"),
@@ -24,16 +26,21 @@ KINDS = (
 )
 
 
-def planned(request: Mapping[str, Any]) -> dict[str, Any]:
-    """``document`` and ``charts`` of a plan."""
+def recipe_of(request: Mapping[str, Any]) -> tuple[Recipe, Recipe, StationConfig]:
+    """The recipe of a request as it stands, the same with its moved poses, and the station.
+
+    Raises
+    ------
+    TumblelineError
+        The recipe, its model or a pose is invalid.
+    """
     from pathlib import Path
 
     from pipelines.archive import Archive
     from pipelines.jobs.model_files import chosen_effects, use_formulas
+    from pipelines.jobs.moved_poses import moves_of, with_moved_poses
     from pipelines.jobs.recipes import load_recipe
     from pipelines.jobs.releases import line_model
-    from pipelines.planning.plan import plan, plan_context
-    from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
 
     config = load_station(Path(request["station"]) if request["station"] else None)
@@ -48,12 +55,40 @@ def planned(request: Mapping[str, Any]) -> dict[str, Any]:
 
     recipe = load_recipe(request["recipe"], line)
     recipe = recipe.model_copy(update={"effects": list(chosen)}) if chosen else recipe
-    context = plan_context(recipe, config, noise_of(recipe, recipe.device, None, None))
+    return recipe, with_moved_poses(recipe, moves_of(request["pose"], "plan"), "plan"), config
+
+
+def planned(request: Mapping[str, Any]) -> dict[str, Any]:
+    """``document``, ``charts`` and ``poses`` of a plan; ``before``: the effects of the recipe by name, where poses are moved."""
+    from pipelines.planning.plan import plan, plan_context
+    from pipelines.planning.preset_noise import noise_of
+
+    as_it_stands, recipe, config = recipe_of(request)
+    noise = noise_of(recipe, recipe.device, None, None)
+    context = plan_context(recipe, config, noise)
+    before = plan(plan_context(as_it_stands, config, noise)) if request["pose"] else None
     return {
         "document": plan(context),
+        "before": None if before is None else {row["effect"]: row for row in before["effects"]},
+        "minutes_before": None if before is None else before["minutes"]["total"],
         "charts": {"sphere": sphere_chart(context), "temperature": temperature_chart(context)},
-        "poses": [[pose.name, pose.outer_deg, pose.inner_deg] for pose in recipe.poses],
+        "poses": pose_rows(as_it_stands, recipe),
     }
+
+
+def pose_rows(as_it_stands: Recipe, recipe: Recipe) -> list[dict[str, Any]]:
+    """Every pose once: name, use, angles in degrees, and whether it was moved."""
+    rows: dict[str, dict[str, Any]] = {}
+    for use in ("poses", "verification"):
+        for old, new in zip(getattr(as_it_stands, use), getattr(recipe, use), strict=True):
+            rows[new.name] = {
+                "name": new.name,
+                "use": "fit" if use == "poses" else "verification",
+                "outer_deg": new.outer_deg,
+                "inner_deg": new.inner_deg,
+                "moved": (old.outer_deg, old.inner_deg) != (new.outer_deg, new.inner_deg),
+            }
+    return list(rows.values())
 
 
 def sphere_chart(context: PlanContext) -> Chart:
@@ -67,7 +102,9 @@ def sphere_chart(context: PlanContext) -> Chart:
             outer, inner = np.radians(np.array(list(named))).T
             x, y = project(force_from_angles(outer, inner))
             texts = tuple(f"{name}: outer {o:g}°, inner {i:g}°" for (o, i), name in named.items())
-            traces.append(Trace(label, x, y, role=cast("Role", role), symbol=cast("Any", symbol), size=10, texts=texts))
+            style = cast("Role", role), cast("Any", symbol)
+            picks = tuple(named.values())
+            traces.append(Trace(label, x, y, role=style[0], symbol=style[1], size=11, texts=texts, picks=picks))
     if len(first) > 1:
         outer, inner = np.radians(np.array([(a.step.pose.outer_deg, a.step.pose.inner_deg) for a in first])).T
         x, y = project(force_from_angles(outer, inner))

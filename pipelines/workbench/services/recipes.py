@@ -1,0 +1,98 @@
+"""Poses of a plan moved on its page, and the recipe that results, written as a file of the workbench's folder."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import effects
+from inertial.frames import angles_from_force
+from pipelines.archive import files
+from pipelines.jobs.moved_poses import moves_of
+from pipelines.jobs.recipe_text import limits_from, recipe_text
+from pipelines.jobs.recipes import folder_of, sample_names
+from pipelines.report.charts.mollweide import direction_at
+from pipelines.workbench.services import requests
+from pipelines.workbench.views.planned import recipe_of
+from schemas.errors import WrongUse
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.state import PlanPage
+    from schemas.recipe import Recipe
+
+NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,60}")
+STEP_DEG = 0.5
+"""Grid of the angles of a pose that is dragged: a hand aims no better on a map of 400 pixels."""
+
+
+def dragged_to(settings: Settings, page: PlanPage, name: str, x: float, y: float) -> PlanPage:
+    """The page with a pose at a place of the map; of the two ways to turn there, the one nearer to the pose's present angles.
+
+    Raises
+    ------
+    WrongUse
+        The place is outside of the sphere.
+    """
+    force = direction_at(x, y)
+    if force is None:
+        raise WrongUse(f"plan: pose {shown(name, 40)} was dropped outside of the sphere; drop it inside the outline")
+    outer, inner = (float(value) for value in np.degrees(angles_from_force(force)))
+    recipe = _recipe(settings, page)
+    present = next((p for p in (*recipe.poses, *recipe.verification) if p.name == name), None)
+    other = (-outer, inner - 180.0 if inner > 0.0 else inner + 180.0)
+    ways = [(outer, inner), other]
+    if present is not None:
+        ways.sort(key=lambda way: abs(way[0] - present.outer_deg) + abs(way[1] - present.inner_deg))
+    return turned_to(settings, page, name, *(STEP_DEG * round(angle / STEP_DEG) for angle in ways[0]))
+
+
+def turned_to(settings: Settings, page: PlanPage, name: str, outer: float, inner: float) -> PlanPage:
+    """The page with a pose at these angles, degrees; checked as a recipe is.
+
+    Raises
+    ------
+    TumblelineError
+        There is no such pose, or the recipe cannot work with it there.
+    """
+    kept = tuple(text for text in page.pose if next(iter(moves_of([text], "plan"))) != name)
+    new = page.model_copy(update={"pose": (*kept, f"{name}={outer:g},{inner:g}"), "edit": name})
+    _recipe(settings, new)
+    return new
+
+
+def save(settings: Settings, page: PlanPage, name: str) -> Path:
+    """The file of the recipe with its moved poses; an existing file is not replaced.
+
+    Raises
+    ------
+    WrongUse
+        The name is unusable or taken, or the model has formulas, which a recipe file cannot hold.
+    """
+    if not NAME.fullmatch(name) or name in sample_names():
+        raise WrongUse(
+            f"recipe: name '{shown(name, 60)}', lower-case letters, digits, ., - and _ are needed, and no built-in name; "
+            "write one such as my-line"
+        )
+    place = settings.folder / f"{name}.toml"
+    if place.exists():
+        raise WrongUse(f"recipe: {place} exists already; choose another name")
+    recipe = _recipe(settings, page)
+    limits = limits_from(recipe.limits, folder_of(page.recipe), settings.folder)
+    moved = ", ".join(page.pose) or "no pose is moved"
+    new = recipe.model_copy(update={"name": name, "limits": limits})
+    text = recipe_text(new, [f"Recipe {page.recipe} with poses moved by hand (outer, inner in degrees): {moved}."])
+    settings.folder.mkdir(parents=True, exist_ok=True)
+    files.publish(place, text.encode(), "recipe", files.ELSEWHERE)
+    return place
+
+
+def _recipe(settings: Settings, page: PlanPage) -> Recipe:
+    """The recipe of a page; formulas of its model are known during the call only."""
+    with effects.additions_forgotten():
+        return recipe_of(requests.plan(settings, page)[1])[1]

@@ -1,0 +1,163 @@
+"""The workbench on unusual archives: findings of an audit, 500 units, broken runs, scripts in every name, and an empty one."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+import pytest
+from browser import Served, Tab, chromium, served, tab, until
+
+from benchmarks.generated_archive import write_archive
+from benchmarks.workbench import tables, write
+from pipelines.archive import Archive
+
+SCRIPT = "<img src=x onerror=window.ran=1>"
+MARKUP = '"><script>window.ran=1</script>'
+LONG = "S" * 64
+MANY = [f"MANY{k:04d}" for k in range(500)]
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    top = tmp_path_factory.mktemp("bench")
+    write_archive(top / "archive", 24, years=3.0, seed=7, workers=1)
+    archive = Archive(top / "archive")
+    write(archive, 1, MANY, tables(MANY, 24, 1))
+    for number, spoiled in ((2, "run.json"), (3, "grades.parquet"), (4, "dwells.json")):
+        run = write(archive, number, ["B1", "B2"], tables(["B1", "B2"], 24, number))
+        place = top / "archive" / "runs" / run / spoiled
+        place.write_bytes(place.read_bytes()[:40])
+        place.parent.rename(place.parent.with_name(f"broken-{number}"))
+    named(archive)
+    with served(top / "archive", top / "bench") as one:
+        yield one
+
+
+def named(archive: Archive) -> None:
+    """A run in which every name is a script: recipe, device, station, person, and a serial of 64 characters."""
+    made = tables([SCRIPT, LONG], 24, 5)
+    made["grades"]["reasons"] = MARKUP
+    made["dwells"]["pose"] = SCRIPT
+    lot = {"device": MARKUP, "units": [{"serial": name, "slot": k} for k, name in enumerate((SCRIPT, LONG))], "seed": 1}
+    about = {"recipe": {"name": SCRIPT, "effects": ["bias", SCRIPT]}, "lot": lot, "station": {"name": SCRIPT}}
+    run = archive.open_run("named", about, {"number": 5})
+    for stage, names in (("reduce", ("dwells",)), ("fit", ("residuals", "coefficients")), ("grade", ("grades",))):
+        run.save(stage, f"named-{stage}", {name: made[name] for name in names}, {"inputs": {}})
+    run.seal()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+def run_of(bench: Served, start: str) -> str:
+    return next(path.name for path in (bench.archive / "runs").iterdir() if path.name.startswith(start))
+
+
+def main_text(one: Tab) -> str:
+    return str(one.page.inner_text("main"))
+
+
+def test_a_finding_of_the_audit_leads_to_the_values_that_it_is_drawn_from(bench: Served, browser: Any) -> None:
+    with tab(browser, bench.address) as one:
+        one.open("/audit?until=2024-01-10")
+        one.sees("details.finding")
+        with_chart = one.page.locator("details.finding:has([data-figure])")
+        assert with_chart.count() >= 1
+        chosen = with_chart.first
+        name = chosen.get_attribute("data-finding")
+        chosen.locator("summary").click()
+        until(lambda: chosen.locator("[data-drawn]").count() == 1, "the evidence is drawn")
+        chosen.locator("text=Address of this finding").click()
+        one.ready()
+        opened = one.page.locator("details.finding[open]")
+        assert opened.count() == 1  # the address opens this finding, and no other
+        assert opened.get_attribute("data-finding") == name
+        until(lambda: opened.locator("[data-drawn]").count() == 1, "the evidence is drawn from its address")
+        numbers = one.page.request.get(
+            bench.address + str(opened.locator("a:text-is('CSV')").get_attribute("href"))
+        ).text()
+        subject = str(name).split(".")[1]
+        drawn = one.page.evaluate(
+            "() => document.querySelector('details.finding[open] [data-drawn]')._fullData.reduce((n, t) => n + t.x.length, 0)"
+        )
+        assert drawn >= 2
+        assert len(numbers.splitlines()) > 2
+        assert subject in main_text(one)
+        opened.locator("table a").first.click()  # the run of the finding
+        until(lambda: "/run?" in one.href, "the run of the finding is opened")
+        one.ready()
+        assert one.findings() == []
+        assert one.errors == [] == one.outside
+
+
+def test_five_hundred_units_are_listed_found_and_paged(bench: Served, browser: Any) -> None:
+    with tab(browser, bench.address) as one:
+        one.open("/units?search=MANY0&outcome=pass")
+        assert one.page.locator("[aria-label=Calibrations] tbody tr").count() == 50
+        one.press("text=Next")
+        until(lambda: "page=2" in one.href, "the second page")
+        one.ready()
+        assert "51 to 100 of" in main_text(one)
+        one.open(f"/run?run={run_of(bench, 'bench-')}")
+        assert one.page.locator("[aria-label=Units] tbody tr").count() == 500
+        one.press(f"text={MANY[321]}")
+        until(lambda: one.page.locator("h1").inner_text().startswith(MANY[321]), "the unit is shown")
+        one.ready()
+        assert one.errors == []
+
+
+def test_a_broken_run_is_said_in_a_sentence_and_the_others_are_shown(bench: Served, browser: Any) -> None:
+    with tab(browser, bench.address) as one:
+        one.open("/units")
+        assert one.page.locator("[aria-label=Calibrations] tbody tr").count() == 50
+        for number in (2, 3, 4):
+            for path in ("/run", "/unit", "/station"):
+                answer = one.page.request.get(
+                    f"{bench.address}{path}?run=broken-{number}", headers={"accept": "text/html"}
+                )
+                assert answer.status in {200, 422}, (path, number, answer.text()[:2000])
+                assert "defect of the program" not in answer.text(), (path, number)
+            answer = one.page.request.get(
+                f"{bench.address}/missing?source=broken-{number}", headers={"accept": "text/html"}
+            )
+            assert answer.status in {200, 422}
+            assert "defect of the program" not in answer.text()
+
+
+def test_no_script_in_any_name_runs(bench: Served, browser: Any) -> None:
+    run = run_of(bench, "named-")
+    pages = [
+        "/units?" + urlencode({"search": MARKUP, "station": SCRIPT}), f"/run?run={run}", f"/unit?run={run}",
+        "/unit?" + urlencode({"run": run, "unit": SCRIPT, "against": "pose"}), f"/unit?run={run}&unit={LONG}",
+        f"/missing?source={run}", f"/station?run={run}", "/audit?" + urlencode({"device": MARKUP}),
+        "/plan?" + urlencode({"recipe": SCRIPT, "pose": MARKUP}), "/models?" + urlencode({"model": MARKUP}),
+        "/upload?" + urlencode({"file": SCRIPT}), "/operator?" + urlencode({"station": ""}), "/" + SCRIPT,
+    ]  # fmt: skip
+    with tab(browser, bench.address) as one:
+        for path in pages:
+            one.page.goto(bench.address + path)
+            until(lambda: one.page.evaluate("() => Boolean(document.body.dataset.ready)"), path)
+            if path.startswith(("/unit?", "/run?")):
+                one.ready()
+                assert one.page.evaluate("() => document.documentElement.scrollWidth - innerWidth") <= 0, path
+            assert one.page.evaluate("() => window.ran") is None, path
+            assert one.page.locator("main img, main script").count() == 0, path
+        assert one.outside == []
+
+
+def test_an_empty_archive_says_on_every_page_what_to_do(tmp_path: Path, browser: Any) -> None:
+    pages = {
+        "/units": "Measure a lot", "/missing": "Choose a source", "/models": "No model file yet", "/upload": "Drop a file",
+        "/operator": "Scan each unit", "/station": "Measure a lot", "/audit": "Measure a lot", "/run": "tumbleline run",
+    }  # fmt: skip
+    with served(tmp_path / "archive", tmp_path / "bench") as server, tab(browser, server.address) as one:
+        for path, words in pages.items():
+            one.page.goto(server.address + path)
+            until(lambda words=words: words in main_text(one), f"{path} says '{words}'")
+        assert one.outside == []
+    shutil.rmtree(tmp_path / "bench", ignore_errors=True)

@@ -1,0 +1,187 @@
+"""Tables as people have them: separators of thousands, UTF-16 without its mark, minutes of a spreadsheet, rows of a summary,
+words whose sign was lost, sheets of positions, sensors that were not turned. Each was read wrongly or refused without a remedy.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import recordings
+
+from inertial.errors import NotIdentified
+from pipelines.importers import files
+from pipelines.importers.clocks import stamps
+from pipelines.importers.inspection import inspect
+from pipelines.importers.mapping import build
+from pipelines.importers.record import imported
+from pipelines.importers.unit_check import unsigned_bits
+from pipelines.stages.norm_fit import norms_fitted
+from pipelines.tables.norms import refuse_one_pose
+from schemas.errors import DataRejected
+
+COUNTS = [[16005, -416, 650], [-12, 1002, 999], [7, -1024, 16384]] * 10
+PLAIN = {"columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "unit": "A1", "units": {"output": "LSB"}}
+
+
+def read(tmp_path: Path, text: str, encoding: str = "utf-8") -> tuple[pd.DataFrame, tuple[str, ...]]:
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    content, _ = files.read_content(tmp_path / "a.csv")
+    return content.table, tuple(content.remarks)
+
+
+def sheet(form: str, divider: str, rows: list[list[float]], *, quoted: bool = False) -> str:
+    def word(value: float) -> str:
+        text = format(value, form)
+        return f'"{text}"' if quoted else text
+
+    lines = [divider.join([f"{0.01 * k:.2f}", *map(word, row)]) for k, row in enumerate(rows)]
+    return "\n".join([divider.join(["t", "ax", "ay", "az"]), *lines]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "remark"),
+    [
+        (sheet(",", ",", COUNTS, quoted=True), "a comma between thousands"),
+        (sheet(",", ";", COUNTS), "a comma between thousands"),
+        (sheet(",.1f", ";", COUNTS).replace(".", "_").replace(",", ".").replace("_", ","), "a point between thousands"),
+        (sheet(",", ";", COUNTS).replace(",", "'"), "an apostrophe between thousands"),
+        (sheet(",", ";", COUNTS).replace(",", "\N{NARROW NO-BREAK SPACE}").replace(".", ","), "a space between thousands"),
+    ],
+)  # fmt: skip
+def test_thousands_with_a_separator_are_counts(text: str, remark: str, tmp_path: Path) -> None:
+    """16,384 in quotes was read as 16.384 and taken for m/s²."""
+    table, remarks = read(tmp_path, text)
+    np.testing.assert_allclose(table[["ax", "ay", "az"]].to_numpy(dtype=float), COUNTS)
+    np.testing.assert_allclose(table["t"], 0.01 * np.arange(len(COUNTS)))
+    assert remark in "; ".join(remarks)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[9.807, 1.204, -2.113], [9.811, 1.206, 2.113]] * 20,  # three decimals, none below one
+        [[0.123, 1.002, -1.004], [1.123, 1.002, -1.004]] * 20,
+    ],
+)
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_three_decimals_are_no_thousands(rows: list[list[float]], decimal: str, tmp_path: Path) -> None:
+    text = sheet(".3f", ";", rows)
+    text = "\n".join(f"{k}{line[line.index(';') :]}" if k else line for k, line in enumerate(text.splitlines()))
+    table, remarks = read(tmp_path, text.replace(".", decimal))
+    np.testing.assert_allclose(table[["ax", "ay", "az"]].to_numpy(dtype=float), rows)
+    assert not any("thousands" in one for one in remarks)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_utf_16_without_its_mark_is_read(encoding: str, tmp_path: Path) -> None:
+    table, remarks = read(tmp_path, sheet("d", ",", COUNTS), encoding)
+    assert table["ax"].tolist()[:3] == [16005, -12, 7]
+    assert remarks == (f"text in {encoding.upper()}",)
+
+
+def test_rows_without_their_last_fields_do_not_hide_the_header(tmp_path: Path) -> None:
+    table, remarks = read(tmp_path, "t,x,y,note\n0,1,2\n1,1,2,\n2,1,2,\n3,1,2\n4,1,2,\n5,1,2,\n")
+    assert list(table.columns)[:3] == ["t", "x", "y"]
+    assert len(table) == 6
+    assert remarks == ()
+
+
+def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
+    found = stamps(pd.Series(["59:59,50", "59:59,75", "00:00,00", "00:00,25"], name="t"), "a.csv")
+    np.testing.assert_allclose(found, [0.0, 0.25, 0.5, 0.75])
+
+
+def frame(rng: np.random.Generator, **more: object) -> tuple[recordings.Recording, pd.DataFrame]:
+    one = recordings.recording(rng, **more)  # type: ignore[arg-type]
+    return one, recordings.table(one, t=one.time)
+
+
+def test_a_row_of_a_summary_is_left_out_where_gaps_may_be(rng: np.random.Generator) -> None:
+    """The message asked for `--gaps split`, which was given."""
+    _, table = frame(rng)
+    last = pd.DataFrame({"t": ["mean"], "ax": [0.0], "ay": [0.0], "az": [0.0]})
+    table = pd.concat([table.astype(object), last], ignore_index=True)
+    found = imported(table, build(PLAIN | {"gaps": "split"}, "t"), "a.csv")
+    assert found.samples is not None
+    assert len(found.samples) == len(table) - 1
+
+
+def test_rows_that_stand_there_twice_are_remarked_upon(rng: np.random.Generator) -> None:
+    _, table = frame(rng)
+    twice = pd.concat([table.iloc[:501], table.iloc[500:]], ignore_index=True)
+    assert "CHECK THE ROWS: 1 rows" in "; ".join(imported(twice, build(PLAIN, "t"), "a.csv").remarks)
+    assert "CHECK THE ROWS" not in "; ".join(imported(table, build(PLAIN, "t"), "a.csv").remarks)
+
+
+def test_words_that_lost_their_sign_are_refused_with_what_to_subtract(rng: np.random.Generator, tmp_path: Path) -> None:
+    """They were imported, and the fit said NOT ADEQUATE."""
+    _, table = frame(rng, positions=18)
+    wrong = table.assign(**{name: np.round(table[name]) % 65536.0 for name in ("ax", "ay", "az")})
+    with pytest.raises(DataRejected, match=r"signed words of 16 bits .* subtract 65536"):
+        imported(wrong, build(PLAIN, "t"), "a.csv")
+    wrong.to_csv(tmp_path / "a.csv", index=False)
+    assert any("without their sign" in one for one in inspect([tmp_path / "a.csv"]).document["open"])
+
+
+@pytest.mark.parametrize(
+    ("bits", "zero", "per_g"), [(12, 2048, 400), (12, 2048, 2000), (16, 32768, 4000), (10, 512, 100)]
+)
+def test_a_converter_with_its_zero_in_the_middle_lost_no_sign(
+    rng: np.random.Generator, bits: int, zero: int, per_g: int
+) -> None:
+    force = np.repeat(recordings.FACES, 50, axis=0)
+    counts = np.clip(np.round(zero + per_g * force + rng.normal(0.0, 2.0, force.shape)), 0, 2**bits - 1)
+    assert unsigned_bits(counts) == 0
+
+
+def test_a_sheet_of_positions_is_proposed_as_dwells(tmp_path: Path) -> None:
+    """The proposed command asked for the rate of samples."""
+    (tmp_path / "a.csv").write_text("Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
+    found = inspect([tmp_path / "a.csv"]).document
+    assert found["open"] == []
+    assert "dwell=Position" in found["command"]
+    assert found["command"].endswith("--rows dwells")
+
+
+def test_axes_that_were_not_recognised_stand_in_capitals(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,ax\n" + "".join(f"{0.01 * k:.2f},0.{k}\n" for k in range(20)))
+    found = inspect([tmp_path / "a.csv"]).document
+    assert "x=COLUMN,y=COLUMN,z=COLUMN" in found["command"]
+    assert any("needs three axes" in one for one in found["open"])
+
+
+def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Generator) -> None:
+    """Dwells with times that ran back were refused by the diagnosis as a fault of the data."""
+    one = recordings.recording(rng, directions=recordings.FACES, moves=False)
+    table = recordings.table(one, t=one.time)
+    table["part"] = ""
+    for number, (start, stop) in enumerate(one.spans):
+        table.loc[start : stop - 1, "part"] = f"face {number}"
+        table.loc[start : stop - 1, "t"] -= one.time[start]
+    content = PLAIN | {"columns": {**PLAIN["columns"], "dwell": "part"}}  # type: ignore[dict-item]
+    found = imported(table[table["part"] != ""].reset_index(drop=True), build(content, "t"), "a.csv")
+    assert found.dwells is not None
+    assert bool(np.all(np.diff(found.dwells["time_s"]) > 0.0))
+    assert "the clock restarts 5 times" in "; ".join(found.remarks)
+
+
+def test_counts_far_from_zero_are_fitted(rng: np.random.Generator) -> None:
+    """100 counts per g about 2048: the outputs change by a tenth of their norm."""
+    force = rng.standard_normal((30, 3))
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    table = pd.DataFrame(
+        2048.0 + 100.0 * force + rng.normal(0.0, 0.01, force.shape), columns=["out_x", "out_y", "out_z"]
+    )
+    table = table.assign(unit="A", dwell=range(30), time_s=np.arange(30) * 10.0, out_unit="LSB")
+    assert norms_fitted(table, None, ("bias", "scale", "misalignment")).fit.fit.coefficients[0, 0, 0] == pytest.approx(
+        2048.0, abs=0.1
+    )
+
+
+def test_a_sensor_that_was_not_turned_is_told_so_and_what_to_do(rng: np.random.Generator) -> None:
+    """A chamber cycle was told to add poses."""
+    still = np.array([0.1, -0.05, -9.7]) + rng.normal(0.0, 0.05, (30, 3))
+    with pytest.raises(NotIdentified, match=r"was not turned.*--face FACE"):
+        refuse_one_pose(still)
+    refuse_one_pose(np.concatenate([still, -still]))

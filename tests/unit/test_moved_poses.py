@@ -1,0 +1,93 @@
+"""Poses moved in a plan: by hand, by a drag on the map, written as a recipe that reads as the same one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import recipe_file
+
+from inertial.frames import force_from_angles
+from pipelines.jobs.moved_poses import moves_of, with_moved_poses
+from pipelines.jobs.recipes import load_recipe
+from pipelines.report.charts.mollweide import direction_at, project
+from pipelines.workbench.services import recipes
+from pipelines.workbench.settings import Settings
+from pipelines.workbench.state import PlanPage
+from schemas.errors import RecipeInvalid, WrongUse
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    return Settings(archive=str(tmp_path / "archive"), folder=folder, token="t")
+
+
+@pytest.fixture
+def page(settings: Settings) -> PlanPage:
+    return PlanPage(recipe=recipe_file(settings.folder))
+
+
+def force(outer: float, inner: float) -> np.ndarray:
+    return force_from_angles(np.radians(outer), np.radians(inner))
+
+
+def test_a_place_of_the_map_and_its_direction_belong_together() -> None:
+    rng = np.random.default_rng(4)
+    some = rng.normal(size=(200, 3))
+    some /= np.linalg.norm(some, axis=1)[:, None]
+    for direction, x, y in zip(some, *project(some), strict=True):
+        assert direction_at(float(x), float(y)) == pytest.approx(direction, abs=1e-6)
+    assert direction_at(0.0, 1.01) is None
+    assert direction_at(1.9, 0.9) is None
+
+
+def test_a_moved_pose_is_the_only_difference_and_a_verification_pose_moves_in_all_its_repetitions() -> None:
+    recipe = load_recipe("production")
+    moved = with_moved_poses(recipe, moves_of(["p05=45,-90", "v1=20,0.5", "p05=46,-90"], "plan"), "plan")
+    changed = [(a, b) for a, b in zip(recipe.poses, moved.poses, strict=True) if a != b]
+    assert [(b.name, b.outer_deg, b.inner_deg) for _, b in changed] == [("p05", 46.0, -90.0)]
+    assert [p.inner_deg for p in moved.verification if p.name == "v1"] == [0.5] * 3
+    kept = {"poses", "verification"}
+    assert moved.model_dump(exclude=kept) == recipe.model_dump(exclude=kept)
+
+
+@pytest.mark.parametrize("text", ["p05", "p05=45", "p05=45,x", "p05=45,90,1", "p05=400,0", "p05=nan,0"])
+def test_what_is_no_pose_is_refused(text: str) -> None:
+    with pytest.raises(WrongUse, match="pose"):
+        moves_of([text], "plan")
+
+
+def test_moves_that_a_recipe_cannot_have_are_refused() -> None:
+    recipe = load_recipe("production")
+    with pytest.raises(WrongUse, match="no pose 'p99'"):
+        with_moved_poses(recipe, {"p99": (0.0, 0.0)}, "plan")
+    fit = recipe.poses[3]
+    with pytest.raises(RecipeInvalid, match="of the fit"):
+        with_moved_poses(recipe, {"v1": (fit.outer_deg, fit.inner_deg)}, "plan")
+    flat = {pose.name: (90.0, float(k)) for k, pose in enumerate(recipe.poses)}
+    with pytest.raises(RecipeInvalid, match="span"):
+        with_moved_poses(recipe, flat, "plan")
+
+
+def test_a_drag_turns_the_table_the_nearer_way(settings: Settings, page: PlanPage) -> None:
+    for outer, inner in ((45.0, 100.0), (-45.0, 100.0)):
+        near = recipes.turned_to(settings, page, "p3", outer + 4.0, inner + 4.0)
+        x, y = project(force(outer, inner)[None])
+        found = recipes.dragged_to(settings, near, "p3", float(x[0]), float(y[0]))
+        assert found.pose == (f"p3={outer:g},{inner:g}",)
+    with pytest.raises(WrongUse, match="outside"):
+        recipes.dragged_to(settings, page, "p3", 3.0, 0.0)
+
+
+def test_the_written_recipe_reads_as_the_moved_one_and_replaces_nothing(settings: Settings, page: PlanPage) -> None:
+    moved = recipes.turned_to(settings, page, "p3", 33.5, 71.25)
+    place = recipes.save(settings, moved, "mine")
+    read = load_recipe(str(place))
+    wanted = with_moved_poses(load_recipe(page.recipe), {"p3": (33.5, 71.25)}, "plan")
+    assert read.model_dump(exclude={"name"}) == wanted.model_dump(exclude={"name"})
+    before = place.read_bytes()
+    for name in ("mine", "production", "../there", "Big", ""):
+        with pytest.raises(WrongUse):
+            recipes.save(settings, moved, name)
+    assert place.read_bytes() == before
