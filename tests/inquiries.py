@@ -53,7 +53,8 @@ def station_file(folder: Path, kind: str = "cubic_transfer", **figures: float) -
     text = (Path(stations.__file__).parent / "simulated.toml").read_text(encoding="utf-8")
     overrides = ", ".join(f"{key} = {value}" for key, value in QUIET.items())
     hidden = ", ".join(f"{key} = {value}" for key, value in figures.items())
-    text += f'\npreset_overrides = {{{overrides}}}\nhidden = [{{kind = "{kind}", figures = {{{hidden}}}}}]\n'
+    own = f'preset_overrides = {{{overrides}}}\nhidden = [{{kind = "{kind}", figures = {{{hidden}}}}}]\n'
+    text = text.replace("[simulation]\n", f"[simulation]\n{own}")
     path = folder / "station.toml"
     path.write_text(text, encoding="utf-8")
     return path

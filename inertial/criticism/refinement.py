@@ -126,3 +126,70 @@ def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
         best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
         terms[place] = refine(rest, best, rest.noise)
     return terms
+
+
+def settled(model: Model) -> Model:
+    """A model with the nonlinear parameters of its terms at the best fit beside all its other terms, at its own noise.
+
+    A search places each parameter near its grid and at the noise without its term, which is larger: where the residual depends
+    on it weakly, the value would differ between a search and a fit of the resulting model. Parameters with one value per axis
+    stay.
+    """
+    terms = list(model.terms)
+    for place, found in enumerate(model.terms):
+        term = found
+        for parameter in _continuous(model.problem, found):
+            rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+            values, drop = _profile(rest.at(model.noise), model.problem, term, parameter)
+            term = _with_value(term, parameter, float(values[int(np.argmax(drop))]))
+        terms[place] = term
+    return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
+
+
+def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
+    """For each effect the 68 % interval of every continuous nonlinear parameter that all axes share, by its profile.
+
+    Within it the sum of squares rises by less than one variance of the noise above its least value; an interval that ends at a
+    bound of the parameter is open there.
+    """
+    found: dict[str, dict[str, tuple[float, float]]] = {}
+    for place, term in enumerate(model.terms):
+        for parameter in _continuous(model.problem, term):
+            rest = Model(model.problem, [t for k, t in enumerate(model.terms) if k != place], near=model.noise)
+            space = rest.at(model.noise)
+            values, drop = _profile(space, model.problem, term, parameter)
+            inside = values[drop >= drop.max() - space.variance]
+            own = found.setdefault(term.effect.id, {})
+            own[parameter.name] = float(inside.min()), float(inside.max())
+    return found
+
+
+_PLACES = 81
+"""Values over the range of a parameter at which its profile is computed; as many again around the best."""
+
+
+def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> tuple[Array, Array]:
+    """Values of a parameter over its range, closer together around the best and its own, and the reduction of χ² at each."""
+    low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
+    coarse = np.append(
+        np.linspace(low, high, _PLACES), on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
+    )
+
+    def drop(places: Array) -> Array:
+        values = np.array([_off_scale(parameter, float(v)) for v in places])
+        return space.gain(_varied(problem, term, parameter, values)).drop
+
+    first = drop(coarse)
+    centre, cell_ = coarse[int(np.argmax(first))], (high - low) / (_PLACES - 1)
+    fine = np.clip(np.linspace(centre - cell_, centre + cell_, _PLACES), low, high)
+    places = np.concatenate([coarse, fine])
+    values = np.array([_off_scale(parameter, float(v)) for v in places])
+    return values, np.concatenate([first, drop(fine)])
+
+
+def _continuous(problem: Problem, term: Term) -> list[Nonlinear]:
+    """The parameters of a term that are continuous and have one value for all axes."""
+    if isinstance(term.effect, Handling):
+        return []
+    parameters = [p for p in term.effect.parameters(problem.lot.state) if not p.choices]
+    return [p for p in parameters if isinstance(term.keywords.get(p.name), float)]

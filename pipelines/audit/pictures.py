@@ -106,8 +106,10 @@ def due_plot(audit: Audit) -> str:
         ahead = np.bincount(np.floor(months[(months >= 0.0) & (months < 24.0)]).astype(int), minlength=24)
         place.bar(np.arange(24) + 0.5, ahead, width=0.8, color=BLUE)
         place.set_xticks(range(0, 25, 3))
+        place.set_ylim(0.0, max(1.05 * float(ahead.max()), 1.0))
         late = int(np.count_nonzero(months < 0.0))
-        place.set(xlabel=f"months ahead ({number_of(late, 'overdue unit')} not shown)", ylabel="units due")
+        more = f" ({number_of(late, 'overdue unit')} not shown)" if late else ""
+        place.set(xlabel=f"months ahead{more}", ylabel="units due")
         place.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True))
         place.grid(visible=False, axis="x")
         return svg(figure)

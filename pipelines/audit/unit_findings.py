@@ -96,7 +96,7 @@ def _leaving(audit: Audit) -> Iterator[AuditFinding]:
             continue
         days, what, bound, drift = min(leavings, key=lambda one: one[0][0])
         text, others = unit_text(drift.parameter), list(dict.fromkeys(one[3].parameter for one in leavings))
-        moves = f"drifts {drift.slope:+.3g} {text} a year" if np.isfinite(drift.slope) else "drifts like its kind"
+        moves = f"drifts {_signed(drift.slope)} {text} a year" if np.isfinite(drift.slope) else "drifts like its kind"
         message = (
             f"{drift.unit}: {drift.parameter} {moves} and leaves its {what} of {bound:g} {text} "
             f"about {date_or_never(days[0])} ({date_or_never(days[1])} to {date_or_never(days[2])})"
@@ -149,7 +149,7 @@ def _unlike_their_kind(audit: Audit) -> Iterator[AuditFinding]:
             text = unit_text(worst.parameter)
             when = f"{_when(worst)}: give it a shorter interval, or take it out of use"
             message = (
-                f"{worst.unit}: {worst.parameter} drifts {worst.slope:+.3g} {text} a year over "
+                f"{worst.unit}: {worst.parameter} drifts {_signed(worst.slope)} {text} a year over "
                 f"{worst.calibrations} calibrations, {abs(worst.odd):.1f} σ from its kind, and {when}"
             )
             yield AuditFinding("quality", "drifts", worst.unit, message, (worst.unit,), _numbers(worst))
@@ -174,3 +174,9 @@ def _after(drift: UnitDrift) -> str:
 
 def _before(drift: UnitDrift) -> str:
     return date_of(drift.day - 365.25 * drift.years)
+
+
+def _signed(value: float) -> str:
+    """A number with its sign and three significant digits, large ones without an exponent."""
+    text = f"{value:+.3g}"
+    return f"{float(text):+.0f}" if "e+" in text else text

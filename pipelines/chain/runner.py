@@ -60,6 +60,13 @@ def captured_tables(records: Records) -> dict[str, pd.DataFrame]:
     return {**tables, **{name: records.gathered(name) for name in ("readings", "history")}}
 
 
+def decisive(job: Job) -> dict[str, Any]:
+    """What the result of a job depends on; the report only shows it and may be made anew in its place."""
+    code = {stage.name: code_hash(stage.modules) for stage in BY_NAME.values()}
+    about = {key: value for key, value in job.about.items() if key != "station"}
+    return {**about, "code": code}
+
+
 class Runner:
     """The chain for one job in one archive."""
 
@@ -67,9 +74,9 @@ class Runner:
         self, job: Job, archive: Archive, progress: Progress = silent, measure: Measure = from_station
     ) -> None:
         self.job, self.archive, self.progress, self.measure = job, archive, progress, measure
-        name = archive.run_name(job.recipe.name, decisive := self._decisive())
+        name = archive.run_name(job.recipe.name, content := decisive(job))
         self._was_there = (archive.root / "runs" / name / START).is_file()
-        self.run: Run = archive.open_run(job.recipe.name, job.about, decisive)
+        self.run: Run = archive.open_run(job.recipe.name, job.about, content)
 
     def all(self) -> Iterator[Done]:
         """Every stage, in order, as it is done."""
@@ -97,12 +104,6 @@ class Runner:
                     files.sweep(self.run.path)
                     reused = self._report() if name == "report" else self._compute(BY_NAME[name])
         return Done(name, reused, time.perf_counter() - start)
-
-    def _decisive(self) -> dict[str, Any]:
-        """What the result depends on; the report only shows it and may be made anew in its place."""
-        code = {stage.name: code_hash(stage.modules) for stage in BY_NAME.values()}
-        about = {key: value for key, value in self.job.about.items() if key != "station"}
-        return {**about, "code": code}
 
     def _capture(self) -> bool:
         records = self.archive.capture(self.job.capture_id)

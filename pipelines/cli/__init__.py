@@ -21,6 +21,8 @@ from schemas.log_lines import tell
 from schemas.own_files import report_to
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from typer._click import Command, Context
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
@@ -58,9 +60,16 @@ class _OnDemand(TyperCommand):
         from pipelines.cli.candidates import attach
 
         attach(command)
-        more = getattr(module, "EPILOG", ())
-        command.epilog = "\n\n".join([*more, "Examples:", *getattr(module, "EXAMPLES", ())])  # a paragraph each
+        command.epilog = _examples(getattr(module, "EXAMPLES", ()), getattr(module, "EPILOG", ()))
+        of_subcommands: dict[str, tuple[str, ...]] = getattr(module, "EXAMPLES_OF", {})
+        for name, examples in of_subcommands.items():
+            getattr(command, "commands")[name].epilog = _examples(examples)  # noqa: B009 - a command without them has none
         return command
+
+
+def _examples(lines: Sequence[str], before: Sequence[str] = ()) -> str:
+    """The end of a help text: a paragraph for each example, after paragraphs of the command's own."""
+    return "\n\n".join([*before, "Examples:", *lines])
 
 
 class _Commands(TyperGroup):

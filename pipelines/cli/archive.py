@@ -18,6 +18,25 @@ EXAMPLES = (
     "tumbleline archive compact --before 2026-05-01",
     "tumbleline archive backup /mnt/copy --database /mnt/copies",
 )
+EXAMPLES_OF = {
+    "clean": (
+        "tumbleline archive clean --dry-run",
+        "tumbleline archive clean --archive /srv/archive",
+    ),
+    "key": (
+        "tumbleline archive key",
+        "tumbleline archive key --public",
+    ),
+    "backup": (
+        "tumbleline archive backup /mnt/copy",
+        "tumbleline archive backup /mnt/copy --database /mnt/copies --keep 30",
+    ),
+    "restore": (
+        "tumbleline archive restore /mnt/copy --archive /srv/restored",
+        "tumbleline archive restore /mnt/copy --archive /srv/restored --database orchestrator.db",
+    ),
+}
+"""Of the subcommands."""
 
 app = typer.Typer(
     help="Maintain the archive.", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False

@@ -124,14 +124,25 @@ def _parameters(document: dict[str, Any]) -> None:
     from inertial import effects
 
     lines = [
-        [name, p.name, short_values(values[p.name]), "", p.unit]
+        [name, p.name, short_values(values[p.name]), _interval(document, name, p.name), p.unit]
         for name, values in document["nonlinear"].items()
         for p in effects.get(name).nonlinear
         if p.name in values
     ]
     lines += [
-        [row["effect"], row["name"], short(1e6 * row["value"]), short(1e6 * row["standard_error"]), "µrad or µg/g"]
+        [row["effect"], row["name"], short(1e6 * row["value"]), _around(row), "µrad or µg/g"]
         for row in document["station"]
     ]
     if lines:
-        print_table(["effect", "parameter", "value", "± 1σ", "unit"], lines)
+        print_table(["effect", "parameter", "value", "68 % interval", "unit"], lines)
+
+
+def _interval(document: dict[str, Any], effect: str, parameter: str) -> str:
+    """The interval of a nonlinear parameter; values that differ between the axes, or are chosen from a few, have none."""
+    found = document["nonlinear_interval"].get(effect, {}).get(parameter)
+    return f"{short(found[0])} to {short(found[1])}" if found else "not estimated"
+
+
+def _around(row: dict[str, Any]) -> str:
+    low, high = (1e6 * (row["value"] + sign * row["standard_error"]) for sign in (-1.0, 1.0))
+    return f"{short(low)} to {short(high)}"

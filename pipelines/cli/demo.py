@@ -105,10 +105,12 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
     """A command to type, on the files of the demonstration."""
-    chosen = f"--effects {','.join(model)}" if model else f"--model {folder / 'model.toml'}"
-    fresh = f" --fresh {folder / 'fresh.parquet'} --fresh-history {folder / 'fresh-history.parquet'}"
-    start = f"tumbleline {name} {folder / 'dwells.parquet'} {chosen} --history {folder / 'history.parquet'}"
-    return start + (fresh if name == "compare" else f" --report {folder / 'report.html'}")
+    from pipelines.cli.next_commands import command_line
+
+    chosen = ["--effects", ",".join(model)] if model else ["--model", str(folder / "model.toml")]
+    again = ["--fresh", str(folder / "fresh.parquet"), "--fresh-history", str(folder / "fresh-history.parquet")]
+    start = [name, str(folder / "dwells.parquet"), *chosen, "--history", str(folder / "history.parquet")]
+    return command_line(*start, *(again if name == "compare" else ["--report", str(folder / "report.html")]))
 
 
 class _Game:
@@ -168,16 +170,18 @@ class _Game:
         write_report(self.folder / "report.html", report)
         if not self.quiet:
             file = self.folder / "model.toml"
-            print_diagnosis(document, source=source, model=file)
+            print_diagnosis(document, data=None, model=file)  # the next step of the game adds the effect
         return document
 
     def _extend(self, recommended: list[str]) -> list[str]:
         """The effects added, written to the model file one version each."""
+        from pipelines.cli.next_commands import extension, judged_data
+
         chosen = self._asked_for(recommended)
         file = self.folder / "model.toml"
-        self._step(
-            "3. Add it.", "\n  ".join(f"tumbleline extend {file} {name}" for name in chosen) or "(nothing to add)"
-        )
+        data = judged_data(str(self.folder / "dwells.parquet"), str(self.folder / "history.parquet"), None)
+        lines = extension(file, chosen, self.hidden.model, data, new=True)[:-1]
+        self._step("3. Add it.", "\n  ".join(lines) or "(nothing to add)")
         self.model = list(_write_model(file, self.hidden.model, chosen))
         return chosen
 

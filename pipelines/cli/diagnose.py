@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -89,7 +90,7 @@ def command(
     table, left_out = without_dwells(table, leave_out)
     beside = history or (history_beside(dwells) if is_file(dwells) else "")
     document, report_text = diagnosed(
-        table, temperatures, judged, dwells, with_report=report is not None, left_out=left_out
+        table, temperatures, judged, _kept_name(dwells, archive), with_report=report is not None, left_out=left_out
     )
     document["history"] = beside or None
     if report is not None:
@@ -102,9 +103,18 @@ def command(
         print_json(document)
     else:
         from pipelines.cli.diagnosis_text import print_diagnosis
+        from pipelines.cli.next_commands import judged_data
 
-        print_diagnosis(document, source=dwells, model=model)
+        print_diagnosis(document, data=partial(judged_data, dwells, beside, archive), model=model)
     raise typer.Exit(DONE if document["adequate"] else PART_FAILED)
+
+
+def _kept_name(dwells: str, archive: str | None) -> str:
+    """The name of the data for a page that is kept: what 'latest' means changes."""
+    from pipelines.archive import Archive
+    from pipelines.importers.exchange import is_file
+
+    return dwells if is_file(dwells) else Archive(archive).run(dwells).id
 
 
 def diagnosed(
@@ -166,6 +176,7 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
     source : the dwells as they were named
     """
     from pipelines.archive import files
+    from pipelines.cli.next_commands import command_line
     from pipelines.diagnosis.next_recipe import next_recipe, reasons
     from pipelines.jobs.recipe_text import limits_from, recipe_text
 
@@ -178,7 +189,8 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
     remarks = [f"Written by 'tumbleline diagnose --next' from {source}: recipe {base.name}, then", *reasons(rows)]
     remarks += [f"without formula {formula.id}: name the model file with 'model'" for formula in base.formulas]
     files.publish(path, recipe_text(recipe, remarks).encode(), "recipe", files.ELSEWHERE)
-    out.print(f"next: {path}; to see what it determines: tumbleline plan {path}", markup=False, soft_wrap=True)
+    out.print(f"next: {path}; to see what it determines:", markup=False, soft_wrap=True)
+    out.print(f"  {command_line('plan', str(path))}", markup=False, soft_wrap=True)
 
 
 def write_report(path: Path, text: str) -> None:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.evidence_text import print_evidence
+from pipelines.cli.next_commands import command_line, print_extension, print_next
 from pipelines.cli.options import console, print_table, short, short_values
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from rich.console import Console
+
+    from pipelines.cli.next_commands import FindData, JudgedData
 
 
 BAD_DWELL = "bad_dwell"
@@ -24,22 +28,21 @@ SMALL = 1.1
 """An error below this multiple of the noise floor can be mistaken for noise, although it is significant."""
 
 
-def print_diagnosis(document: dict[str, Any], *, source: str, model: Path | None, next_command: bool = True) -> None:
+def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None) -> None:
     """Print a diagnosis.
 
     Parameters
     ----------
-    source : the dwells as they were named on the command line
+    data : gives the data as they were named on the command line, where commands to give next are printed; None: none are printed
     model : the model file as it was given there
-    next_command : whether to print the commands that add the recommended effects
     """
     out = console()
     out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
     print_evidence(document)
     print_findings(document)
-    _unexplained(out, document, model)
-    if next_command:
-        _next_command(out, document, source, model)
+    _unexplained(out, document, data, model)
+    if data is not None:
+        _next_command(out, document, data, model)
     _unseen(document)
     from pipelines.cli.measurements_text import measurements_table
 
@@ -210,13 +213,15 @@ def _classes(document: dict[str, Any]) -> None:
         lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
     columns = ["effect", "scope", "size\nµg", "p", "residual\nµg", "cross-validated\nµg", "parameters"]
     title = "Missing effects; these data cannot separate the effects of one row"
-    print_table(columns, lines, title=title, whole=6)
+    print_table(columns, lines, title=title)
     if any(not group["plausible"] for group in document["classes"]):
         console().print("(!) larger than the usual size of this effect: check other causes, too", markup=False)
     legend = (
         "residual: with the effect added · cross-validated: on dwells not fitted, the worst of poses, soaks, stretches of "
         "time"
     )
+    if any(group.get("nonlinear_interval") for group in document["classes"]):
+        legend += " · in brackets: 68 % interval"
     console().print(legend, style="dim", markup=False)
 
 
@@ -226,8 +231,17 @@ def _parameters_of(group: dict[str, Any], effects: Any) -> str:
     if group["scope"] == "data" or not group["nonlinear"]:
         return ""
     known = [p for p in effects.get(name).nonlinear if group["nonlinear"].get(p.name) is not None]
-    values = ", ".join(f"{p.name} = {short_values(group['nonlinear'][p.name])} {p.unit}".rstrip() for p in known)
+    between = group.get("nonlinear_interval") or {}
+    values = ", ".join(
+        f"{p.name} = {short_values(group['nonlinear'][p.name])}{_within(between.get(p.name))} {p.unit}".rstrip()
+        for p in known
+    )
     return f"{name}: {values}" if values and len(group["effects"]) > 1 else values
+
+
+def _within(interval: Sequence[float] | None) -> str:
+    """The 68 % interval behind a value."""
+    return f" ({short(interval[0])} to {short(interval[1])})" if interval else ""
 
 
 def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:
@@ -235,7 +249,15 @@ def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:
     return next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
 
 
-def _unexplained(out: Console, document: dict[str, Any], model: Path | None) -> None:
+def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
+    """The command that judges the model with the suggested formula, without a model file."""
+    found = document["offer"]
+    formula = f"{found['id']}={'; '.join(found['columns'])}"
+    effects = ",".join([*document["effects"], found["id"]])
+    return command_line("diagnose", data.source, "--effects", effects, "--formula", formula, *data.options)
+
+
+def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
     found = document["unexplained"]
     if not found:
         return
@@ -248,29 +270,14 @@ def _unexplained(out: Console, document: dict[str, Any], model: Path | None) -> 
     if document["offer"]:
         out.print(f"Formula for {model or 'a model file'}, to be refined:\n", markup=False, soft_wrap=True)
         out.print(document["offer"]["toml"], markup=False, soft_wrap=True)
-        out.print(
-            f"\nthen  tumbleline extend {model or 'model.toml'} {document['offer']['id']}", markup=False, soft_wrap=True
-        )
+        if data is not None:
+            print_next(out, [_with_formula(document, data())])
 
 
-def _next_command(out: Console, document: dict[str, Any], source: str, model: Path | None) -> None:
+def _next_command(out: Console, document: dict[str, Any], data: FindData, model: Path | None) -> None:
     if not document["recommended"]:
         return
-    from pipelines.jobs.model_files import STARTING_MODEL
-
-    file = str(model or free_name())
-    judged = ",".join(document["effects"])
-    start = "" if (model and model.exists()) or judged == ",".join(STARTING_MODEL) else f" --effects {judged}"
-    history = f" --history {document['history']}" if document.get("history") else ""
-    fresh = " --fresh-history ITS-HISTORY" if history else ""
-    out.print("\nNext:", style="bold")
-    for place, name in enumerate(document["recommended"]):
-        out.print(f"  tumbleline extend {file} {name}{start if place == 0 else ''}", markup=False, soft_wrap=True)
-    out.print(
-        f"  tumbleline history {file} --dwells {source}{history} --fresh ANOTHER-RUN-OF-THE-SAME-UNITS{fresh}",
-        markup=False,
-        soft_wrap=True,
-    )
+    print_extension(out, document, data, model)
     added = set(document["recommended"])
     several = [g["effects"] for g in document["classes"] if len(g["effects"]) > 1 and added & set(g["effects"])]
     if several:
@@ -280,14 +287,6 @@ def _next_command(out: Console, document: dict[str, Any], source: str, model: Pa
             style="dim",
             soft_wrap=True,
         )
-
-
-def free_name() -> str:
-    """A name for a new model file; an existing file belongs to another model."""
-    from pathlib import Path
-
-    names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
-    return next(name for name in names if not Path(name).exists())
 
 
 def _unseen(document: dict[str, Any]) -> None:

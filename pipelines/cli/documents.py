@@ -127,6 +127,7 @@ class ImproveDocument(TypedDict):
     ladder: Annotated[list[LadderRow], "oldest version first; empty if no unit can be judged"]
     refuted: Annotated[list[str], "added effects that the fresh run is evidence against"]
     warnings: list[str]
+    fresh: Annotated[str | None, "the fresh run that judged the last version; null: there was none"]
     next: Annotated[list[str], "commands to give next"]
 
 

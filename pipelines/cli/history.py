@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.options import (
     ArchiveOption,
     EffectFileOption,
@@ -128,14 +128,12 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
             style="bold red",
             soft_wrap=True,
         )
-        for effect in (effect for effect in refuted if effect in rows[-1]["effects"]):
-            out.print(f"  {removal(file, effect)}", markup=False, soft_wrap=True)
+        print_next(out, [removal(file, effect) for effect in refuted if effect in rows[-1]["effects"]])
 
 
 def removal(file: Path, effect: str) -> str:
     """The command that removes an effect which a fresh run refutes."""
-    words = ["tumbleline", "extend", str(file), "--remove", effect, "--why", "the fresh run is evidence against it"]
-    return shlex.join(words)
+    return command_line("extend", str(file), "--remove", effect, "--why", "the fresh run is evidence against it")
 
 
 def _change(row: dict[str, Any]) -> str:

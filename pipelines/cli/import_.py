@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.cli.next_commands import archive_words, command_line, print_next
 from pipelines.cli.options import (
     ArchiveOption,
     GroupOption,
@@ -211,7 +212,7 @@ def command(
         print_json(imports[0] if len(imports) == 1 else {"imports": imports, "adequate": adequate})
     else:
         for one in imports:
-            _print(one, list_dwells=list_dwells)
+            _print(one, archive, list_dwells=list_dwells)
     raise typer.Exit(DONE if adequate is True else PART_FAILED)
 
 
@@ -325,7 +326,7 @@ def _slips(how: Mapping) -> list[str]:
     ]
 
 
-def _print(one: dict[str, Any], *, list_dwells: bool) -> None:
+def _print(one: dict[str, Any], archive: str | None, *, list_dwells: bool) -> None:
     """An import for people."""
     out = console()
     rows = f"{one['samples']} samples, {one['dwells']} dwells" if one["samples"] else f"{one['dwells']} dwells"
@@ -338,7 +339,7 @@ def _print(one: dict[str, Any], *, list_dwells: bool) -> None:
         verdict, style = VERDICTS[one["adequate"]]
         out.print(f"  {verdict}", style=style)
         if one["fit"] == "norm" and one["adequate"] is False:
-            out.print(f"  to look further: tumbleline diagnose {one['run']}", markup=False, soft_wrap=True)
+            print_next(out, [command_line("diagnose", one["run"], *archive_words(archive))])
 
 
 def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -70,12 +71,20 @@ def command(
         bool,
         typer.Option("--yes", "-y", help="Answer yes; a class of several effects needs --effect."),
     ] = False,
+    measure: Annotated[
+        bool | None,
+        typer.Option(
+            "--measure/--no-measure",
+            help="Let the station of a run measure its units again as the fresh run; default: ask at a terminal.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Diagnose a model, ask which of the missing effects to add, write the model file, and judge the change by a fresh run.
 
-    One question per effect; effects that these data cannot separate are named in the question. Exit status 0: the resulting model
-    is adequate and no fresh run refutes it; 1: otherwise; 2: the input cannot be used.
+    One question per effect; effects that these data cannot separate are named in the question. Where DATA is a run and an effect
+    was added, the fresh run is one of its archive, or the station measures it: one more question, or --measure. Exit status 0:
+    the resulting model is adequate and no fresh run refutes it; 1: otherwise; 2: the input cannot be used.
     """
     from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
     from pipelines.diagnosis.inputs import history_beside
@@ -90,9 +99,9 @@ def command(
     dwells = without_dwells(dwells, named_dwells(leave_out))
     tables = _Tables(dwells, temperatures, again, again_temperatures)
     beside = history or (history_beside(data) if is_file(data) else "")
-    document = _Improvement(data, tables, model, target, beside, by, as_json, archive).run(
-        judged, _names(choose), yes=yes
-    )
+    may_measure = True if yes and measure is None else measure
+    improvement = _Improvement(data, tables, model, target, beside, by, as_json, archive, fresh, may_measure)
+    document = improvement.run(judged, _names(choose), yes=yes)
     if as_json:
         print_json(document)
     else:
@@ -118,6 +127,7 @@ class _Improvement:
 
     model : the file that is judged; None for a list of effects · target : the file to write
     used_history : file of temperatures against time; empty where there is none · by : author of the change
+    fresh : the fresh run as it was given; empty: it is looked for, or measured as ``measure`` says
     """
 
     data: str
@@ -128,10 +138,13 @@ class _Improvement:
     by: str
     quiet: bool
     archive: str | None
+    fresh: str
+    measure: bool | None
 
     def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> dict[str, Any]:
         """The document of the command; the model file is written last, after all checks."""
         from pipelines.cli.improve_text import next_lines, print_heading
+        from pipelines.cli.next_commands import judged_data
         from pipelines.jobs.model_files import publish_model
 
         before = self._diagnosis(judged, full=True)
@@ -142,7 +155,8 @@ class _Improvement:
         if added:
             print_heading(f"Diagnosis with {', '.join(added)}", quiet=self.quiet)
             after = self._diagnosis(list(versions[-1].effects), full=False)
-        rows = self._rows(versions, after["error"]["floor_ug"])
+        tables, fresh = self._with_fresh(bool(added))
+        rows = self._rows(versions, after["error"]["floor_ug"], tables)
         if text:
             publish_model(self.target, text)
         document: dict[str, Any] = {
@@ -158,11 +172,24 @@ class _Improvement:
             "refuted": [name for row in rows if row["confirmed"] is False for name in row["added"]],
             "warnings": list(dict.fromkeys(text for row in rows for text in row["warnings"])),
         }
-        fresh = self.tables.fresh is not None
-        document["next"] = next_lines(
-            document, self.target, self.used_history, after=after, fresh=fresh, archive=self.archive
-        )
+        document["fresh"] = fresh or None
+        data = partial(judged_data, self.data, self.used_history, self.archive)
+        document["next"] = next_lines(document, self.target, data, after=after)
         return document
+
+    def _with_fresh(self, changed: bool) -> tuple[_Tables, str]:
+        """The tables with those of a fresh run, and its name; a changed model is judged by one where there may be one."""
+        from pipelines.cli.improve_fresh import fresh_run
+        from pipelines.cli.inputs import dwells_and_history
+
+        fresh = self.fresh
+        if fresh or not changed:
+            return self.tables, fresh
+        fresh = fresh_run(self.data, self.archive, measure=self.measure)
+        if not fresh:
+            return self.tables, ""
+        again, temperatures = dwells_and_history(fresh, "", self.archive)
+        return replace(self.tables, fresh=again, fresh_history=temperatures), fresh
 
     def _diagnosis(self, effects: list[str] | None, *, full: bool) -> dict[str, Any]:
         """The diagnosis of a model, printed with all its tables or as its verdict alone."""
@@ -175,7 +202,7 @@ class _Improvement:
         document["history"] = self.used_history or None
         if not self.quiet:
             if full:
-                print_diagnosis(document, source=self.data, model=self.model, next_command=False)
+                print_diagnosis(document, data=None, model=self.model)
             else:
                 print_verdict(document)
         return document
@@ -261,14 +288,14 @@ class _Improvement:
         alone = f"; these data do not separate it from {', '.join(others)}" if others else ""
         return f"a diagnosis of {Path(self.data).name} names it{alone}"
 
-    def _rows(self, versions: list[Version], noise: float | None) -> list[dict[str, Any]]:
+    def _rows(self, versions: list[Version], noise: float | None, given: _Tables) -> list[dict[str, Any]]:
         """Errors of each version; none where no unit can be judged."""
         from pipelines.cli.compare import compared
         from pipelines.diagnosis.model_history import evolution
 
         if noise is None:
             return []
-        tables = (self.tables.dwells, self.tables.history, self.tables.fresh, self.tables.fresh_history)
+        tables = (given.dwells, given.history, given.fresh, given.fresh_history)
         rows = evolution(versions, lambda effects, before: compared(effects, *tables, before=before))
         keys = ("version", "added", "fitted_ug", "heldout_ug", "fresh_ug", "fall_ug", "fall_u_ug", "confirmed", "text")
         return [{key: row[key] for key in keys} | {"noise_ug": noise, "warnings": row["warnings"]} for row in rows]
@@ -276,7 +303,7 @@ class _Improvement:
 
 def _target(model: Path | None, output: Path | None) -> Path:
     """The model file to write; another existing file is refused."""
-    from pipelines.cli.diagnosis_text import free_name
+    from pipelines.cli.next_commands import free_name
 
     target = output or model or Path(free_name())
     if target != model and target.exists():

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING, Any
 
+from pipelines.cli.next_commands import command_line, fresh_measurement, print_next
 from pipelines.cli.options import console, print_table, short
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-FRESH, FRESH_HISTORY = "ANOTHER-RUN-OF-THE-SAME-UNITS", "ITS-HISTORY"
+    from pipelines.cli.next_commands import FindData
+
 ERRORS = {
     "fitted_ug": "fitted to these dwells",
     "heldout_ug": "dwells left out: the worst of poses, soaks, stretches of time",
@@ -39,10 +40,7 @@ def print_improvement(document: dict[str, Any]) -> None:
     out = console()
     for text in document["warnings"]:
         out.print(f"warning: {text}", style="yellow", markup=False, soft_wrap=True)
-    if document["next"]:
-        out.print("\nNext:", style="bold")
-        for line in document["next"]:
-            out.print(f"  {line}", markup=False, soft_wrap=True)
+    print_next(out, document["next"])
 
 
 def _choices(document: dict[str, Any]) -> None:
@@ -72,51 +70,27 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
         console().print(f"{', '.join(row['added'])}: {row['text']}", style=style, markup=False, soft_wrap=True)
 
 
-def next_lines(
-    document: dict[str, Any],
-    target: Path,
-    history: str,
-    *,
-    after: dict[str, Any],
-    fresh: bool,
-    archive: str | None = None,
-) -> list[str]:
+def next_lines(document: dict[str, Any], target: Path, find: FindData, *, after: dict[str, Any]) -> list[str]:
     """The commands to give next; empty where the model is adequate and a fresh run has judged it.
 
     Parameters
     ----------
     target : the model file
-    history : the file of temperatures against time that was read; empty where there was none
+    find : gives the data
     after : the diagnosis of the resulting model
-    fresh : whether there was a fresh run
-    archive : as it was given; None for the default one
     """
     from pipelines.cli.history import removal
 
     if document["refuted"]:
         return [removal(target, effect) for effect in document["refuted"]]
-    temperatures = [*(["--history", history] if history else []), *(["--archive", archive] if archive else [])]
-    own = ["--model", str(target)] if document["file"] else ["--effects", ",".join(document["effects"])]
-    again = ["tumbleline", "improve", document["data"], *own, *temperatures]
     left = [c for c in document["choices"] if not c["added"]]
+    if not (left or after["recommended"] or (document["added"] and not document["fresh"])):
+        return []
+    data = find()
+    own = ["--model", str(target)] if document["file"] else ["--effects", ",".join(document["effects"])]
+    again = ["improve", data.source, *own, *data.options]
     if left:
-        return [shlex.join([*again, "--effect", name]) for name in (left[0]["effect"], *left[0]["not_separated_from"])]
-    lines: list[str] = []
-    if document["added"] and not fresh:
-        its_own = ["--fresh-history", FRESH_HISTORY] if history else []
-        lines = [
-            shlex.join(
-                [
-                    "tumbleline",
-                    "history",
-                    str(target),
-                    "--dwells",
-                    document["data"],
-                    *temperatures,
-                    "--fresh",
-                    FRESH,
-                    *its_own,
-                ]
-            )
-        ]
-    return [*lines, shlex.join(again)] if after["recommended"] else lines
+        names = (left[0]["effect"], *left[0]["not_separated_from"])
+        return [command_line(*again, "--effect", name) for name in names]
+    lines = fresh_measurement(target, data) if document["added"] and not document["fresh"] else []
+    return [*lines, command_line(*again)] if after["recommended"] else lines

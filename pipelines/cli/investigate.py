@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -106,7 +106,7 @@ def command(
     if as_json:
         print_json(document)
     else:
-        print_inquiry(document)
+        print_inquiry(document, archive)
     raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
 
 
@@ -184,14 +184,17 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
 
 def _continue_command() -> str:
     """The command that measures the proposed follow-up."""
+    from pipelines.cli.next_commands import command_line
+
     given = [a for a in sys.argv[1:] if a not in {"--ask", "--json"}]
-    return shlex.join(["tumbleline", *given, "--yes"])
+    return command_line(*given, "--yes")
 
 
-def print_inquiry(document: dict[str, Any]) -> None:
-    """Print an inquiry."""
+def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
+    """Print an inquiry; ``archive`` as it was given, for the commands to give next."""
     from pipelines.cli.diagnosis_text import print_findings, verdict
     from pipelines.cli.measurements_text import measurements_table
+    from pipelines.cli.next_commands import judged_data, print_extension, print_next
 
     out = console()
     good = document["ended"] in {"adequate", "told_apart"}
@@ -203,12 +206,9 @@ def print_inquiry(document: dict[str, Any]) -> None:
     )
     if document["ended"] in {"asked", "declined"}:
         measurements_table(document["next_measurements"])
-        out.print("\nNext:", style="bold")
-        out.print(f"  {document['command']}", markup=False, soft_wrap=True)
-    elif document["recommended"]:
-        out.print("\nNext:", style="bold")
-        for name in document["recommended"]:
-            out.print(f"  tumbleline extend model.toml {name}", markup=False, soft_wrap=True)
+        print_next(out, [document["command"]])
+    else:
+        print_extension(out, document, partial(judged_data, document["run"], "", archive), None)
 
 
 def _rounds(document: dict[str, Any]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.optimise_options import OptimiseOptions, levels_of, requirement_of
 from pipelines.cli.options import console, error_console, print_table, short
 from schemas.errors import TumblelineError
@@ -210,9 +211,11 @@ def print_optimum(document: dict[str, Any]) -> None:
         print_table(heads, _error_lines(document["coefficients"]))
     if document["seen_besides"]:
         out.print(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}", soft_wrap=True)
-    out.print(f"Recipe file: {document['file']}; measure with 'tumbleline run {document['file']}'", soft_wrap=True)
+    out.print(f"Recipe file: {document['file']}", markup=False, soft_wrap=True)
     if document["limits_missing"]:
         error_console().print(f"warning: {document['limits_missing']}", markup=False, soft_wrap=True, style="yellow")
+    else:
+        print_next(out, [command_line("run", str(document["file"]))])
     if "page" in document:
         out.print(f"Page: {document['page']}")
 

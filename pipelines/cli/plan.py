@@ -33,6 +33,17 @@ EXAMPLES = (
     "tumbleline plan my.toml",
     "tumbleline plan optimise my.toml",
 )
+EXAMPLES_OF = {
+    "recipe": (
+        "tumbleline plan my.toml",
+        "tumbleline plan my.toml --station line-1.toml --page plan.html",
+    ),
+    "optimise": (
+        "tumbleline plan optimise my.toml",
+        "tumbleline plan optimise my.toml --criterion T --part third_order,odd_quadratic",
+    ),
+}
+"""Of the subcommands."""
 
 
 RECIPE = "recipe"

@@ -86,7 +86,7 @@ def command(
     if as_json:
         print_json(document)
     else:
-        _print(outcomes, document)
+        _print(outcomes, document, archive)
     raise typer.Exit(1 if document["failed"] else 0)
 
 
@@ -140,7 +140,10 @@ def _counts(outcomes: list[Outcome]) -> dict[str, int]:
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
 
 
-def _print(outcomes: list[Outcome], document: dict[str, Any]) -> None:
+DIFFERENCES = 3  # re-runs that are proposed for a comparison
+
+
+def _print(outcomes: list[Outcome], document: dict[str, Any], archive: str | None) -> None:
     lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
@@ -154,8 +157,10 @@ def _print(outcomes: list[Outcome], document: dict[str, Any]) -> None:
         f"{document['selected']} selected: {document['rerun']} re-analysed, {document['unchanged']} unchanged, "
         f"{document['failed']} failed"
     )
-    if document["rerun"]:
-        out.print("compare the results with 'tumbleline diff RUN RE-RUN'", style="dim", markup=False)
+    from pipelines.cli.next_commands import archive_words, command_line, print_next
+
+    anew = [one for one in outcomes if one.new and one.new != one.run and not one.error]
+    print_next(out, [command_line("diff", one.run, one.new, *archive_words(archive)) for one in anew[:DIFFERENCES]])
 
 
 def _line(one: Outcome) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,6 +14,7 @@ from pipelines.cli.options import (
     RepeatOption,
     SeedOption,
     StationOption,
+    console,
     error_console,
     print_json,
 )
@@ -67,18 +68,20 @@ def command(
     """Measure and calibrate a lot, from recipe to report: the main job.
 
     Given again after a stop, the same command continues the run; given again after the end, it measures nothing and shows the
-    result. A lot that is larger than the fixture is measured in several fillings, if an operator at the terminal seats the units.
+    result. RECIPE may be run:RUN: the units of an archived run are measured again as they were, with --repeat 1, 2, … as fresh
+    measurements. A lot that is larger than the fixture is measured in several fillings, if an operator at the terminal seats the
+    units.
     """
     from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import library_remarks
+    from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
-    from pipelines.jobs.job import Request
+    from pipelines.jobs.job import OF_RUN, Request
     from pipelines.jobs.seating import SCAN, read_seating
     from schemas.station import load_station
 
-    config = load_station(station)
-    slots = config.devices.slots.count
+    slots = 0 if recipe.startswith(OF_RUN) else load_station(station).devices.slots.count
     seating = scanned(slots) if units == SCAN else read_seating(units)
     request_of_lot = Request(
         recipe=recipe,
@@ -91,10 +94,10 @@ def command(
     )
     asks = prompts if prompts is not None else attended() and not as_json
     requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
-    asks = asks and (bool(prompts) or len(requests) > 1 or config.kind == "modbus")
     jobs = [request.job(Archive(archive)) for request in requests]
+    asks = asks and (bool(prompts) or len(requests) > 1 or jobs[0].station.kind == "modbus")
     runs = [
-        _measured(request, job, Archive(archive), direct=direct, asks=asks)
+        measured(job, Archive(archive), None if direct else request, asks=asks)
         for request, job in zip(requests, jobs, strict=True)
     ]
     for line in (line for run in runs for line in library_remarks(run)):
@@ -105,11 +108,25 @@ def command(
     else:
         for document in documents:
             print_summary(document)
+        print_next(
+            console(),
+            [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
+        )
     raise typer.Exit(max(exit_status(document) for document in documents))
 
 
-def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks: bool) -> Run:
-    """The run of one filling of the fixture."""
+def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
+    """The commands after a run: is its model adequate, and its certificates where they can be given."""
+    from pipelines.cli.next_commands import archive_words, command_line
+
+    own = [run.id, *archive_words(archive)]
+    lines = [command_line("diagnose", *own)] if len(document["effects"]) and "dwells" in run.tables() else []
+    certain = any(unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"])
+    return [*lines, command_line("certify", *own)] if certain else lines
+
+
+def measured(job: Job, store: Archive, request: Request | None, *, asks: bool) -> Run:
+    """The run of one filling of the fixture; by the orchestrator where its request is given, else without."""
     from pipelines.audit.index_growth import add_runs
     from pipelines.chain.attendance import JUDGED, Attendance
     from pipelines.chain.runner import Runner
@@ -117,7 +134,7 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
 
     with shown() as (progress, report_stage, quiet):
         operator = Terminal(quiet) if asks else None
-        if not direct:
+        if request is not None:
             from pipelines.flows.local import run_locally
 
             return run_locally(request, job, store, progress, report_stage, operator)

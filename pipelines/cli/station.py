@@ -25,6 +25,33 @@ EXAMPLES = (
     "tumbleline station status --station line-1.toml",
     "tumbleline station check --station line-1.toml",
 )
+EXAMPLES_OF = {
+    "status": (
+        "tumbleline station status --station line-1.toml",
+        "tumbleline station status --station line-1.toml --watch",
+    ),
+    "check": (
+        "tumbleline station check --station line-1.toml",
+        "tumbleline station check --station line-1.toml --registers",
+    ),
+    "log": (
+        "tumbleline station log",
+        "tumbleline station log latest --all",
+    ),
+    "watch": (
+        "tumbleline station watch",
+        "tumbleline station watch --station line-1.toml --minutes 30",
+    ),
+    "serve": (
+        "tumbleline station serve --port 5020",
+        "tumbleline station serve --units 4 --speed 60",
+    ),
+    "profiles": (
+        "tumbleline station profiles",
+        "tumbleline station profiles watlow_f4t",
+    ),
+}
+"""Of the subcommands."""
 
 SHORT = {"read": "r", "write": "w", "read_write": "rw"}
 

@@ -34,10 +34,12 @@ NOISE_ONLY = (
     "(docs/how-to/state-the-uncertainty.md)"
 )
 
-LEGEND = (
-    "fit: rms residual · verify: largest | |a| − g | of a pose not used, mean of its dwells · error: rms of the worst axis in "
-    "these poses · period: the same, expected over the period of validity"
-)
+LEGEND = {
+    "residual_rms_ug": "fit: rms residual",
+    "verification_norm_ug": "verify: largest | |a| − g | of a pose not used, mean of its dwells",
+    "bias_error_ug": "error: rms of the worst axis in these poses",
+    "bias_error_period_ug": "period: the same, expected over the period of validity",
+}
 NOISE_LEGEND = "N, B: noise of the worst axis, an upper limit where a term is not identified"
 
 
@@ -96,7 +98,7 @@ def print_summary(document: dict[str, Any]) -> None:
     print_table(["slot", "unit", "result", "grade", *(title for _, title in shown)], lines)
     out = console()
     if calibrated:
-        out.print(LEGEND, style="dim", soft_wrap=True)
+        out.print(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim", soft_wrap=True)
         if any(name == "velocity_random_walk_ug_rtHz" for name, _ in shown):
             out.print(NOISE_LEGEND, style="dim", soft_wrap=True)
     for unit in document["units"]:

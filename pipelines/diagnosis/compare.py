@@ -13,7 +13,7 @@ from inertial.criticism.handling.base import Handling
 from inertial.criticism.left_out import left_out
 from inertial.criticism.model import Model, refuse_without_freedom
 from inertial.criticism.problem import Problem
-from inertial.criticism.refinement import terms_of
+from inertial.criticism.refinement import intervals, settled, terms_of
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from inertial.planning.reasons import drivers_of
@@ -70,6 +70,7 @@ def _compared(
     problem = Problem(lot_of(found, square=square))
     model = Model(problem, terms_of(catalogue.get_all(effects), problem))
     refuse_without_freedom(model)
+    model = settled(model)
     fitted = estimate(model)
     left = residuals_of(problem, fitted)
     out = left_out(model)
@@ -87,6 +88,7 @@ def _compared(
         "by_axis": _by_axis(left, radial=problem.lot.radial),
         "by_pose": _by_pose(found, left),
         "nonlinear": {t.effect.id: t.keywords for t in model.terms if t.keywords},
+        "nonlinear_interval": intervals(model),
         "station": _station(fitted),
         "warnings": without_history(found, model.terms),
         "progress": None,

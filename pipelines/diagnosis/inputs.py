@@ -38,10 +38,19 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
 def history_beside(source: str) -> str:
     """The history in the folder of a file of dwells: NAME-history, or history for a file called dwells; else empty."""
+    return _beside(source, "history")
+
+
+def fresh_beside(source: str) -> str:
+    """The fresh run in the folder of a file of dwells: NAME-fresh, or fresh for a file called dwells; else empty."""
+    return _beside(source, "fresh")
+
+
+def _beside(source: str, what: str) -> str:
     dwells = Path(source)
-    stems = [f"{dwells.stem}-history", f"{dwells.stem}_history"]
+    stems = [f"{dwells.stem}-{what}", f"{dwells.stem}_{what}"]
     if dwells.stem.endswith("dwells"):
-        stems.append(f"{dwells.stem.removesuffix('dwells')}history")
+        stems.append(f"{dwells.stem.removesuffix('dwells')}{what}")
     endings = dict.fromkeys((dwells.suffix, ".parquet", ".csv"))
     found = (dwells.with_name(stem + ending) for stem in stems for ending in endings)
     return next((str(path) for path in found if path.is_file()), "")

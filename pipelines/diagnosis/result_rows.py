@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects as catalogue
+from inertial.criticism.model import Model
+from inertial.criticism.problem import Problem
+from inertial.criticism.refinement import intervals, settled, terms_of
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from inertial.criticism.bad_dwells import BadDwell
     from inertial.criticism.diagnosis import Diagnosis, Named
     from inertial.criticism.influence import Carried
-    from inertial.criticism.model import Model
 
 BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
@@ -42,7 +44,29 @@ def classes_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     """Rows of all classes: handling errors first, because they must be corrected before effects are judged."""
     rows = [_class(n, names) for n in diagnosis.handled]
     rows += [_bad_dwell(diagnosis, d, names) for d in diagnosis.removed if not d.tail]
-    return [*rows, *(_class(n, names) for n in diagnosis.named)]
+    fitted = _fitted_parameters(diagnosis)
+    return [*rows, *(_class(n, names) | fitted.get(n.effects.simplest.effect.id, {}) for n in diagnosis.named)]
+
+
+def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
+    """Nonlinear parameters of the named effects as ``compare`` has them for the model with all of these, with their intervals.
+
+    A search has them at its own noise and beside other terms: one value under one name needs one estimate.
+    """
+    added = [n.effects.simplest for n in diagnosis.named if not n.effects.of_data]
+    if not any(term.values for term in added):
+        return {}
+    known = catalogue.catalogue()
+    judged = [t.effect.id for t in diagnosis.base.terms if t.effect.id in known or ":" in t.effect.id]
+    problem = Problem(diagnosis.problem.lot)
+    ids = dict.fromkeys([*judged, *(term.effect.id for term in added)])
+    model = settled(Model(problem, terms_of(catalogue.get_all(list(ids)), problem)))
+    between = intervals(model)
+    return {
+        term.effect.id: {"nonlinear": dict(term.values), "nonlinear_interval": between.get(term.effect.id, {})}
+        for term in model.terms
+        if term.values and term.effect.id in {one.effect.id for one in added}
+    }
 
 
 def _class(named: Named, names: Names) -> dict[str, Any]:

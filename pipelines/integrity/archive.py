@@ -61,7 +61,10 @@ class Report:
         return {
             "archive": str(checked.root),
             "whole": self.whole,
-            "findings": [asdict(finding) for finding in checked.findings],
+            "findings": [
+                {key: value for key, value in asdict(finding).items() if key != "because"}
+                for finding in checked.findings
+            ],
             "remarks": checked.remarks,
             "signatures": {"trust": self.trust, "keys": sorted(checked.keys), "manifests": dict(checked.signatures)},
             "chain_head": self.head,
@@ -130,7 +133,7 @@ def verify(
     else:
         check_links(archive, [run.path for run in chosen] + captures, total)
     _report_untrusted(total, demanded=demanded)
-    total.findings = by_cause(total.findings, archive.root)
+    total.findings = by_cause(total.findings, archive.root, chain.differing)
     return Report(total, chain.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
@@ -17,11 +18,13 @@ if TYPE_CHECKING:
 def check_capture(path: Place, checked: CheckedPart, schema: int) -> CheckedPart:
     """Check a capture."""
     records: list[tuple[dict[str, Any], str, Place]] = []
+    unusable: Place | None = None
     for folder in sorted(path.iterdir(), key=lambda place: place.name):
         if not is_number(folder.name):
             continue
         manifest = checked.manifest(folder / "record.json", schema)
         if manifest is None:
+            unusable = unusable or folder / "record.json"
             continue
         content = checked.named(manifest[0], "content", folder / "record.json")
         for name, expected in sorted(content.items()):
@@ -35,8 +38,12 @@ def check_capture(path: Place, checked: CheckedPart, schema: int) -> CheckedPart
         check_strangers(folder, {*content, "record.json"}, checked)
         records.append((*manifest, folder))
     records.sort(key=lambda one: (str(type(one[0].get("order"))), one[0].get("order", 0)))
-    _check_order(records, checked)
-    _check_end(path, records, checked, schema)
+    part = checked.blank()
+    _check_order(records, part)
+    _check_end(path, records, part, schema)
+    if unusable is not None:  # the gap that it leaves in the order
+        part.findings = [replace(one, because=checked.name(unusable)) for one in part.findings]
+    checked.add(part)
     if records:
         _check_state(path, records[-1], checked)
     return checked

@@ -11,17 +11,28 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from pipelines.integrity.findings import CHANGED, EDITED, MISSING, SIGNATURE, IntegrityFinding
+from pipelines.integrity.seals import OF_ANOTHER
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from pipelines.archive.store import Place
 
 FEWEST_GONE = 2  # missing files of a missing folder from which on the folder is reported instead
 
 
-def by_cause(findings: Iterable[IntegrityFinding], root: Place) -> list[IntegrityFinding]:
-    """The findings by cause; each path occurs once, and consequences are listed in the finding that caused them."""
+NAMED = 6  # further edited files that a message names
+
+
+def by_cause(
+    findings: Iterable[IntegrityFinding], root: Place, differing: Collection[str] = ()
+) -> list[IntegrityFinding]:
+    """The findings by cause; each path occurs once, and consequences are listed in the finding that caused them.
+
+    Parameters
+    ----------
+    differing : files that differ from what the chain sealed: of two files that disagree, these were edited
+    """
     by_path: dict[str, list[IntegrityFinding]] = {}
     for finding in dict.fromkeys(findings):
         by_path.setdefault(finding.path, []).append(finding)
@@ -34,7 +45,55 @@ def by_cause(findings: Iterable[IntegrityFinding], root: Place) -> list[Integrit
         over = _manifest_of(path)
         if over in causes and causes[path].kind == CHANGED and causes[over].kind in {EDITED, SIGNATURE}:
             causes[over] = _with(causes[over], [causes.pop(path)])
-    return list(causes.values())
+    _without_disagreements(causes, by_path, differing)
+    _by_folder(causes, by_path, differing)
+    return [replace(one, because="") for one in causes.values()]
+
+
+def _without_disagreements(
+    causes: dict[str, IntegrityFinding], by_path: Mapping[str, Sequence[IntegrityFinding]], differing: Collection[str]
+) -> None:
+    """List a file that only disagrees with others, and is as it was sealed, under the other one."""
+    for path in list(causes):
+        links = [one.because for one in by_path.get(path, ())]
+        if path not in causes or path in differing or not links or not all(links):
+            continue
+        others = [one for one in dict.fromkeys(links) if one in causes and one != path]
+        proved = [one for one in others if one in differing]
+        direct = [one for one in others if any(not finding.because for finding in by_path.get(one, ()))]
+        fuller = [one for one in others if len(by_path.get(one, ())) > len(links)]
+        for other in (proved or direct or fuller)[:1]:
+            causes[other] = _with(causes[other], [causes.pop(path)])
+
+
+def _by_folder(
+    causes: dict[str, IntegrityFinding], by_path: Mapping[str, Sequence[IntegrityFinding]], differing: Collection[str]
+) -> None:
+    """One finding for the edited manifests of one run or capture: who edits several edits them together."""
+    folders: dict[str, list[str]] = {}
+    for path, one in causes.items():
+        parts = PurePosixPath(path).parts
+        if parts[:1] in {("runs",), ("captures",)} and path.endswith(".json") and one.kind in {EDITED, SIGNATURE}:
+            folders.setdefault("/".join(parts[:2]), []).append(path)
+
+    def rank(path: str) -> tuple[bool, bool, bool, int]:
+        own = by_path.get(path, ())
+        exchanged = any(one.message.startswith(OF_ANOTHER) for one in own)
+        moved = any(one.kind == CHANGED for one in own)  # numbers, not only hashes
+        return not exchanged, not moved, path not in differing, -len(own)
+
+    for paths in folders.values():
+        if len(paths) > 1:
+            paths.sort(key=rank)
+            names = [PurePosixPath(path).name for path in paths[1:]]
+            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+            _merge(causes, paths, f"; the same run or capture: {', '.join(names[:NAMED])}{more}")
+
+
+def _merge(causes: dict[str, IntegrityFinding], paths: Sequence[str], also: str) -> None:
+    """Put the findings of all paths under the first."""
+    first = causes[paths[0]]
+    causes[paths[0]] = _with(replace(first, message=first.message + also), [causes.pop(path) for path in paths[1:]])
 
 
 def _one(findings: list[IntegrityFinding]) -> IntegrityFinding:

@@ -22,11 +22,13 @@ class Chain:
     head : hash of its last entry.
     sealed : the files that it names, with the hash that the last entry to name them gives.
     entries : what each entry seals, by its number.
+    differing : the files that differ from what it sealed.
     """
 
     head: str = ""
     sealed: dict[str, str] = field(default_factory=dict[str, str])
     entries: dict[int, dict[str, str]] = field(default_factory=dict[int, "dict[str, str]"])
+    differing: set[str] = field(default_factory=set[str])
 
 
 def check_chain(root: Place, checked: CheckedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
@@ -69,8 +71,7 @@ def check_chain(root: Place, checked: CheckedPart, *, only: set[str] | None = No
         checked.wrong(
             MISSING, root / hash_chain.FOLDER, f"has no entry with hash {head}: entries were removed or written again"
         )
-    for name, expected in chain.sealed.items():
-        _check_sealed(root, name, expected, checked)
+    chain.differing = {name for name, hashed in chain.sealed.items() if not _is_sealed(root, name, hashed, checked)}
     chain.head = before
     return chain
 
@@ -80,12 +81,14 @@ def _files(named: dict[str, str]) -> dict[str, str]:
     return {k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")}
 
 
-def _check_sealed(root: Place, name: str, expected: str, checked: CheckedPart) -> None:
+def _is_sealed(root: Place, name: str, expected: str, checked: CheckedPart) -> bool:
+    """Whether a file is there as it was sealed."""
     place = root / name
     try:
         actual = files.sha256(place)
     except OSError:
         checked.wrong(MISSING, place, "is missing, the chain of the archive names it")
-        return
+        return False
     if actual != expected:
         checked.wrong(EDITED, place, "differs from what the chain of the archive sealed")
+    return actual == expected

@@ -34,12 +34,14 @@ class IntegrityFinding:
     kind : ``changed``, ``missing``, ``edited``, ``foreign``, ``newer``, ``unreadable``, ``signature`` or ``unchained``.
     path : the file, below the archive's root.
     consequences : sentences about further findings with this cause.
+    because : a file that this one disagrees with; where only that one was edited, the finding is a consequence of it.
     """
 
     kind: str
     path: str
     message: str
     consequences: tuple[str, ...] = ()
+    because: str = ""
 
 
 @dataclass
@@ -82,9 +84,10 @@ class CheckedPart:
         """The name of a place relative to the root of the archive."""
         return str(place)[len(str(self.root)) :].lstrip("/\\")
 
-    def wrong(self, kind: str, place: Place, message: str) -> None:
-        """Add a finding."""
-        self.findings.append(IntegrityFinding(kind, self.name(place), message))
+    def wrong(self, kind: str, place: Place, message: str, because: Place | None = None) -> None:
+        """Add a finding; ``because`` is the other file where two files disagree."""
+        other = "" if because is None else self.name(because)
+        self.findings.append(IntegrityFinding(kind, self.name(place), message, because=other))
 
     def manifest(self, place: Place, known_schema: int) -> tuple[dict[str, Any], str] | None:
         """Content of a manifest and hash of its file, with the signature checked; None where the manifest is unusable."""

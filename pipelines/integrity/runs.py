@@ -76,12 +76,16 @@ def _check_links(
         checked.wrong(EDITED, place, "was edited: its parameters are not a table of names and values")
     for name, expected in checked.named(content, "inputs", place).items():
         if name in manifests and manifests[name].get("sha256") != expected:
-            checked.wrong(EDITED, place, f"names another table {name} than the one in the run")
+            table = place.parent / f"{name}.json"
+            checked.wrong(EDITED, place, f"names another table {name} than the one in the run", table)
     for name, expected in checked.named(content, "manifests", place).items():
         if name in hashes and hashes[name] != expected:
             edited = place.parent / f"{name}.json"
             checked.wrong(
-                EDITED, edited, f"is not the manifest that {place.stem} was made from: it was edited or written again"
+                EDITED,
+                edited,
+                f"is not the manifest that {place.stem} was made from: it was edited or written again",
+                place,
             )
         elif name not in hashes and name != "records":
             checked.wrong(MISSING, place.parent / f"{name}.json", f"is missing, {place.stem} was made from it")
@@ -100,7 +104,8 @@ def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, A
     for name, content in manifests.items():
         named = content.get("manifests", {})
         if isinstance(named, dict) and named.get("records", actual) != actual:
-            checked.wrong(EDITED, end, f"is not the end of the capture that {name} of run {run.id} was made from")
+            text = f"is not the end of the capture that {name} of run {run.id} was made from"
+            checked.wrong(EDITED, end, text, run.path / f"{name}.json")
             return
 
 

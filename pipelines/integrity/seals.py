@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 JUST_NOW = timedelta(minutes=5)  # clocks of hosts may differ by as much: see the ledger
 MARK, REPORT = "sealed.json", "report.json"
+OF_ANOTHER = "is the seal of another run"
 REMEDY = "it was copied here, its entry was removed, or its writer was killed: see 'tumbleline archive clean'"
 
 
@@ -57,7 +58,11 @@ def _check_run(run: Run, chain: Chain, checked: CheckedPart) -> None:
     elif number not in chain.entries:
         entry = hash_chain.place_of_entry(run.archive.root, number)
         checked.wrong(MISSING, entry, f"is missing, it sealed run {run.id}")
-    elif chain.entries[number] != content.get("files") or f"runs/{run.id}/run.json" not in content["files"]:
+    elif f"runs/{run.id}/run.json" not in checked.named(content, "files", mark):
+        checked.wrong(
+            EDITED, mark, f"{OF_ANOTHER}: the folder was exchanged with another or renamed; restore it from a copy"
+        )
+    elif chain.entries[number] != content["files"]:
         checked.wrong(
             EDITED,
             mark,

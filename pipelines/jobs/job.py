@@ -49,6 +49,9 @@ ANALYSIS_KEYS = {
 }
 
 
+OF_RUN = "run:"
+"""What a recipe's name begins with where it is the run whose units are measured again."""
+
 GUARDS = {"suspenders", "safety", "self_test"}
 """Parts of a station that say when a capture pauses and how it ends: one that an operator has eased goes on where it was."""
 
@@ -138,6 +141,8 @@ class Request:
 
     def fillings(self, slots: int) -> list[Request]:
         """The request in portions that fit a fixture of so many slots; a slot map is one filling as it is."""
+        if self.recipe.startswith(OF_RUN):
+            return [self]
         named = self.units or tuple(units_of(self.recipe))
         if self.slots or len(named) <= slots:
             return [self]
@@ -150,6 +155,8 @@ class Request:
         ----------
         archive : where the line's model is released, for recipes that ask for it; the default one where None
         """
+        if self.recipe.startswith(OF_RUN):
+            return self._of_run(archive)
         recipe = load_recipe(self.recipe, lambda device: self._line_model(archive, device))
         limits = load_limits(recipe, folder_of(self.recipe))
         lot = lot_of(recipe, self.units, self.slots, seed=self.seed, repeat=self.repeat)
@@ -162,6 +169,19 @@ class Request:
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
         refuse_unreachable(job)
         return job
+
+    def _of_run(self, archive: Archive | None) -> Job:
+        """The job of an archived run: its recipe, station and units, with this request's count of repeats."""
+        from pipelines.archive import Archive as Store
+
+        options = {"--station": self.station, "--units": self.units, "--fault": self.faults}
+        given = [*(name for name, value in options.items() if value), *(["--seed"] if self.seed is not None else [])]
+        if given:
+            raise WrongUse(
+                f"run: {self.recipe} measures the units of a run again on its station, {', '.join(given)} cannot change them; "
+                "leave it out, or name a recipe"
+            )
+        return measured_again(job_of_run((archive or Store()).run(self.recipe.removeprefix(OF_RUN))), self.repeat)
 
     def _line_model(self, archive: Archive | None, device: str) -> dict[str, Any]:
         from pipelines.archive import Archive as Store
@@ -203,6 +223,13 @@ def job_of_run(run: Run, *, effects: Sequence[str] = (), model: Path | None = No
     known = "readings" in run.tables()
     _refuse_inconsistent(job, covariates(run.table("readings")) if known else recorded_columns(station.devices.reader))
     return job
+
+
+def measured_again(job: Job, repeat: int) -> Job:
+    """The job of an archived run with another count of repeats: a measurement of its own."""
+    if repeat == job.lot.repeat:
+        return job
+    return replace(job, lot=job.lot.model_copy(update={"repeat": repeat}), captured="")
 
 
 def _refuse_inconsistent(job: Job, recorded: Sequence[str]) -> None:

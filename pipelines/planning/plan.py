@@ -17,6 +17,7 @@ from inertial.planning.expected import expected_errors, expected_gain
 from inertial.planning.reasons import reason
 from inertial.planning.visibility import SEEN, visibilities
 from pipelines.planning.reach import reach
+from pipelines.planning.shown_by_verification import OF_VERIFICATION, REMEDY, shown_by_verification
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import schedule, spent
@@ -24,7 +25,7 @@ from pipelines.tables.calibration import unit_texts
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
@@ -87,6 +88,7 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
     found = visibilities(context.state, recipe.effects, noise.error(recipe.dwell_s), covariance=context.covariance)
     fast = visibilities(context.state, recipe.effects, noise.white(recipe.dwell_s), [s.effect for s in found if s.seen])
     alone = {s.effect: MICRO * s.size for s in fast if np.isfinite(s.size)}
+    checked = _shown_by_verification(context, [s.effect for s in found if not s.seen])
     white, wander, together = (MICRO * f(recipe.dwell_s) for f in (noise.white, noise.wander, noise.error))
     return {
         "recipe": recipe.name,
@@ -101,7 +103,7 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
         "minutes": spent(context.activities).document(),
         "coefficients": _coefficient_rows(expected),
         "bias": _bias(context, expected, of_record, terms),
-        "effects": [_row(s, context.state, recipe.effects) | {"floor_white_ug": alone.get(s.effect)} for s in found],
+        "effects": [_row(s, context, checked) | {"floor_white_ug": alone.get(s.effect)} for s in found],
         **({} if terms is None else {"uncertainty": reach(context, of_record, terms, limits)}),
     }
 
@@ -176,9 +178,16 @@ def identified(context: PlanContext) -> Expected:
     try:
         return expected_errors(context.recipe.effects, context.state, context.covariance, units=units)
     except NotIdentified as problem:
-        raise NotIdentified(
-            f"plan {context.recipe.name}: {missing(context.state, context.recipe.effects) or problem}"
-        ) from None
+        effects = context.recipe.effects
+        text = missing(context.state, effects) or str(problem)
+        named = [effect for effect in effects if f"{effect} cannot be identified" in text]
+        checked = sorted(_shown_by_verification(context, named))
+        also = f"; {', '.join(checked)}: {OF_VERIFICATION}; {REMEDY}" if checked else ""
+        raise NotIdentified(f"plan {context.recipe.name}: {text}{also}") from None
+
+
+def _shown_by_verification(context: PlanContext, effects: Sequence[str]) -> set[str]:
+    return shown_by_verification(context.activities, context.station, context.recipe, effects)
 
 
 def missing(state: State, effects: Sequence[str]) -> str:
@@ -228,7 +237,15 @@ def _unit(effect: str, place: int) -> str:
     return unit_texts(known, "µg")[place] if isinstance(known, SensorEffect) else "µrad"
 
 
-def _row(visibility: Visibility, state: State, model: Sequence[str]) -> dict[str, Any]:
+def _why(visibility: Visibility, context: PlanContext, checked: Collection[str]) -> str:
+    """Why an effect is not visible; empty where it is."""
+    if visibility.seen:
+        return ""
+    text = reason(context.state, visibility.effect, context.recipe.effects)
+    return f"{text or visibility.breaker}; {OF_VERIFICATION}" if visibility.effect in checked else text
+
+
+def _row(visibility: Visibility, context: PlanContext, checked: Collection[str]) -> dict[str, Any]:
     finite = bool(np.isfinite(visibility.floor))
     return {
         "effect": visibility.effect,
@@ -248,5 +265,5 @@ def _row(visibility: Visibility, state: State, model: Sequence[str]) -> dict[str
             {"parameter": r.parameter, "unit": r.unit, "from": r.low, "to": r.high, "text": str(r)}
             for r in visibility.unseen_ranges
         ],
-        "why": "" if visibility.seen else reason(state, visibility.effect, model),
+        "why": _why(visibility, context, checked),
     }

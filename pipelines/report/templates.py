@@ -9,11 +9,30 @@ from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 
+from inertial import effects
+from pipelines.stages.figures import FIGURES
+
 
 @cache
 def _environment() -> Environment:
     loader = FunctionLoader(lambda part: (files("pipelines.report") / part).read_text(encoding="utf-8"))
-    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    own: dict[str, Any] = {"plain_name": plain_name, "figure_name": figure_name}
+    made.globals.update(own)
+    return made
+
+
+def plain_name(effect_id: str) -> str:
+    """What an effect is, in a few words for readers of a page; empty for an id that is not of the catalogue."""
+    if effect_id not in effects.catalogue():
+        return ""
+    text = (type(effects.get(effect_id)).__doc__ or "").strip().splitlines()[:1]
+    return text[0].partition(":")[0].rstrip(".") if text else ""
+
+
+def figure_name(figure: str) -> str:
+    """What a figure of merit is, in a few words for readers of a page; empty for one of another version."""
+    return FIGURES[figure].label if figure in FIGURES else ""
 
 
 def template(name: str) -> Template:

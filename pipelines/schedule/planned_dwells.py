@@ -37,7 +37,7 @@ def planned_dwells(recipe: Recipe, station: StationConfig, activities: list[Acti
     checks = [one for one in whole if one.kind == "verification"]
     return Planned(
         fit=state_of(whole, station, recipe),
-        verification=state_of(whole, station, recipe, kind="verification") if checks else None,
+        verification=state_of(whole, station, recipe, kinds=("verification",)) if checks else None,
         soak=np.array([one.step.soak for one in own]),
         target_C=np.array([one.step.temperature for one in own]),
     )

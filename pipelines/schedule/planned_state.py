@@ -18,7 +18,7 @@ from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.profile_files import recorded_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -59,10 +59,10 @@ def state_of(
     *,
     history: bool = False,
     recorded: Iterable[str] | None = None,
-    kind: str = "dwell",
+    kinds: Collection[str] = ("dwell",),
 ) -> State:
-    """The dwells of the fit, or of another kind, among what a station does, see :func:`planned_state`."""
-    dwells = [s for s in stretches if s.kind == kind]
+    """The dwells of the fit, or of other kinds, among what a station does, see :func:`planned_state`."""
+    dwells = [s for s in stretches if s.kind in kinds]
     outer, inner = np.radians([(s.step.pose.outer_deg, s.step.pose.inner_deg) for s in dwells]).T
     time = np.array([s.start + 0.5 * s.seconds for s in dwells])
     settled = np.array([s.step.settled for s in dwells])

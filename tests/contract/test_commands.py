@@ -64,6 +64,34 @@ def test_the_help_of_a_command_shows_two_examples_with_options_that_exist(name: 
         command.make_context(name, rest)  # parses: every argument and value is of its kind
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_subcommand_shows_two_examples_of_its_own(name: str) -> None:
+    group = get_command(app).get_command(None, name)._load()
+    for own, leaf in getattr(group, "commands", {}).items():
+        text = CliRunner().invoke(app, [name, own, "--help"], env={"COLUMNS": "160"}).stdout
+        examples = re.findall(rf"^ *(tumbleline {name}\b.*?) *$", text.split("Examples:")[1], re.MULTILINE)
+        assert len(set(examples)) == 2, own
+        for example in examples:
+            command, rest = meant(group, shlex.split(example)[2:])
+            assert command is leaf, example
+            command.make_context(own, rest)
+
+
+def test_help_needs_eighty_columns_at_most_and_breaks_no_option() -> None:
+    for name in COMMANDS:
+        group = get_command(app).get_command(None, name)._load()
+        subcommands = [[name, own] for own in getattr(group, "commands", {})]
+        for words in [[name], *subcommands]:
+            text = CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "80", "NO_COLOR": "1"}).stdout
+            lines = text.splitlines()
+            assert [line for line in lines if len(line) > 80 and not line.lstrip().startswith("tumbleline ")] == []
+            if len(words) == 1 and subcommands:
+                continue  # the options are those of the subcommands
+            leaf = getattr(group, "commands", {}).get(words[-1], group)
+            options = {option for p in leaf.params for option in p.opts if option.startswith("--")}
+            assert {option for option in options if not re.search(rf"{option}\b", text)} == set(), words
+
+
 def meant(command: object, rest: list[str]) -> tuple[TyperCommand, list[str]]:
     """The subcommand that words begin with, or the usual one of the group, and the words after it."""
     below = getattr(command, "commands", {})

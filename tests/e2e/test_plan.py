@@ -177,3 +177,35 @@ def test_effects_that_slow_noise_hides_are_listed_with_what_shows_them():
     assert re.search(r"step_change|warm_up|bias_temperature_quadratic|creep_after_move", listed)
     done = CliRunner().invoke(app, ["plan", "--noise", "2", "--wander", "0"])
     assert "raised by slow noise" not in done.stdout
+
+
+def test_an_effect_that_only_the_verification_poses_show_is_refused_with_the_reason(tmp_path):
+    """The diagnosis of such a run names it, as it uses every dwell; the plan says why a fit cannot have it."""
+    from capture_double import CaptureDouble
+
+    from pipelines.archive import Archive
+    from pipelines.chain.runner import Runner
+    from pipelines.cli.fit_refusal import fit_refusal
+    from pipelines.jobs.job import Request
+
+    source = Path(__file__).resolve().parents[2] / "deploy" / "recipes"
+    text = (source / "line-twelve.toml").read_text(encoding="utf-8")
+    (tmp_path / "line-temperature.limits.toml").write_bytes((source / "line-temperature.limits.toml").read_bytes())
+    recipe = tmp_path / "twelve.toml"
+    recipe.write_text(text, encoding="utf-8")
+    runner = Runner(Request(str(recipe)).job(), Archive(tmp_path / "archive"), measure=CaptureDouble())
+    runner.stage("capture")
+    model = [*runner.job.recipe.effects, "third_order"]
+    assert fit_refusal(runner.run, runner.job.recipe.effects) == ""
+    told = fit_refusal(runner.run, model)
+    done = CliRunner().invoke(app, ["plan", str(recipe), "--effects", ",".join(model)])
+    assert done.exit_code != 0
+    for message in (told, str(done.exception)):
+        assert "third_order cannot be identified" in message
+        assert "only the verification poses show it, which a diagnosis uses and a fit leaves out" in message
+        assert "move poses from 'verification' to 'poses'" in message
+    without = tmp_path / "without.toml"
+    without.write_text("\n".join(line for line in text.splitlines() if "verification" not in line), encoding="utf-8")
+    refused = CliRunner().invoke(app, ["plan", str(without), "--effects", ",".join(model)])
+    assert "third_order cannot be identified" in str(refused.exception)
+    assert "verification" not in str(refused.exception)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typed_commands import printed_commands
 from typer.testing import CliRunner
 
 from inertial.frames import force_from_angles
@@ -51,6 +52,16 @@ def test_the_recipe_that_is_written_is_what_was_told(found):
     assert recipe.temperatures_C == document["temperatures_C"]
     planned = minutes(steps(recipe), load_station(), recipe)
     assert planned.total == pytest.approx(document["minutes"]["total"], abs=0.05)
+
+
+@pytest.mark.slow
+def test_the_line_after_a_search_measures_the_new_recipe(tmp_path):
+    target = tmp_path / "my new recipe.toml"
+    base = ["plan", "optimise", "--device", "analogue", "--effects", THERMAL, "--factor", "4", "-o", str(target)]
+    done = CliRunner().invoke(app, base)
+    (words,) = printed_commands(done.stdout)
+    assert words == ["run", str(target)]
+    assert CliRunner().invoke(app, [*words, "--direct", "--archive", str(tmp_path / "archive")]).exit_code in {0, 1}
 
 
 def test_the_new_recipe_is_compared_with_the_own_one_and_the_textbook_plan(found):

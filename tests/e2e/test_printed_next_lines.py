@@ -64,10 +64,13 @@ def test_the_printed_lines_carry_the_history_and_confirm_the_effect(command, lag
     lines = next_lines(out)
     assert [words[0] for words in lines] == ["extend", "history"]
     assert lines[1][lines[1].index("--history") + 1] == "b/temperatures.parquet"
-    told = {"ANOTHER-RUN-OF-THE-SAME-UNITS": "a/again.parquet", "ITS-HISTORY": "b/again-temperatures.parquet"}
-    for words in lines:
-        status, out, err = command(*(told.get(word, word) for word in words))
+    assert "give it to history with --fresh and its temperatures with --fresh-history" in one_row(out)
+    for words in lines:  # as they are printed
+        status, out, err = command(*words)
         assert status == 0, err
+    again = ("--fresh", "a/again.parquet", "--fresh-history", "b/again-temperatures.parquet")
+    status, out, err = command(*lines[1], *again)
+    assert status == 0, err
     assert re.search(r"(?<!not )confirmed:", one_row(out))
     assert "warning" not in out
     assert "remove it from the model" not in out
@@ -86,6 +89,8 @@ def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(
     lines = next_lines(out)
     assert lines[-1][lines[-1].index("--history") + 1] == "history.parquet"
     command(*lines[0])
+    status, out, err = command(*lines[1], "--json")
+    assert json.loads(out)["versions"][-1]["confirmed"] is True
     # the fresh run's own history stands beside it as well
     words = lines[-1][: lines[-1].index("--fresh")]
     status, out, err = command(*words, "--fresh", "fresh.parquet", "--json")

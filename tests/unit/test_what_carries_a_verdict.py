@@ -50,7 +50,7 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
         assert without["p_value"] < 1e-6
     first = group["influence"][0]
     share = f"({100.0 * first['share']:.0f} %)"
-    print_diagnosis(document, source="dwells.parquet", model=None)
+    print_diagnosis(document, data=None, model=None)
     text = " ".join(capsys.readouterr().out.split())
     assert (
         f"dwells with the largest influence on {' or '.join(group['effects'])}: {first['unit']} dwell {first['dwell']} {share}"
@@ -70,7 +70,7 @@ def test_dwells_left_out_as_tails_are_listed_beside_a_verdict_of_adequate(tmp_pa
     document = json.loads(CliRunner().invoke(app, given).stdout)
     assert document["classes"] == []
     assert document["removed"]["heavy_tails"] is True
-    print_diagnosis(document, source="dwells.parquet", model=None)
+    print_diagnosis(document, data=None, model=None)
     assert "the tails of the noise of this run may reach as far" in " ".join(capsys.readouterr().out.split())
     assert "the tails of the noise of this run may reach as far" in (tmp_path / "page.html").read_text(encoding="utf-8")
 

@@ -1,0 +1,160 @@
+"""Commands to give next, as lines that can be pasted: every file, run and archive in them exists, and every word is quoted."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rich.console import Console
+
+PROGRAM = "tumbleline"
+MEASURE_AGAIN = (
+    "Only a second measurement of the same units confirms an effect: give it to history with --fresh{history}."
+)
+
+
+@dataclass(frozen=True)
+class JudgedData:
+    """The data that a command judged, as they were named on the command line.
+
+    source : dwells, a file or a run · history : the file of temperatures against time that was read; empty where there was none
+    fresh, fresh_history : the same units measured again; empty where no such data are known
+    measure : the words of the command that measures ``fresh``; none where it is there
+    refusal : why the recipe of a run cannot fit a model; None where the data are not from a recipe
+    archive : as it was given; None for the default one
+    """
+
+    source: str
+    history: str = ""
+    fresh: str = ""
+    fresh_history: str = ""
+    archive: str | None = None
+    measure: tuple[str, ...] = ()
+    refusal: Callable[[Sequence[str]], str] | None = None
+
+    @property
+    def options(self) -> list[str]:
+        """The options that name history and archive."""
+        return [*(["--history", self.history] if self.history else []), *archive_words(self.archive)]
+
+
+FindData = Callable[[], JudgedData]
+"""Gives the data of a command; see :func:`judged_data`."""
+
+
+def command_line(*words: str) -> str:
+    """A command of this program as a line for a shell."""
+    return shlex.join([PROGRAM, *words])
+
+
+def archive_words(archive: str | None) -> list[str]:
+    """The option that names an archive; none for the default one."""
+    return ["--archive", str(archive)] if archive else []
+
+
+def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
+    """The data of a command, with a fresh run: the one beside a file, or the one that an archive holds or will hold.
+
+    Parameters
+    ----------
+    history : the file of temperatures against time that was read; empty where there was none
+    """
+    from pipelines.diagnosis.inputs import fresh_beside, history_beside
+    from pipelines.importers.exchange import is_file
+
+    if is_file(source):
+        fresh = fresh_beside(source)
+        return JudgedData(source, history, fresh, history_beside(fresh) if fresh and history else "", archive)
+    from pipelines.archive import Archive
+    from pipelines.chain.runner import decisive
+    from pipelines.cli.fit_refusal import fit_refusal
+    from pipelines.jobs.fresh_run import fresh_repeat, fresh_run_of, repeatable
+    from pipelines.jobs.job import OF_RUN, job_of_run, measured_again
+
+    store = Archive(archive)
+    run = store.run(source)
+    if not repeatable(run):
+        return JudgedData(run.id, history, archive=archive)
+    refusal = partial(fit_refusal, run)
+    found = fresh_run_of(store, run)
+    if found is not None:
+        return JudgedData(run.id, history, found.id, archive=archive, refusal=refusal)
+    repeat = fresh_repeat(store, run)
+    job = measured_again(job_of_run(run), repeat)
+    words = ("run", f"{OF_RUN}{run.id}", "--repeat", str(repeat), *archive_words(archive))
+    fresh = store.run_name(job.recipe.name, decisive(job))
+    return JudgedData(run.id, history, fresh, archive=archive, measure=words, refusal=refusal)
+
+
+def extension(
+    file: Path | str, effects: Sequence[str], judged: Sequence[str], data: JudgedData, *, new: bool
+) -> list[str]:
+    """The commands that add effects to a model file, and the one that shows the errors of its versions.
+
+    Parameters
+    ----------
+    judged : the model that was judged; a new file begins with it
+    new : whether the file does not exist yet
+    """
+    start = ["--effects", ",".join(judged)] if new else []
+    lines = [
+        command_line("extend", str(file), name, *(start if place == 0 else []), "--run", data.source)
+        for place, name in enumerate(effects)
+    ]
+    return [*lines, *fresh_measurement(file, data)]
+
+
+def fresh_measurement(file: Path | str, data: JudgedData) -> list[str]:
+    """The command that measures the units again, where that is possible and not done, and the one that shows the errors."""
+    return [*([command_line(*data.measure)] if data.measure else []), versions(file, data)]
+
+
+def versions(file: Path | str, data: JudgedData) -> str:
+    """The command that shows the errors of the versions of a model."""
+    fresh = ["--fresh", data.fresh] if data.fresh else []
+    if data.fresh_history:
+        fresh += ["--fresh-history", data.fresh_history]
+    return command_line("history", str(file), "--dwells", data.source, *data.options, *fresh)
+
+
+def print_next(out: Console, lines: Sequence[str]) -> None:
+    """Print commands under a heading."""
+    if lines:
+        out.print("\nNext:", style="bold")
+        for line in lines:
+            out.print(f"  {line}", markup=False, soft_wrap=True)
+
+
+def print_extension(out: Console, document: dict[str, Any], find: FindData, model: Path | None) -> None:
+    """Print the commands that add the recommended effects of a diagnosis and judge them.
+
+    Parameters
+    ----------
+    find : gives the data; called only where there is something to add: to look for a fresh run takes a second
+    model : the model file that was judged; None for a list of effects
+    """
+    if not document["recommended"]:
+        return
+    data = find()
+    file = model or free_name()
+    new = not (model and model.exists())
+    if data.refusal is not None and (why := data.refusal([*document["effects"], *document["recommended"]])):
+        out.print(why, style="yellow", markup=False, soft_wrap=True)
+    print_next(out, extension(file, document["recommended"], document["effects"], data, new=new))
+    if not data.fresh:
+        its_own = " and its temperatures with --fresh-history" if data.history else ""
+        out.print(MEASURE_AGAIN.format(history=its_own), style="dim", markup=False, soft_wrap=True)
+
+
+def free_name() -> str:
+    """A name for a new model file; an existing file belongs to another model."""
+    from pathlib import Path
+
+    names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
+    return next(name for name in names if not Path(name).exists())

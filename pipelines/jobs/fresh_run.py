@@ -1,0 +1,58 @@
+"""A second measurement of a run's units by the same recipe on the same station, which no fit has seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.jobs.job import ANALYSIS_KEYS, job_of_run, measured_again
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from pipelines.archive import Archive, Run
+
+
+def fresh_run_of(archive: Archive, run: Run) -> Run | None:
+    """The newest finished run that measured the same units in the same way again; None where there is none."""
+    if not repeatable(run):
+        return None
+    about = run.about
+    units = tuple(unit["serial"] for unit in about["lot"]["units"])
+    wanted = _measurement(about)
+    for info in reversed(archive.runs()):
+        if not info.finished or info.rerun_of or info.units != units:
+            continue
+        other = archive.run(info.id)
+        try:
+            same = _measurement(other.about) == wanted
+        except (ArchiveUnusable, KeyError):  # 'tumbleline verify' says what is wrong with it
+            continue
+        if same and other.about["capture"] != about["capture"] and not other.about.get("parents"):
+            return other
+    return None
+
+
+def repeatable(run: Run) -> bool:
+    """Whether a station measured the whole recipe of a run, so that it can do so again."""
+    return bool(run.about.get("capture")) and not run.about.get("parents")
+
+
+def fresh_repeat(archive: Archive, run: Run) -> int:
+    """The first count of repeats after the run's whose capture is not finished: one that was begun and stopped goes on.
+
+    Raises
+    ------
+    WrongUse
+        The run was imported, or measured only what another run lacked.
+    """
+    job = job_of_run(run)
+    repeat = job.lot.repeat + 1
+    while archive.capture(measured_again(job, repeat).capture_id).is_complete():
+        repeat += 1
+    return repeat
+
+
+def _measurement(about: dict[str, Any]) -> tuple[Any, ...]:
+    """What decides on a measurement but the noise: poses and soaks, station, units and their places."""
+    recipe = {key: value for key, value in about["recipe"].items() if key not in ANALYSIS_KEYS}
+    lot = {key: value for key, value in about["lot"].items() if key != "repeat"}
+    return recipe, lot, about["station"].get("name")

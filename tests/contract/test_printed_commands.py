@@ -1,0 +1,81 @@
+"""Every command that a message, a page or a line under "Next" names: it exists, with its options, wherever it stands in the code.
+
+What is printed under "Next" is run in ``tests/e2e/test_next_lines.py``.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typed_commands import unknown_options
+
+from pipelines.cli import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[2]
+PRODUCT = [
+    path for room in ("pipelines", "stations", "schemas", "inertial") for path in sorted((ROOT / room).rglob("*.py"))
+]
+TEMPLATES = sorted((ROOT / "pipelines").rglob("*.html"))
+
+
+def texts(tree: ast.Module) -> Iterator[str]:
+    """The texts of a module, values within them as X; documentation is left out."""
+    inside = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    documentation = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            yield "".join(part.value if isinstance(part, ast.Constant) else "X" for part in node.values)
+        elif (
+            isinstance(node, ast.Constant) and isinstance(node.value, str) and not {id(node)} & (inside | documentation)
+        ):
+            yield node.value
+
+
+def quoted(text: str) -> list[str]:
+    """The commands within a text: between quotes, or from the name of the program to the end of the line."""
+    pattern = rf"'(tumbleline (?:{NAMES})\b[^'\n]*)'|^ *(tumbleline (?:{NAMES})\b.*)$"
+    return [found[0] or found[1] for found in re.findall(pattern, text, re.MULTILINE)]
+
+
+NAMES = "|".join(re.escape(name) for name in COMMANDS)
+FOUND = [
+    (path.relative_to(ROOT).as_posix(), line)
+    for path in PRODUCT
+    for text in texts(ast.parse(path.read_text(encoding="utf-8")))
+    for line in quoted(text)
+]
+OF_PAGES = [
+    (path.relative_to(ROOT).as_posix(), re.sub(r"{{.*?}}", "X", line))
+    for path in TEMPLATES
+    for line in re.findall(rf"<code>(tumbleline (?:{NAMES})\b[^<]*)</code>", path.read_text(encoding="utf-8"))
+]
+
+
+def test_messages_name_commands() -> None:
+    assert len(FOUND) > 80
+
+
+@pytest.mark.parametrize("path", sorted({path for path, _ in (*FOUND, *OF_PAGES)}))
+def test_a_command_in_a_message_exists_with_its_options(path: str) -> None:
+    for line in (line for place, line in (*FOUND, *OF_PAGES) if place == path):
+        closed = line if line.count('"') % 2 == 0 else line.replace('"', "")
+        assert unknown_options(closed.replace("{", "").replace("}", "")) == set(), line
+
+
+def test_a_command_on_a_line_of_its_own_is_made_of_quoted_words() -> None:
+    """By one function: a name with a blank in it would otherwise break the line that is pasted."""
+    raw = {
+        (path.stem, text)
+        for path in (ROOT / "pipelines" / "cli").glob("*.py")
+        for text in texts(ast.parse(path.read_text(encoding="utf-8")))
+        if re.match(rf" +tumbleline (?:{NAMES})\b", text)
+    }
+    assert raw == set()

@@ -1,0 +1,121 @@
+"""What every command prints needs eighty columns at most; what is copied (commands, paths, serial numbers) stays whole."""
+
+import contextlib
+import io
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from capture_double import CaptureDouble, small_job
+from test_next_lines import MODEL
+
+from pipelines.archive import Archive
+from pipelines.archive.signatures import VARIABLE
+from pipelines.chain.runner import Runner
+from pipelines.cli import COMMANDS, main
+
+WIDE = 80
+OUTPUTS = {
+    "list": ["list"],
+    "show": ["show", "latest", "coefficients"],
+    "report": ["report", "latest"],
+    "lineage": ["lineage", "latest"],
+    "verify": ["verify"],
+    "certify": ["certify", "latest", "--units", "A1"],
+    "revoke": ["revoke", "A1", "--reason", "fell to the floor"],
+    "export": ["export", "latest", "--format", "csv"],
+    "audit": ["audit"],
+    "query": ["query", "select unit, figure, value from figures limit 5"],
+    "rerun": ["rerun", "all", "--check"],
+    "fit": ["fit", "latest", "--limits", "industrial"],
+    "diff": ["diff", "latest", "latest"],
+    "release": ["release", "--list"],
+    "compare": ["compare", "latest"],
+    "diagnose": ["diagnose", "latest", "--effects", "bias,scale,misalignment"],
+    "history": ["history", "m.toml"],
+    "extend": ["extend", "n.toml", "third_order"],
+    "plan": ["plan", "small.toml"],
+    "run": ["run", "small.toml", "--direct"],
+    "station": ["station", "log"],
+    "keys": ["keys", "recipe"],
+    "inspect": ["inspect", "rest.csv"],
+    "import": ["import", "rest.csv", "--map", "time=t,x=x,y=y,z=z", "--units", "output=g", "--unit", "R1"],
+    "allan": ["allan", "rest.csv", "--rate", "100", "--columns", "x,y,z"],
+    "psd": ["psd", "rest.csv", "--rate", "100", "--columns", "x,y,z"],
+    "monitor": ["monitor"],
+    "archive": ["archive", "clean", "--dry-run"],
+}
+"""The main output of each command, in this order, in a folder with one run."""
+
+ELSEWHERE = {
+    "demo": "measures for half a minute; its tables are those of compare and diagnose",
+    "improve": "tests/e2e/test_improve.py: its tables, of eighty columns",
+    "investigate": "measures for minutes; its tables are those of diagnose",
+    "whatif": "fits the archive twice; its table is that of diff",
+    "workbench": "serves pages",
+    "operator": "asks an orchestrator",
+    "doctor": "asks an orchestrator; its table is tested in tests/unit/test_doctor.py",
+    "program": "moves a station",
+    "certificate": "writes documents, prints one line each",
+    "correct": "prints lines, tests/e2e/test_correct.py",
+    "waveforms": "prints one line",
+}
+
+
+def test_every_command_has_an_output_here_or_a_reason() -> None:
+    assert set(COMMANDS) == set(OUTPUTS) | set(ELSEWHERE)
+    assert not set(OUTPUTS) & set(ELSEWHERE)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a line: recipe, archive with one run, a model, a record at rest."""
+    place = tmp_path_factory.mktemp("line")
+    rng = np.random.default_rng(3)
+    rest = pd.DataFrame(rng.normal([0.0, 0.0, 1.0], 1e-4, (3000, 3)), columns=["x", "y", "z"])
+    rest.insert(0, "t", np.arange(3000) / 100.0)
+    rest.to_csv(place / "rest.csv", index=False)
+    (place / "m.toml").write_text(MODEL, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, "")
+        list(Runner(small_job(place), Archive(place / "archive"), measure=CaptureDouble()).all())
+    return place
+
+
+def printed(words: list[str], columns: str | None) -> str:
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        patch.setattr(sys, "argv", ["tumbleline", *words])
+        patch.setenv("NO_COLOR", "1")
+        patch.setenv("COLUMNS", columns) if columns else patch.delenv("COLUMNS", raising=False)
+        with pytest.raises(SystemExit) as left:
+            main()
+    assert left.value.code in {0, 1, None}, (words, err.getvalue())
+    return out.getvalue()
+
+
+def copied(line: str) -> bool:
+    """Whether a line is one that is copied: a command, a statement of a file, or one with a word longer than the terminal."""
+    text = line.strip()
+    return text.startswith("tumbleline ") or max(map(len, text.split()), default=0) > WIDE - 20
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_the_output_of_a_command_needs_eighty_columns(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv(VARIABLE, "")
+    text = printed(OUTPUTS[name], str(WIDE))
+    if name != "export":  # a file, whose lines are as long as its format needs
+        assert [line for line in text.splitlines() if len(line) > WIDE and not copied(line)] == []
+    assert text
+
+
+def test_a_table_in_a_pipe_has_every_column_and_no_cell_is_cut(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    text = printed(["show", "small", "coefficients"], None)
+    heads = next(line for line in text.splitlines() if "effect" in line)
+    assert {"unit", "effect", "name", "axis", "value"} <= set(heads.split())
+    assert not re.search(r"\S…", text)

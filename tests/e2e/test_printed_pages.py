@@ -1,0 +1,128 @@
+"""What README and guides show as printed is printed: each block with an output is compared by a test, here or elsewhere."""
+
+import contextlib
+import io
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipelines.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted((ROOT / "deploy").glob("*.md"))]
+COMPARED = {
+    "find-a-missing-effect": "tests/e2e/test_diagnosis_docs.py",
+    "add-your-own-effect": "tests/e2e/test_diagnosis_docs.py",
+    "from-a-spreadsheet": "tests/e2e/test_pages_by_role.py",
+    "trace-a-certificate": "tests/e2e/test_trace_docs.py",
+    "export": "tests/e2e/test_export_docs.py",
+    "import-your-data": "tests/e2e/test_import_docs.py",
+    "correct-a-recording": "tests/e2e/test_correct.py",
+    "improve-a-model": "tests/e2e/test_printed_pages.py",
+    "README": "tests/e2e/test_printed_pages.py",
+    "issue-a-certificate": "tests/e2e/test_printed_pages.py",
+    "program-the-device": "tests/faults/test_programming.py",
+}
+"""Pages with printed outputs, and the test that compares them."""
+
+
+def outputs(page: Path) -> list[tuple[str, str]]:
+    """The commands of the console blocks of a page below which an output stands, with it."""
+    found: list[tuple[str, str]] = []
+    for block in re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
+        for command, printed in re.findall(r"^\$ (tumbleline .*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE):
+            if printed.strip():
+                found.append((command.split("  #")[0].strip(), printed))
+    return found
+
+
+def test_every_page_that_shows_an_output_is_compared_by_a_test() -> None:
+    shown = {page.stem for page in PAGES if outputs(page)}
+    assert shown == set(COMPARED)
+    for stem, test in COMPARED.items():
+        text = (ROOT / test).read_text(encoding="utf-8")
+        assert stem in text or f"{stem}.md" in text, (stem, test)
+
+
+def pattern(printed: str) -> str:
+    """A printed text as a pattern: blanks and numbers may differ, ``…`` stands for anything."""
+    words = re.escape(" ".join(re.sub(r"[─\s]+", " ", printed).split()))
+    return re.sub(r"\d+(?:\\?\.\d+)?(?:e\\?-?\d+)?", r"[\\d.e+-]+", words).replace("…", ".*?")
+
+
+def given(command: str) -> tuple[int, str, str]:
+    """The command line in this process: status, standard output, standard error."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        patch.setattr(sys, "argv", shlex.split(command))
+        patch.setenv("COLUMNS", "100")
+        with pytest.raises(SystemExit) as left:
+            main()
+    return int(left.value.code or 0), out.getvalue(), err.getvalue()
+
+
+def compared(command: str, printed: str) -> None:
+    status, out, err = given(command)
+    assert status in {0, 1}, (command, err)
+    text = " ".join(re.sub(r"[─\s]+", " ", out).split())
+    assert re.search(pattern(printed), text), (command, text)
+
+
+def test_a_removed_effect_is_told_as_the_guide_to_improvements_shows(tmp_path: Path, monkeypatch) -> None:
+    ((command, printed),) = outputs(ROOT / "docs" / "how-to" / "improve-a-model.md")
+    monkeypatch.chdir(tmp_path)
+    Path("game").mkdir()
+    given("tumbleline extend game/model.toml cross_coupling --effects bias,scale,misalignment")
+    compared(command, printed)
+
+
+@pytest.mark.slow
+def test_the_story_of_the_readme_prints_what_it_shows(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    story = text[text.index("## Find the missing effect") : text.index("## On the line")]
+    shown = dict(outputs(ROOT / "README.md"))
+    for command in re.findall(r"^\$ (tumbleline .*)$", story, re.MULTILINE):
+        if command in shown:
+            compared(command, shown[command])
+        else:
+            status, _, err = given(command)
+            assert status == 0, (command, err)
+
+
+@pytest.mark.slow
+def test_the_main_job_prints_what_the_readme_shows(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    block = re.search(r"```\n( +fit +verify.*?)```", text, flags=re.DOTALL)
+    assert block is not None
+    status, out, err = given("tumbleline run")
+    assert status == 0, err
+    words = " ".join(re.sub(r"[─\s]+", " ", re.sub(r"production-\w+", "RUN", out)).split())
+    wanted = pattern(re.sub(r"production-\w+", "RUN", block[1]))
+    assert re.search(wanted, words), words
+    shown = dict(outputs(ROOT / "README.md"))
+    compared("tumbleline diagnose latest", shown["tumbleline diagnose latest"])
+
+
+@pytest.mark.slow
+def test_a_certificate_is_told_as_its_guide_shows(tmp_path: Path, monkeypatch) -> None:
+    pytest.importorskip("typst")
+    from capture_double import CaptureDouble, small_job
+
+    from pipelines.archive import Archive
+    from pipelines.archive.signatures import VARIABLE
+    from pipelines.chain.runner import Runner
+
+    page = ROOT / "docs" / "how-to" / "issue-a-certificate.md"
+    ((command, printed),) = outputs(page)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(VARIABLE, "")
+    list(Runner(small_job(tmp_path), Archive("archive"), measure=CaptureDouble()).all())
+    laboratory = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)[0]
+    Path("laboratory.toml").write_text(laboratory, encoding="utf-8")
+    assert given("tumbleline certify latest")[0] == 0
+    compared(command, printed)
