@@ -1,5 +1,6 @@
 """A run whose samples are those of the simulated station's own units, made in a second, to be written into these units."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,12 +8,14 @@ from typing import Any
 
 import numpy as np
 from capture_double import CaptureDouble, small_job
+from pydantic import TypeAdapter
 
 from pipelines.archive import Archive, Run
 from pipelines.certificates.programmed import TOP
 from pipelines.chain.runner import Runner
+from pipelines.cli.documents.devices import ProgramDocument
 from pipelines.jobs.job import Job
-from pipelines.programming.job import chosen_units, program_run, station_of
+from pipelines.programming.job import chosen_units, document, program_run, station_of
 from pipelines.programming.outcome import Choice, Outcome
 from stations.opening import make_plant
 from stations.plant.plant import Plant
@@ -60,6 +63,8 @@ def keep_state(run: Run, job: Job, prepare: Callable[[Plant], None]) -> None:
 def programmed(run: Run, serials: tuple[str, ...] = (), **choice: Any) -> tuple[dict[str, Outcome], dict[str, str]]:
     """The units written, by serial, and their certificates."""
     outcomes, given = program_run(run, chosen_units(run, serials), station_of(run), Choice(**choice), lambda text: None)
+    printed = json.dumps(document(run, outcomes, given))
+    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")  # as --json prints it
     return {one.serial: one for one in outcomes}, given
 
 

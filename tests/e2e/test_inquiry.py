@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.cli.documents import OperatorDocument
+from pipelines.cli.documents.station import OperatorDocument
 from pipelines.inquiry.documents import InquiryDocument
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
 from pipelines.inquiry.joint_diagnosis import JointDiagnosis
