@@ -16,7 +16,7 @@ from pipelines.chain.runner import Runner
 from pipelines.cli.documents.devices import ProgramDocument
 from pipelines.jobs.job import Job
 from pipelines.programming.job import chosen_units, document, program_run, station_of
-from pipelines.programming.outcome import Choice, Outcome
+from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from stations.opening import make_plant
 from stations.plant.plant import Plant
 
@@ -60,7 +60,9 @@ def keep_state(run: Run, job: Job, prepare: Callable[[Plant], None]) -> None:
     place.write_bytes(plant.journal.state(plant.now_us))
 
 
-def programmed(run: Run, serials: tuple[str, ...] = (), **choice: Any) -> tuple[dict[str, Outcome], dict[str, str]]:
+def programmed(
+    run: Run, serials: tuple[str, ...] = (), **choice: Any
+) -> tuple[dict[str, ProgrammingOutcome], dict[str, str]]:
     """The units written, by serial, and their certificates."""
     outcomes, given = program_run(run, chosen_units(run, serials), station_of(run), Choice(**choice), lambda text: None)
     printed = json.dumps(document(run, outcomes, given))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.finding import AuditFinding
-    from pipelines.audit.stations_over_time import Chart, StationSeries
+    from pipelines.audit.stations_over_time import ControlChart, StationSeries
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 
@@ -102,7 +102,7 @@ def _telling_series(audit: Audit) -> list[StationSeries]:
     return [one for one in audit.stations if one.where == "level_error"][:MOST_SERIES]
 
 
-def _telling_charts(audit: Audit) -> list[Chart]:
+def _telling_charts(audit: Audit) -> list[ControlChart]:
     return sorted(audit.charts, key=lambda chart: (chart.p_value, chart.station, chart.parameter))[:MOST_CHARTS]
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.reproduce import Reproduction
-    from pipelines.rerun.rerun import Outcome
+    from pipelines.rerun.rerun import RerunOutcome
 
 PART = "Old data, new models"
 ORDER = 520
@@ -79,7 +79,7 @@ def command(
         return
     from pipelines.rerun.partition import run_again
 
-    outcomes: list[Outcome] = _mapped(run_again, store, runs, (change, dask, count), report=report)
+    outcomes: list[RerunOutcome] = _mapped(run_again, store, runs, (change, dask, count), report=report)
     document = {"archive": str(store.root), "runs": [asdict(one) for one in outcomes], **_counts(outcomes)}
     if as_json:
         print_json(document)
@@ -132,13 +132,13 @@ def _mapped(
     return [one for portion in done for one in portion]
 
 
-def _counts(outcomes: list[Outcome]) -> dict[str, int]:
+def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
     failed = sum(bool(one.error) for one in outcomes)
     anew = sum(bool(one.new) and one.new != one.run for one in outcomes)
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
 
 
-def _print(outcomes: list[Outcome], document: dict[str, Any]) -> None:
+def _print(outcomes: list[RerunOutcome], document: dict[str, Any]) -> None:
     lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
@@ -156,7 +156,7 @@ def _print(outcomes: list[Outcome], document: dict[str, Any]) -> None:
         out.print("compare the results with 'tumbleline diff RUN RE-RUN'", style="dim", markup=False)
 
 
-def _line(one: Outcome) -> list[str]:
+def _line(one: RerunOutcome) -> list[str]:
     whats = dict.fromkeys("code" if change["what"] == "code" else change["what"] for change in one.because)
     worked = [name for name, how in one.stages.items() if how == "computed"]
     return [one.run, one.new if one.new != one.run else "—", ", ".join(whats) or "nothing", ", ".join(worked) or "none"]

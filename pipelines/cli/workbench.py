@@ -62,7 +62,7 @@ def command(
 
     from pipelines.archive import Archive
     from pipelines.workbench.application import create_app
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
     if (certificate is None) != (key is None):
         raise WrongUse("workbench: a certificate and its key are needed together; give both or neither")
@@ -73,7 +73,7 @@ def command(
     )
     listening = place.getsockname()[1] if place is not None else port
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
-    settings = Settings(
+    settings = WorkbenchSettings(
         archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
         tls=certificate is not None, proxied=behind_proxy, station=station, workers=workers,
         **({"token": given} if given else {}),

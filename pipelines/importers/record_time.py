@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers import clocks, values
-from pipelines.importers.clocks import Clock
+from pipelines.importers.clocks import RecordingClock
 from pipelines.importers.mapping import TIME_UNITS, Mapping
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
@@ -38,7 +38,7 @@ def seconds(
     breaks: Sequence[int],
     *,
     dwells: bool = False,
-) -> Clock:
+) -> RecordingClock:
     """Seconds of every row from any beginning.
 
     Parameters
@@ -75,28 +75,28 @@ def seconds(
 
 def _clock(
     columns: Columns[str, pd.Series], mapping: Mapping, stated: Columns[str, str], where: str, *, dwells: bool
-) -> Clock:
+) -> RecordingClock:
     time = columns.get("time")
     if time is not None and values.is_moment(time):
-        return Clock(values.seconds(time, where), "s", ())
+        return RecordingClock(values.seconds(time, where), "s", ())
     if time is not None and clocks.is_stamps(time) and mapping.units.time != "samples":
-        return Clock(clocks.stamps(time, where), "s", ())
+        return RecordingClock(clocks.stamps(time, where), "s", ())
     if time is None or mapping.units.time == "samples":
         if mapping.rate_hz is None:
             raise WrongUse(
                 f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
             )
         count = np.arange(len(columns["x"]), dtype=np.float64) if time is None else finite(time, where)
-        return Clock(count / mapping.rate_hz, "samples", ())
+        return RecordingClock(count / mapping.rate_hz, "samples", ())
     numbers = finite(time, where)
     name = str(time.name)
     if dwells:
         found = clocks.recognised(numbers, name, stated.get(name, ""))
         own = found.unit if not found.reason.startswith("steps") else ""
         unit = mapping.units.time or own or "s"
-        return Clock(numbers * TIME_UNITS[unit], unit, ())
+        return RecordingClock(numbers * TIME_UNITS[unit], unit, ())
     if np.all(numbers == numbers[0]):
-        return Clock(np.zeros(len(numbers)), "s", ())
+        return RecordingClock(np.zeros(len(numbers)), "s", ())
     return clocks.clock(numbers, name, mapping.units.time, stated.get(name, ""), where)
 
 

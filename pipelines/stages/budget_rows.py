@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.stages.budget_terms import BudgetTerms
-    from pipelines.stages.contributions import Source
-    from pipelines.stages.quantities import Quantity, Split
+    from pipelines.stages.contributions import UncertaintySource
+    from pipelines.stages.quantities import BudgetQuantity, VarianceParts
 
     Array = NDArray[np.float64]
 
@@ -71,7 +71,11 @@ def empty() -> dict[str, pd.DataFrame]:
 
 
 def rows_of_quantities(
-    units: Sequence[str], quantities: Sequence[Quantity], found: Split, terms: BudgetTerms, known: Mapping[str, Source]
+    units: Sequence[str],
+    quantities: Sequence[BudgetQuantity],
+    found: VarianceParts,
+    terms: BudgetTerms,
+    known: Mapping[str, UncertaintySource],
 ) -> dict[str, pd.DataFrame]:
     """Tables ``budget`` and ``uncertainties``."""
     names = np.array(found.fit.source.contributions, dtype=object)
@@ -97,7 +101,9 @@ def rows_of_quantities(
     return {"budget": pd.DataFrame(rows), "uncertainties": pd.DataFrame(sums)}
 
 
-def _parts(one: Quantity, unit: int, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]]) -> dict[str, float]:
+def _parts(
+    one: BudgetQuantity, unit: int, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]]
+) -> dict[str, float]:
     """Standard uncertainty of every contribution."""
     if one.extra:
         return {name: float(values[unit]) for name, values in one.extra.items()}
@@ -108,8 +114,8 @@ def _parts(one: Quantity, unit: int, groups: Sequence[str], places: Mapping[str,
 
 
 def _about(
-    name: str, u: float, one: Quantity, unit: int, found: Split, places: Mapping[str, NDArray[np.intp]],
-    known: Mapping[str, Source], terms: BudgetTerms,
+    name: str, u: float, one: BudgetQuantity, unit: int, found: VarianceParts, places: Mapping[str, NDArray[np.intp]],
+    known: Mapping[str, UncertaintySource], terms: BudgetTerms,
 ) -> dict[str, Any]:  # fmt: skip
     """The source of a contribution."""
     plain = {"contribution": name, "u": u, "visible": float("nan"), "sensitivity": float("nan")}
@@ -145,7 +151,9 @@ def _about(
     }
 
 
-def _sum(unit: str, one: Quantity, number: int, own: Sequence[dict[str, Any]], terms: BudgetTerms) -> dict[str, Any]:
+def _sum(
+    unit: str, one: BudgetQuantity, number: int, own: Sequence[dict[str, Any]], terms: BudgetTerms
+) -> dict[str, Any]:
     """The quantity with its combined and expanded uncertainty."""
     if (
         one.extra

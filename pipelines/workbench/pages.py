@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pipelines.report.charts import Chart
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
     from pipelines.workbench.state import PageState
 
 State = TypeVar("State", bound="PageState")
@@ -45,7 +45,7 @@ class Workbench:
     boot : id of this process of the server · navigation : heading and address of the pages, in order
     """
 
-    settings: Settings
+    settings: WorkbenchSettings
     jobs: Jobs
     boot: str = field(default_factory=lambda: secrets.token_hex(8))
     navigation: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])

@@ -14,13 +14,13 @@ from pipelines.workbench.services import jobs as job_table
 from pipelines.workbench.services import lots, models, sources, uploads
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.work import done_in_process
-from pipelines.workbench.settings import Settings
+from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import TumblelineError, WrongUse
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
+def settings(tmp_path: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
 
 
 def ended(table: Jobs, name: str) -> job_table.Job:
@@ -78,7 +78,7 @@ def test_a_defect_in_work_is_said_and_does_not_end_the_process(capsys: pytest.Ca
     assert "Traceback" in capsys.readouterr().err
 
 
-def lot_of(settings: Settings, **state: object) -> str:
+def lot_of(settings: WorkbenchSettings, **state: object) -> str:
     place = settings.folder / "lots" / "abc"
     place.mkdir(parents=True)
     (place / "request.json").write_text(
@@ -90,7 +90,7 @@ def lot_of(settings: Settings, **state: object) -> str:
     return "abc"
 
 
-def test_a_question_is_answered_once_and_by_its_number(settings: Settings) -> None:
+def test_a_question_is_answered_once_and_by_its_number(settings: WorkbenchSettings) -> None:
     name = lot_of(settings)
     with pytest.raises(lots.Stale):
         lots.answer(settings, name, 1, "go")
@@ -102,7 +102,7 @@ def test_a_question_is_answered_once_and_by_its_number(settings: Settings) -> No
         lots.answer(settings, "../abc", 2, "go")
 
 
-def test_a_lot_whose_process_is_gone_is_interrupted(settings: Settings) -> None:
+def test_a_lot_whose_process_is_gone_is_interrupted(settings: WorkbenchSettings) -> None:
     gone = os.fork()
     if gone == 0:
         os._exit(0)
@@ -116,13 +116,13 @@ def test_a_lot_whose_process_is_gone_is_interrupted(settings: Settings) -> None:
 
 
 @pytest.mark.parametrize("units", [["A1", "A1"], ["<script>"], ["A" * 65]])
-def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: Settings, units: list[str]) -> None:
+def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: WorkbenchSettings, units: list[str]) -> None:
     with pytest.raises(TumblelineError):
         lots.start(settings, "production", units, list(range(len(units))), [], 0)
     assert not (settings.folder / "lots").exists()
 
 
-def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Settings) -> None:
+def test_a_model_is_saved_version_by_version_with_its_formulas(settings: WorkbenchSettings) -> None:
     start, formulas = ["bias", "scale"], ["humid = humidity_pct - 45"]
     place, version = models.save(settings, "line-1", start, ["third_order", "humid"], formulas, "seen twice", "run-7")
     assert version == 3
@@ -140,7 +140,7 @@ def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Setting
             models.save(settings, name, start, ["third_order"], [], why, "")
 
 
-def test_only_files_of_the_folder_are_sources(settings: Settings, tmp_path: Path) -> None:
+def test_only_files_of_the_folder_are_sources(settings: WorkbenchSettings, tmp_path: Path) -> None:
     settings.folder.mkdir()
     frame = pd.DataFrame({"unit": ["U"], "dwell": [0]})
     for name in ("dwells.csv", "fresh.csv", "dwells-history.csv"):
@@ -154,7 +154,7 @@ def test_only_files_of_the_folder_are_sources(settings: Settings, tmp_path: Path
             sources.resolve(settings, name, "source")
 
 
-def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: Settings) -> None:
+def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: WorkbenchSettings) -> None:
     first = uploads.keep(settings, "../../etc/a<b>.csv", b"1")
     assert Path(first).parent == settings.folder / "uploads"
     assert uploads.keep(settings, "../../etc/a<b>.csv", b"1") == first

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
-    from pipelines.audit.stations_over_time import Chart as ControlChart
-    from pipelines.audit.stations_over_time import StationSeries
+    from pipelines.audit.stations_over_time import ControlChart, StationSeries
 
 MOST_CHARTS = 6
 MONTHS = 24
