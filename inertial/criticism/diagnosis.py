@@ -96,7 +96,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
 
 def _concluded(run: ExaminedRun, search_: EffectSearch, rng: Generator) -> Diagnosis:
     """The diagnosis by the result of the search."""
-    base, fields, found = search_.base, search_.field, search_.found
+    base, fields, found = search_.base, search_.field, search_.result
     problem = base.problem
     drivers = drivers_of(problem)
     log_p = adequacy(fields, drivers, base, rng)

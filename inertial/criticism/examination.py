@@ -98,7 +98,7 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
     run.removed = bad_dwells(run.model())
     found = mended(run)
     for _ in range(_TURNS):
-        if not run.handled and not found.found.added:
+        if not run.handled and not found.result.added:
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=found.base.problem.slope)
@@ -117,12 +117,12 @@ class EffectSearch:
     base: Model
     field: Candidates
     part: "LotPart"
-    found: SearchResult
+    result: SearchResult
 
     @property
     def model(self) -> Model:
         """The model with all added terms."""
-        return self.found.model
+        return self.result.model
 
 
 def mended(run: ExaminedRun) -> EffectSearch:

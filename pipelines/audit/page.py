@@ -12,7 +12,7 @@ from pipelines.audit.finding import WHO
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.pictures import chart_plot, drift_plot, due_plot, series_plot, yield_plot
 from pipelines.report.diagnosis import chance
-from pipelines.report.numbers import THIN, plain
+from pipelines.report.numbers import THIN, significant
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         slots=audit.slot_means,
         odd=audit.odd[:MOST_ROWS],
         unit_text=unit_text,
-        number=plain,
+        number=significant,
         signed=_signed,
         chance=chance,
         date=_date,
@@ -122,9 +122,9 @@ def _whole(count: int) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{plain(100.0 * share)} %"
+    return f"{significant(100.0 * share)} %"
 
 
 def _signed(value: float) -> str:
-    text = plain(value)
+    text = significant(value)
     return text if text.startswith("−") or not text else f"+{text}"

@@ -17,7 +17,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from pipelines.archive import Archive
 from pipelines.report.charts import csv_text, plotly_figure, png_bytes
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
@@ -85,7 +85,7 @@ def page(
     text = _environment().get_template(template).render(
         state=state, problems=problems or [], bench=bench, command=state.command(bench.settings.archive),
         may_change=bool(getattr(request.state, "may_change", False)), static=static_version(), path=request.url.path,
-        number=plain, micro=MICRO, finite=math.isfinite, **values,
+        number=significant, micro=MICRO, finite=math.isfinite, **values,
     )  # fmt: skip
     return HTMLResponse(text, status)
 

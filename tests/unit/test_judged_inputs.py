@@ -66,7 +66,7 @@ def test_a_page_says_what_its_command_says(settings: WorkbenchSettings) -> None:
     )
     state, found = done_in_process("diagnose", requests.diagnosis(settings, page)[1], lambda *_: None)
     assert state == "done"
-    words = page.words()
+    words = page.arguments()
     with effects.additions_forgotten():
         told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
     assert told["error"] == pytest.approx(found.document["error"])
@@ -82,7 +82,7 @@ def test_a_plan_on_its_page_is_that_of_its_command(settings: WorkbenchSettings) 
     page = PlanPage()
     state, found = done_in_process("plan", requests.plan(settings, page)[1], lambda *_: None)
     assert state == "done"
-    told = json.loads(CliRunner().invoke(app, [*page.words(), "--json"]).stdout)
+    told = json.loads(CliRunner().invoke(app, [*page.arguments(), "--json"]).stdout)
     assert told["minutes"] == pytest.approx(found["document"]["minutes"])
     assert [(row["effect"], row["seen"]) for row in told["effects"]] == [
         (row["effect"], row["seen"]) for row in found["document"]["effects"]
