@@ -1,95 +1,99 @@
-"""What a column of a table may hold: its type, and which values."""
+"""One analysis of a column of a table, from which all checks of the column are answered."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import pandas as pd
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
+    from collections.abc import Hashable, Sequence
 
+    import pandas as pd
+    import pandera.pandas as pa
     from numpy.typing import NDArray
 
-Kind = Literal["text", "number", "whole", "flag"]
-DTYPES: dict[Kind, str] = {"text": "str", "number": "float64", "whole": "int64", "flag": "bool"}
-NEEDED: dict[Kind, str] = {
-    "text": "a text", "number": "a finite number", "whole": "a whole number", "flag": "true or false",
-}  # fmt: skip
+DIFFERENT = 2**62
+
+
+_NONE = np.zeros(0, dtype=np.intp)
 
 
 @cache
-def _name_of(dtype: Hashable) -> str:
-    """The name of a type, which pandas composes anew at each call."""
-    return str(dtype)
-
-
-class WrongValues(NamedTuple):
-    """Rows (n,) whose value is not allowed, and what is needed there."""
-
-    rows: NDArray[np.bool_]
-    needed: str
+def _named(kind: Hashable) -> str:
+    """The name of a type, cached, as the libraries compose it at each call."""
+    return str(kind)
 
 
 @dataclass(frozen=True)
-class Column:
-    """The contract of a column.
+class Seen:
+    """A column.
 
-    low : smallest number that is allowed · allowed : the texts that may occur, all if there are none
-    empty : whether a text may be empty · missing : whether a value may be missing; an infinite number may be there then, too
+    kind : name of its type; numbers : (rows,), its values where they are numbers or flags, None for texts
+    codes : (rows,), index of each text, −1 where it is missing; texts : the different texts
     """
 
-    kind: Kind
-    low: float | None = None
-    allowed: tuple[str, ...] = ()
-    empty: bool = False
-    missing: bool = False
+    kind: str
+    numbers: NDArray[Any] | None
+    codes: NDArray[np.intp]
+    texts: tuple[object, ...] = ()
 
-    def converted(self, values: pd.Series) -> pd.Series | WrongValues:
-        """The values in the type of the column, or those that have none in it."""
-        if _name_of(values.dtype) == DTYPES[self.kind]:
-            return values
-        if self.kind == "text":
-            return values.astype("str")
-        if self.kind == "flag":
-            wrong = ~values.isin([True, False]).to_numpy()
-            return WrongValues(wrong, NEEDED["flag"]) if wrong.any() else values.astype("bool")
-        numbers = pd.to_numeric(values, errors="coerce")
-        if self.kind == "whole":
-            whole = np.asarray(numbers, dtype=np.float64)
-            wrong = ~np.isfinite(whole) | (np.floor(whole) != whole)
-            return WrongValues(wrong, NEEDED["whole"]) if wrong.any() else numbers.astype("int64")
-        wrong = (numbers.isna() & values.notna()).to_numpy()
-        return WrongValues(wrong, NEEDED["number"]) if wrong.any() else numbers.astype("float64")
+    @classmethod
+    def of(cls, values: pd.Series) -> Self:
+        """The analysis of a column."""
+        if isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiub":
+            return cls(_named(values.dtype), values.to_numpy(), _NONE)
+        codes, texts = values.factorize()
+        return cls(str(values.dtype), None, codes, tuple(texts.tolist()))
 
-    def wrong(self, values: pd.Series) -> WrongValues | None:
-        """The values of the column's type that are not allowed; None where there are none."""
-        return self._wrong_text(values) if self.kind == "text" else self._wrong_number(values)
+    def is_right(self, column: pa.Column) -> bool:
+        """Whether the column has its type and passes its checks."""
+        kind = _named(column.dtype).split("[", maxsplit=1)[0].replace("string", "str")
+        if self.kind != kind or (not column.nullable and self._has_gaps()):
+            return False
+        return all(self._passes(check) for check in column.checks or [])
 
-    def _wrong_text(self, values: pd.Series) -> WrongValues | None:
-        there: list[Any] = values.unique().tolist()  # a few texts in many rows
-        bad = [text for text in there if not self._is_allowed(text)]
-        if not bad:
-            return None
-        needed = f"one of {', '.join(self.allowed)}" if self.allowed else NEEDED["text"]
-        return WrongValues((values.isin(bad) | (values.isna() & (not self.missing))).to_numpy(), needed)
+    def is_finite(self, rows: slice | NDArray[np.bool_]) -> bool:
+        """Whether the column has finite numbers in these rows."""
+        return self.numbers is not None and bool(np.all(np.isfinite(self.numbers[rows])))
 
-    def _is_allowed(self, text: Any) -> bool:
-        if not isinstance(text, str):
-            return self.missing
-        return text in self.allowed if self.allowed else bool(text) or self.empty
+    def _has_gaps(self) -> bool:
+        if self.numbers is None:
+            return bool((self.codes < 0).any())
+        return self.numbers.dtype.kind == "f" and bool(np.isnan(self.numbers).any())
 
-    def _wrong_number(self, values: pd.Series) -> WrongValues | None:
-        numbers = values.to_numpy()
-        if self.kind == "number" and not self.missing:
-            finite = np.isfinite(numbers)
-            if not finite.all():
-                return WrongValues(~finite, NEEDED["number"])
-        if self.low is not None:
-            low = numbers < self.low
-            if low.any():
-                return WrongValues(low, f"at least {self.low:g}")
-        return None
+    def _passes(self, check: pa.Check) -> bool:
+        """Whether the values pass a check of the kinds in these tables; false for other kinds, which the schema checks."""
+        figures = check.statistics
+        if check.name == "greater_than_or_equal_to" and self.numbers is not None:
+            return not bool((self.numbers < figures["min_value"]).any())
+        if check.name == "isin" and self.numbers is None:
+            return set(self.texts) <= set(figures["allowed_values"])
+        if check.name == "str_length" and figures == {"min_value": 1, "max_value": None, "exact_value": None}:
+            return "" not in self.texts
+        return False
+
+
+def all_different(columns: Sequence[Seen]) -> bool:
+    """Whether all rows differ in at least one of these columns; false, too, where there are too many values to decide."""
+    combined, count = np.zeros(1, dtype=np.int64), 1
+    for column in columns:
+        codes, own = _codes_of(column)
+        count *= own
+        if count > DIFFERENT:
+            return False
+        combined = combined * own + codes
+    return not columns or np.unique(combined).size == combined.size
+
+
+def _codes_of(column: Seen) -> tuple[NDArray[np.int64], int]:
+    """A code (rows,) from 0 for every value of a column, and the largest possible number of codes."""
+    if column.numbers is None:
+        return column.codes + 1, len(column.texts) + 1
+    if column.numbers.dtype.kind in "iu" and len(column.numbers):
+        low, high = int(column.numbers.min()), int(column.numbers.max())
+        return column.numbers - low, high - low + 1
+    distinct, codes = np.unique(column.numbers, return_inverse=True)
+    return codes, max(len(distinct), 1)

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
+from pandera.errors import SchemaError
 
-from schemas.columns import Column, WrongValues
+from schemas.columns import Seen, all_different
 from schemas.errors import DataRejected
 from schemas.tables import TABLES
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from schemas.tables import Table
-
-FINITE = Column("number")
 
 
 def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
@@ -29,36 +27,24 @@ def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
     table = TABLES[name]
     source = where or name
     _refuse_missing_columns(table, frame, source)
-    converted: dict[str, pd.Series] = {}
-    for column, contract in table.columns.items():
-        own = frame[column]
-        values = _right(contract, own, frame, source)
-        if values is not own:
-            converted[column] = values
-    counted = (frame["status"] == "ok").to_numpy() if table.only_ok and table.finite else None
-    for column in table.finite:
-        if column in frame.columns:
-            own = frame[column]
-            _right(FINITE, own if counted is None or counted.all() else own[counted], frame, source)
+    if _plainly_right(table, frame):
+        return frame
+    _refuse_not_finite(table, frame, source)
     _refuse_twice(table, frame, source)
-    return frame.assign(**converted) if converted else frame
+    try:
+        return table.schema.validate(frame)
+    except SchemaError as problem:
+        raise DataRejected(_explain(problem, frame, source)) from None
 
 
-def _right(contract: Column, own: pd.Series, frame: pd.DataFrame, source: str) -> pd.Series:
-    """The values of a column in its type; the first one that is not allowed is refused."""
-    values = contract.converted(own)
-    if isinstance(values, WrongValues):
-        wrong, needed = values
-    else:
-        problem = contract.wrong(values)
-        if problem is None:
-            return values
-        wrong, needed = problem
-    index = own.index[int(np.flatnonzero(wrong)[0])]
-    count = f" ({int(wrong.sum())} such rows)" if wrong.sum() > 1 else ""
-    raise DataRejected(
-        f"{source}: {_row(frame, index)}, column {own.name}: found {own.loc[index]}, {needed} is needed{count}; "
-        "measure again, or correct or leave out the row"
+def _plainly_right(table: Table, frame: pd.DataFrame) -> bool:
+    """Whether the frame meets its contract, by one pass over every column; a frame that does not is examined again in detail."""
+    seen = {name: Seen.of(frame[name]) for name in {*table.columns, *table.finite, *table.key} & set(frame.columns)}
+    rows = frame["status"].to_numpy() == "ok" if table.only_ok else slice(None)
+    return (
+        all(seen[name].is_right(column) for name, column in table.columns.items())
+        and all(seen[name].is_finite(rows) for name in table.finite if name in seen)
+        and all_different([seen[name] for name in table.key])
     )
 
 
@@ -71,16 +57,49 @@ def _refuse_missing_columns(table: Table, frame: pd.DataFrame, source: str) -> N
         )
 
 
+def _refuse_not_finite(table: Table, frame: pd.DataFrame, source: str) -> None:
+    rows = frame.loc[frame["status"] == "ok"] if table.only_ok else frame
+    for column in table.finite:
+        if column not in rows.columns:
+            continue
+        own = rows[column]
+        plain = own.dtype == np.float64  # others are converted first, which is slower
+        values = own.to_numpy() if plain else np.asarray(pd.to_numeric(own, errors="coerce"), dtype=float)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            index = rows.index[bad[0]]
+            raise DataRejected(
+                f"{source}: {_row(rows, index)}, column {column}: found {rows[column].loc[index]}, a finite number is "
+                f"needed ({bad.size} such rows); measure again or leave the row out"
+            )
+
+
 def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
     if not table.key:
         return
-    twice = frame[list(table.key)].duplicated()
+    twice = frame.duplicated(list(table.key))
     if twice.any():
         index = frame.index[int(np.flatnonzero(twice.to_numpy())[0])]
         named = ", ".join(f"{column} {frame[column].loc[index]}" for column in table.key)
         raise DataRejected(
             f"{source}: row {index}: {named} is there twice, it may be there once; remove one of the two"
         )
+
+
+def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
+    column = getattr(problem.schema, "name", None) or "?"
+    cases = problem.failure_cases
+    if isinstance(cases, pd.DataFrame) and len(cases) and "index" in cases and pd.notna(cases["index"].iloc[0]):
+        index, value = cases["index"].iloc[0], cases["failure_case"].iloc[0]
+        row = _row(frame, index)
+        return f"{source}: {row}, column {column}: found {value}, {_needed(problem)} is needed; correct the row"
+    return f"{source}: column {column}: {str(problem).splitlines()[0]}; correct the column"
+
+
+def _needed(problem: SchemaError) -> str:
+    """The requirement of a check, without the library's notation."""
+    words = str(problem.check).removeprefix("<Check ").removesuffix(">")
+    return words.split(": ", 1)[-1].replace("_", " ")
 
 
 def _row(frame: pd.DataFrame, index: Any) -> str:

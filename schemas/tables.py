@@ -6,11 +6,16 @@ Every table has a schema version that travels with its file.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import pandera.pandas as pa
 
 from schemas import version
-from schemas.columns import Column
 from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 VERSION = version.VERSION
 KINDS = ("dwell", "verification", "allan", "procedure")
@@ -24,42 +29,47 @@ class Table:
 
     Parameters
     ----------
-    columns : the columns that must be there, with their contracts; numbers are finite unless they may be missing.
-    finite : numbers that are finite where they are there: columns that a table need not have, or that may be missing.
+    columns : the columns that must be there, with their checks.
+    finite : columns in which NaN and infinity are refused; all of them are numbers.
     key : columns that together name a row; no two rows may share them.
-    only_ok : ``finite`` counts only in rows whose ``status`` is ``ok``.
+    only_ok : finite columns count only in rows whose ``status`` is ``ok``.
     """
 
-    columns: dict[str, Column]
+    columns: dict[str, pa.Column]
     finite: tuple[str, ...] = ()
     key: tuple[str, ...] = ()
     only_ok: bool = False
+    schema: pa.DataFrameSchema = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "schema", pa.DataFrameSchema(self.columns, strict=False, coerce=True))
 
 
-TEXT, WHOLE, FLAG, NUMBER = Column("text"), Column("whole", low=0), Column("flag"), Column("number")
-REMARK = Column("text", empty=True)
+def _text(*allowed: str) -> pa.Column:
+    checks = [pa.Check.isin(list(allowed))] if allowed else [pa.Check.str_length(min_value=1)]
+    return pa.Column(str, checks=checks)
 
 
-def _one_of(*allowed: str) -> Column:
-    return Column("text", allowed=allowed)
+def _number(*, low: float | None = None, missing: bool = False) -> pa.Column:
+    return pa.Column(float, checks=[pa.Check.ge(low)] if low is not None else [], nullable=missing)
 
 
-def _numbers(*names: str) -> dict[str, Column]:
-    return dict.fromkeys(names, NUMBER)
+def _whole(low: int = 0) -> pa.Column:
+    return pa.Column("int64", checks=[pa.Check.ge(low)])
 
 
-def _gaps(*names: str) -> dict[str, Column]:
-    return dict.fromkeys(names, Column("number", missing=True))
+def _numbers(names: Sequence[str]) -> dict[str, pa.Column]:
+    return {name: _number() for name in names}
 
 
-def _texts(*names: str) -> dict[str, Column]:
-    return dict.fromkeys(names, TEXT)
+def _gaps(names: Sequence[str]) -> dict[str, pa.Column]:
+    return {name: _number(missing=True) for name in names}
 
 
 _OUT = ("out_x", "out_y", "out_z")
 _SD = ("sd_x", "sd_y", "sd_z")
 _FORCE = ("force_x", "force_y", "force_z")
-_PLACE = {"unit": TEXT, "slot": WHOLE, "record": WHOLE, "kind": _one_of(*KINDS)}
+_PLACE = {"unit": _text(), "slot": _whole(), "record": _whole(), "kind": _text(*KINDS)}
 _ANGLES = ("outer_deg", "inner_deg", "outer_command_deg", "inner_command_deg")
 _SURROUNDINGS = (
     "chamber_C",
@@ -72,225 +82,276 @@ _SURROUNDINGS = (
 
 TABLES: dict[str, Table] = {
     # Samples may hold NaN: what a device really sent is kept, and the validate stage refuses the unit.
-    "samples": Table({**_PLACE, "time_s": NUMBER, **_gaps(*AXES)}),
+    "samples": Table({**_PLACE, "time_s": _number(), **_gaps(AXES)}, finite=("time_s",)),
     "readings": Table(
         {
             **_PLACE,
-            "pose": TEXT,
-            "soak": WHOLE,
-            **_gaps(*_ANGLES),
-            **_gaps(*_SURROUNDINGS),
-            **_numbers("start_s", "duration_s", "rate_hz"),
-            "n": WHOLE,
-            "overflow": FLAG,
-            "status": TEXT,
-            "out_unit": _one_of(*OUTPUT_UNITS),
-            "full_scale": Column("number", low=0.0),
+            "pose": _text(),
+            "soak": _whole(),
+            **_gaps(_ANGLES),
+            **_gaps(_SURROUNDINGS),
+            **_numbers(("start_s", "duration_s", "rate_hz")),
+            "n": _whole(),
+            "overflow": pa.Column(bool),
+            "status": _text(),
+            "out_unit": _text(*OUTPUT_UNITS),
+            "full_scale": _number(low=0.0),
         },
-        finite=(*_ANGLES, "chamber_C", "unit_C"),
+        finite=(
+            *_ANGLES,
+            "chamber_C",
+            "unit_C",
+            "start_s",
+            "duration_s",
+            "rate_hz",
+            "full_scale",
+        ),
         key=("unit", "record"),
         only_ok=True,
     ),
     "history": Table(
         {
-            "time_s": NUMBER,
-            "chamber_C": NUMBER,
-            "slot": WHOLE,
-            "unit": TEXT,
-            **_gaps("unit_C"),
+            "time_s": _number(),
+            "chamber_C": _number(),
+            "slot": _whole(),
+            "unit": _text(),
+            **_gaps(("unit_C",)),
         },
+        finite=("time_s", "chamber_C"),
     ),
     "events": Table(
         {
-            "time_s": NUMBER,
-            "kind": TEXT,
-            "record": Column("whole", low=-1),  # −1: none
-            "reason": REMARK,
-            "action": REMARK,
+            "time_s": _number(),
+            "kind": _text(),
+            "record": _whole(-1),  # −1: none
+            "reason": pa.Column(str),
+            "action": pa.Column(str),
         },
+        finite=("time_s",),
     ),
     "soaks": Table(
         {
-            "time_s": NUMBER,
-            "record": WHOLE,
-            **_numbers("target_C", "seconds", "air_overshoot_K", "device_overshoot_K"),
+            "time_s": _number(),
+            "record": _whole(),
+            **_numbers(("target_C", "seconds", "air_overshoot_K", "device_overshoot_K")),
         },
+        finite=("time_s", "target_C", "seconds", "air_overshoot_K", "device_overshoot_K"),
     ),
     "verdicts": Table(
         {
-            "unit": TEXT,
-            "slot": WHOLE,
-            "refused": FLAG,
-            "fault": REMARK,
-            "reason": REMARK,
+            "unit": _text(),
+            "slot": _whole(),
+            "refused": pa.Column(bool),
+            "fault": pa.Column(str),
+            "reason": pa.Column(str),
         },
         key=("unit",),
     ),
     "dwells": Table(
-        {"unit": TEXT, "dwell": WHOLE, "time_s": NUMBER, **_numbers(*_OUT)},
-        finite=(*_SD, *_FORCE, "outer_deg", "inner_deg", "unit_C", "chamber_C"),
+        {"unit": _text(), "dwell": _whole(), "time_s": _number(), **_numbers(_OUT)},
+        finite=(
+            "time_s",
+            *_OUT,
+            *_SD,
+            *_FORCE,
+            "outer_deg",
+            "inner_deg",
+            "unit_C",
+            "chamber_C",
+        ),
         key=("unit", "dwell"),
     ),
     "coefficients": Table(
         {
-            "unit": TEXT,
-            "axis": _one_of(*AXES, "*"),
-            "effect": TEXT,
-            "name": TEXT,
-            **_numbers("value", "standard_error"),
-            "unit_text": REMARK,
+            "unit": _text(),
+            "axis": _text(*AXES, "*"),
+            "effect": _text(),
+            "name": _text(),
+            **_numbers(("value", "standard_error")),
+            "unit_text": pa.Column(str),
         },
+        finite=("value", "standard_error"),
         key=("unit", "axis", "effect", "name"),
     ),
     "covariance": Table(
         {
-            "unit": TEXT,
-            "axis": _one_of(*AXES),
-            "row": WHOLE,
-            "column": WHOLE,
-            "value": NUMBER,
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "row": _whole(),
+            "column": _whole(),
+            "value": _number(),
         },
+        finite=("value",),
         key=("unit", "axis", "row", "column"),
     ),
     "residuals": Table(
         {
-            "unit": TEXT,
-            "dwell": WHOLE,
-            "axis": _one_of(*AXES, "norm"),
-            "pose": TEXT,
-            **_numbers("force_g", "residual_ug", "standard_error_ug", "expected_ug"),
-            **_gaps("unit_C"),
+            "unit": _text(),
+            "dwell": _whole(),
+            "axis": _text(*AXES, "norm"),
+            "pose": _text(),
+            **_numbers(("force_g", "residual_ug", "standard_error_ug", "expected_ug")),
+            **_gaps(("unit_C",)),
         },
+        finite=("residual_ug", "force_g", "standard_error_ug", "expected_ug"),
         key=("unit", "dwell", "axis"),
     ),
     "predictions": Table(
         {
-            "unit": TEXT,
-            "axis": _one_of(*AXES),
-            "dwell": WHOLE,
-            "other": WHOLE,
-            "covariance_ug2": NUMBER,
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "dwell": _whole(),
+            "other": _whole(),
+            "covariance_ug2": _number(),
         },
+        finite=("covariance_ug2",),
         key=("unit", "axis", "dwell", "other"),
     ),
     "wander": Table(
         {
-            "unit": TEXT,
-            "axis": _one_of(*AXES),
-            "method": _one_of("wander", "birge"),
-            **_numbers("white_ug", "flicker_ug", "walk_ug", "lack_of_fit"),
-            "dof": WHOLE,
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "method": _text("wander", "birge"),
+            **_numbers(("white_ug", "flicker_ug", "walk_ug", "lack_of_fit")),
+            "dof": _whole(),
         },
+        finite=("white_ug", "flicker_ug", "walk_ug", "lack_of_fit"),
         key=("unit", "axis"),
     ),
     "verification": Table(
         {
-            "unit": TEXT,
-            "dwell": WHOLE,
-            "pose": TEXT,
-            **_numbers("norm_g", "error_ug", "uncertainty_ug", "error_x_ug", "error_y_ug", "error_z_ug"),
+            "unit": _text(),
+            "dwell": _whole(),
+            "pose": _text(),
+            **_numbers(
+                (
+                    "norm_g",
+                    "error_ug",
+                    "uncertainty_ug",
+                    "error_x_ug",
+                    "error_y_ug",
+                    "error_z_ug",
+                )
+            ),
         },
+        finite=(
+            "norm_g",
+            "error_ug",
+            "uncertainty_ug",
+            "error_x_ug",
+            "error_y_ug",
+            "error_z_ug",
+        ),
         key=("unit", "dwell"),
     ),
     "verification_poses": Table(
-        {"unit": TEXT, "pose": TEXT, "dwells": Column("whole", low=1), **_numbers("error_ug", "uncertainty_ug")},
+        {"unit": _text(), "pose": _text(), "dwells": _whole(1), **_numbers(("error_ug", "uncertainty_ug"))},
+        finite=("error_ug", "uncertainty_ug"),
         key=("unit", "pose"),
     ),
     "allan": Table(
         {
-            "unit": TEXT,
-            "axis": _one_of(*AXES),
-            **_numbers("tau_s", "deviation_ug", "low_ug", "high_ug"),
-            **_gaps("fitted_ug"),
+            "unit": _text(),
+            "axis": _text(*AXES),
+            **_numbers(("tau_s", "deviation_ug", "low_ug", "high_ug")),
+            **_gaps(("fitted_ug",)),
         },
+        finite=("tau_s", "deviation_ug", "low_ug", "high_ug"),
         key=("unit", "axis", "tau_s"),
     ),
     "noise": Table(
         {
-            "unit": TEXT,
-            "axis": _one_of(*AXES),
-            "term": TEXT,
-            **_gaps("value", "low", "high"),
-            "identified": FLAG,
-            "unit_text": REMARK,
+            "unit": _text(),
+            "axis": _text(*AXES),
+            "term": _text(),
+            **_gaps(("value", "low", "high")),
+            "identified": pa.Column(bool),
+            "unit_text": pa.Column(str),
         },
         key=("unit", "axis", "term"),
     ),
     "procedure_points": Table(
         {
-            **_texts("unit", "procedure", "axis", "series"),
-            **dict.fromkeys(("number", "point"), WHOLE),
-            **_gaps("setting", "value", "uncertainty"),
+            **{name: _text() for name in ("unit", "procedure", "axis", "series")},
+            **{name: _whole() for name in ("number", "point")},
+            **_gaps(("setting", "value", "uncertainty")),
         },
         key=("number", "unit", "axis", "series", "point"),
     ),
     "procedure_figures": Table(
         {
-            **_texts("unit", "procedure", "figure", "axis"),
-            "number": WHOLE,
-            **_gaps("value", "uncertainty", "low", "high"),
-            "identified": FLAG,
-            "unit_text": TEXT,
-            "note": REMARK,
+            **{name: _text() for name in ("unit", "procedure", "figure", "axis")},
+            "number": _whole(),
+            **_gaps(("value", "uncertainty", "low", "high")),
+            "identified": pa.Column(bool),
+            "unit_text": _text(),
+            "note": pa.Column(str),
         },
         key=("number", "unit", "figure", "axis"),
     ),
-    "procedure_findings": Table({"unit": REMARK, "procedure": TEXT, "number": WHOLE, "subject": TEXT, "text": TEXT}),
+    "procedure_findings": Table(
+        {"unit": pa.Column(str), "procedure": _text(), "number": _whole(), "subject": _text(), "text": _text()}
+    ),
     "figures": Table(
         {
-            "unit": TEXT,
-            "figure": TEXT,
-            **_numbers("value", "uncertainty"),
-            "limit": Column("number", missing=True),
-            "unit_text": REMARK,
-            "outcome": TEXT,
-            "rule": REMARK,
+            "unit": _text(),
+            "figure": _text(),
+            **_numbers(("value", "uncertainty")),
+            "limit": _number(missing=True),
+            "unit_text": pa.Column(str),
+            "outcome": _text(),
+            "rule": pa.Column(str),
         },
+        finite=("value", "uncertainty"),
         key=("unit", "figure"),
     ),
     # one row per unit, quantity and contribution
     "budget": Table(
         {
-            **_texts("unit", "quantity", "axis", "contribution", "type", "distribution", "scope"),
-            **dict.fromkeys(("unit_text", "input_unit", "source"), REMARK),
-            **_numbers("u", "share", "divisor", "stated"),
-            **_gaps("dof", "sensitivity", "visible"),
+            **{name: _text() for name in ("unit", "quantity", "axis", "contribution", "type", "distribution", "scope")},
+            **{name: pa.Column(str) for name in ("unit_text", "input_unit", "source")},
+            **_numbers(("u", "share", "divisor", "stated")),
+            **_gaps(("dof", "sensitivity", "visible")),
         },
+        finite=("u", "share"),
         key=("unit", "quantity", "axis", "contribution"),
     ),
     "uncertainties": Table(
         {
-            **_texts("unit", "quantity", "axis", "frame"),
-            **dict.fromkeys(("unit_text", "largest"), REMARK),
-            **_numbers("value", "u_a", "u_b", "u", "k", "expanded"),
-            **_gaps("dof", "shown", "unseen"),
+            **{name: _text() for name in ("unit", "quantity", "axis", "frame")},
+            **{name: pa.Column(str) for name in ("unit_text", "largest")},
+            **_numbers(("value", "u_a", "u_b", "u", "k", "expanded")),
+            **_gaps(("dof", "shown", "unseen")),
         },
+        finite=("value", "u_a", "u_b", "u", "k", "expanded"),
         key=("unit", "quantity", "axis"),
     ),
     # of the coefficients of all axes in one vector, x before y before z, lower triangle
     "budget_covariance": Table(
-        {"unit": TEXT, "row": WHOLE, "column": WHOLE, "value": NUMBER},
+        {"unit": _text(), "row": _whole(), "column": _whole(), "value": _number()},
+        finite=("value",),
         key=("unit", "row", "column"),
     ),
     # risks of the decisions over the production that a lot stands for
     "lot_risks": Table(
         {
-            "figure": TEXT,
-            "unit_text": REMARK,
-            "units": Column("whole", low=1),
-            **_numbers("mean", "u", "limit", "accept"),
-            **_gaps("process", "pfa", "pfr", "accepted", "largest_pfa"),
+            "figure": _text(),
+            "unit_text": pa.Column(str),
+            "units": _whole(1),
+            **_numbers(("mean", "u", "limit", "accept")),
+            **_gaps(("process", "pfa", "pfr", "accepted", "largest_pfa")),
         },
+        finite=("mean", "u", "limit", "accept"),
         key=("figure",),
     ),
     "grades": Table(
         {
-            "unit": TEXT,
-            "slot": WHOLE,
-            "outcome": _one_of(*OUTCOMES),
-            "grade": REMARK,
-            "reasons": REMARK,
-            "rule": REMARK,
+            "unit": _text(),
+            "slot": _whole(),
+            "outcome": _text(*OUTCOMES),
+            "grade": pa.Column(str),
+            "reasons": pa.Column(str),
+            "rule": pa.Column(str),
         },
         key=("unit",),
     ),
