@@ -23,7 +23,7 @@ def settings(tmp_path: Path) -> WorkbenchSettings:
     return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
 
 
-def ended(table: Jobs, name: str) -> job_table.Job:
+def ended(table: Jobs, name: str) -> job_table.BackgroundJob:
     end = time.monotonic() + 60.0
     while (job := table.get(name)).state not in job_table.ENDED:
         assert time.monotonic() < end
