@@ -179,7 +179,7 @@ def _happened(
     fields: Candidates, beside: Model, term: Term, alternative: Handling, size: Array
 ) -> tuple[str, tuple[int, ...]]:
     """The description of a handling error, and its dwells: at each place that explains the run equally well."""
-    lot, place = fields.problem.lot, {k: v for k, v in term.keytexts.items() if isinstance(v, float)}
+    lot, place = fields.problem.lot, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
     best = judge(fields, beside, term).cost
     texts: list[str] = []
     dwells = list(alternative.dwells(lot, **place))
