@@ -13,8 +13,8 @@ from pydantic import TypeAdapter
 from pipelines.archive import Archive, Run
 from pipelines.certificates.programmed import TOP
 from pipelines.chain.runner import Runner
-from pipelines.cli.documents.devices import ProgramDocument
 from pipelines.jobs.job import Job
+from pipelines.programming.documents import ProgramDocument
 from pipelines.programming.job import chosen_units, document, program_run, station_of
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from stations.opening import make_plant

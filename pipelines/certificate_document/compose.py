@@ -21,6 +21,7 @@ from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, s
 from pipelines.certificates.statement import stated
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
+from schemas.counts import number_of
 from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
@@ -42,6 +43,11 @@ QUANTITIES = {
 }
 BUDGETS = ("bias", "scale", "output", "bias_error_period")
 """Quantities whose budget a certificate prints."""
+SOURCES = {
+    "[stability], ": "stability of the device, ",
+    "[stability]": "stability of the device",
+    "[uncertainty]": "uncertainties of the references",
+}
 DECLARATION = (
     "The results relate only to the item calibrated, in the condition in which it was received, and to the stated conditions. "
     "This certificate may be reproduced in full only, unless the laboratory has approved otherwise in writing."
@@ -161,12 +167,15 @@ def _result(one: StatedQuantity, coefficients: list[Coefficient]) -> Result:
 
 def _budget(one: StatedQuantity) -> BudgetTable:
     rows = sorted(one["contributions"], key=lambda row: -row["share"])
+    deviation = (
+        one["quantity"] == "bias_error_period"
+    )  # its contributions add up to the result, not to the result's own u
     return BudgetTable(
         quantity=f"{QUANTITIES.get(one['quantity'], one['quantity'])}, {one['axis']}",
         unit=one["unit"],
-        u=one["u"],
-        k=one["k"],
-        expanded=one["expanded"],
+        u=one["value"] if deviation else one["u"],
+        k=None if deviation else one["k"],
+        expanded=None if deviation else one["expanded"],
         rows=tuple(
             Contribution(
                 name=row["name"],
@@ -175,11 +184,18 @@ def _budget(one: StatedQuantity) -> BudgetTable:
                 u=row["u"],
                 unit=one["unit"],
                 share=row["share"],
-                source=row["source"],
+                source=_source(row["source"]),
             )
             for row in rows
         ),
     )
+
+
+def _source(text: str) -> str:
+    """The source of a contribution without the names of tables in files."""
+    for table, words in SOURCES.items():
+        text = text.replace(table, words)
+    return text
 
 
 def _conformity(one: Any) -> Conformity:
@@ -225,10 +241,11 @@ def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
     kinds = dwells["kind"].astype(str)
     poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
     verified = f"; verification in {kept} other poses" if kept else "; no pose was kept for verification"
+    soaks = number_of(len(recipe.get("temperatures_C") or [0]), "temperature")
     procedure = f"{who.method.procedure}. " if who.method.procedure else ""
     return (
         f"{procedure}Static multi-position calibration in the gravity of the Earth: {poses} poses at "
-        f"{len(recipe.get('temperatures_C') or [0])} temperature(s), {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
+        f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
         f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ()))}{verified}."
     )
 

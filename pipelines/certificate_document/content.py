@@ -58,13 +58,17 @@ class Contribution(Strict):
 
 
 class BudgetTable(Strict):
-    """The budget of one result."""
+    """The budget of one result.
+
+    u : of the result, in ``unit``; of a result that is a standard deviation itself, the result
+    k, expanded : None for such a result
+    """
 
     quantity: str
     unit: str
     u: float
-    k: float
-    expanded: float
+    k: float | None
+    expanded: float | None
     rows: tuple[Contribution, ...]
 
 

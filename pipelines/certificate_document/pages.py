@@ -119,7 +119,8 @@ def _references(c: CertificateContent) -> dict[str, Any]:
 def _as_found(a: Adjustment) -> dict[str, Any]:
     if a.found_rms_ug is None or a.found_max_ug is None or a.left_rms_ug is None or a.left_max_ug is None:
         earlier = f"Earlier certificate {a.earlier} of {a.earlier_date}: " if a.earlier else ""
-        return {"title": "As found, as left", "before": [f"{earlier}{a.text}."]}
+        text = a.text if earlier else f"{a.text[:1].upper()}{a.text[1:]}"
+        return {"title": "As found, as left", "before": [f"{earlier}{text}."]}
     rows = [
         ["as found, coefficients of the earlier certificate", significant(a.found_rms_ug), significant(a.found_max_ug)],
         ["as left, coefficients of this certificate", significant(a.left_rms_ug), significant(a.left_max_ug)],
@@ -190,8 +191,9 @@ def _budgets(c: CertificateContent) -> dict[str, Any]:
             ]
             for row in one.rows
         ]
-        expanded = f"k = {one.k:.2f}, U = {significant(one.expanded, 2)} {one.unit}"
-        head = f"{one.quantity}: u = {significant(one.u)} {one.unit}, {expanded}"
+        head = f"{one.quantity}: {significant(one.u, 2) if one.k is None else f'u = {significant(one.u)}'} {one.unit}"
+        if one.k is not None and one.expanded is not None:
+            head += f", k = {one.k:.2f}, U = {significant(one.expanded, 2)} {one.unit}"
         heads = ["contribution", "type", "distribution", f"u, {one.unit}", "share of u²", "source"]
         tables.append(_table(head, heads, rows, [2, "auto", "auto", "auto", "auto", 3], [3, 4]))
     return {"title": "Uncertainty budgets", "tables": tables} if tables else {}

@@ -58,7 +58,8 @@ class _OnDemand(TyperCommand):
         from pipelines.cli.candidates import attach
 
         attach(command)
-        command.epilog = "\n\n".join(["Examples:", *getattr(module, "EXAMPLES", ())])  # a paragraph each
+        more = getattr(module, "EPILOG", ())
+        command.epilog = "\n\n".join([*more, "Examples:", *getattr(module, "EXAMPLES", ())])  # a paragraph each
         return command
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RateOption, RunArgument, error_console
+from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
 
 PART = "Results"
 ORDER = 340
@@ -21,7 +21,11 @@ EXAMPLES = (
 BINARY = ".mat"
 
 _FOLDER = Path(__file__).parent.parent / "export" / "formats"
-_NAMES = ", ".join(found.name for found in iter_modules([str(_FOLDER)]))  # their names, without importing them
+_FORMATS = {found.name: "" for found in iter_modules([str(_FOLDER)])}  # their names, without importing them
+for _name in _FORMATS:  # the first line of a module says what it writes
+    _line = (_FOLDER / f"{_name}.py").read_text(encoding="utf-8").partition("\n")[0]
+    _FORMATS[_name] = _line.strip('"').partition(": ")[2].replace("``", "")
+EPILOG = ("Formats:", *(f"{name}: {text}" for name, text in _FORMATS.items()))
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +36,7 @@ if TYPE_CHECKING:
 
 def command(
     run: RunArgument = "latest",
-    form: Annotated[str, typer.Option("--format", help=f"{_NAMES}.")] = "json",
+    form: Annotated[str, typer.Option("--format", help=f"{', '.join(_FORMATS)}; described below.")] = "json",
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…", help="Export only these units; default: all that passed.")
     ] = "",
@@ -46,20 +50,31 @@ def command(
         ),
     ] = None,
     nominal: Annotated[
-        float | None, typer.Option("--nominal", help="Output per g that the driver of the autopilot assumes.")
+        float | None,
+        typer.Option("--nominal", help="ardupilot, betaflight, px4: output per g by which the driver divides."),
     ] = None,
     device_id: Annotated[
         str,
-        typer.Option("--device-id", metavar="ID|SN=ID,…", help="Number of the sensor in the autopilot (CAL_ACC0_ID)."),
+        typer.Option(
+            "--device-id",
+            metavar="ID|SN=ID,…",
+            help="px4 (CAL_ACC0_ID), ardupilot (INS_ACC_ID): number of the sensor in the autopilot.",
+        ),
     ] = "",
     sensor: Annotated[
-        int, typer.Option("--sensor", metavar="0…3", help="Place of the accelerometer in the autopilot.")
+        int,
+        typer.Option("--sensor", metavar="0…3", help="ardupilot, px4: place of the accelerometer in the autopilot."),
     ] = 0,
     arithmetic: Annotated[
-        str, typer.Option("--arithmetic", metavar="double|float|q24", help="Arithmetic of exported C code.")
+        str, typer.Option("--arithmetic", metavar="double|float|q24", help="c: arithmetic of the code.")
     ] = "double",
-    rate: RateOption = None,
-    counts_per_g: Annotated[int, typer.Option("--counts-per-g", help="Counts of 1 g in Betaflight (acc_1G).")] = 2048,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate", metavar="HZ", min=1e-9, help="kalibr, ros: rate of the receiver; that of the static record."
+        ),
+    ] = None,
+    counts_per_g: Annotated[int, typer.Option("--counts-per-g", help="betaflight: counts of 1 g (acc_1G).")] = 2048,
     archive: ArchiveOption = None,
     *,
     failed: Annotated[bool, typer.Option("--failed", help="Also export units that failed their limits.")] = False,
@@ -70,8 +85,8 @@ def command(
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b).
 
-    Files for autopilots hold one unit each, and state in µg what the format cannot hold. The rate (--rate) of
-    noise formats is that of the static record by default.
+    Files for autopilots hold one unit each, and state in µg what the format cannot hold. Only units that passed are exported;
+    revoked calibrations are left out. An option that begins with names of formats is for these formats.
     """
     from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import signature_remarks

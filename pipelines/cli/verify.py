@@ -1,7 +1,8 @@
-"""``tumbleline verify``: check the archive for changed, missing and foreign files."""
+"""``tumbleline verify``: check the archive for changed, missing and foreign files, or the files of a certificate."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -17,17 +18,28 @@ if TYPE_CHECKING:
 
 PART = "Certificates, trace, audit"
 ORDER = 440
-SUMMARY = "Check every hash of the archive: find changed, edited or missing files."
+SUMMARY = "Check every hash of the archive, or the files of a certificate."
 EXAMPLES = (
-    "tumbleline verify",
     "tumbleline verify latest",
+    "tumbleline verify certificates/SN1_1.pdf --trust laboratory.pem",
 )
 
 
 def command(
     runs: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[RUN…]", help="Verify only these runs and their captures; default: the whole archive."),
+        typer.Argument(
+            metavar="[RUN…|FILE…]",
+            help="Only these runs and their captures, or files of certificates (.pdf, .xml, .sig); default: the whole archive.",
+        ),
+    ] = None,
+    trust: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--trust",
+            metavar="FILE.pem",
+            help="Certificate of a laboratory's key, or of its authority, that vouches for the signatures of FILE.",
+        ),
     ] = None,
     key: Annotated[
         list[str] | None,
@@ -47,13 +59,24 @@ def command(
 ) -> None:
     """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 
-    Exit status 1: there are findings.
+    Files of certificates are checked alone: form, schema, signatures, attachment. --trust decides who may sign, --archive
+    compares numbers with the archive and finds revoked and replaced certificates. Exit status 1: there are findings, or nothing
+    proves where a certificate comes from.
     """
     from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
     from pipelines.audit.index_check import check_index
+    from pipelines.cli.certificate_check import certificate_files, check_certificates
     from pipelines.integrity import verify
+    from schemas.errors import WrongUse
 
+    if files := certificate_files(runs or ()):
+        accepted = check_certificates(files, trust or (), archive, as_json=as_json)
+        raise typer.Exit(DONE if accepted else PART_FAILED)
+    if trust:
+        raise WrongUse(
+            "--trust: no file of a certificate is given, one is needed; give FILE.pdf or FILE.xml, or leave it out"
+        )
     store = Archive(archive)
     store.refuse_none()
     keys = public_keys(key or ())

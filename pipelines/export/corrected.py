@@ -77,6 +77,7 @@ class Corrected:
     """A corrected recording.
 
     force : (n, 3), g; covariance : (n, 3, 3), g², of the calibration; with a track also of the bias and of noise
+    track : of the steps, and of the samples after the last whole step as one step without update
     bias, bias_covariance : at the samples; None without tracking
     outside : samples beyond the temperatures that were measured
     """
@@ -194,11 +195,17 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
             f"{recording.name}: the force is known nowhere and the unit is never at rest, one of them is needed to track the "
             "bias; give --force, columns force_x, force_y, force_z, or record the unit at rest"
         )
+    if (
+        len(time) % per
+    ):  # the samples after the last whole step are too few for an update; the filter lets the time pass
+        middle = np.append(middle, time[-1])
+        force, known = (np.vstack([values, np.full((1, 3), np.nan)]) for values in (force, known))
+        magnitude = np.append(magnitude, np.nan)
     flicker = flicker_terms(per / rate, max(1000.0 * per / rate, float(time[-1] - time[0])))
     terms = {symbol: values / MICRO for symbol, values in noise.value.items()}
     model = bias_model(terms["N"], terms["B"], terms["K"], tracking.turn_on_ug / MICRO, flicker)
     found = track(model, middle, force, known, magnitude, per / rate)
-    last = np.minimum(np.arange(len(time)) // per, steps - 1)
+    last = np.arange(len(time)) // per
     bias, own = found.expected[last], found.expected_covariance[last]
     white = np.diag(model.white**2 * rate)
     covariance = plain.covariance + own + white

@@ -6,12 +6,13 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import Archive, files
+from pipelines.archive import Archive, Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
-from pipelines.certificates.programmed import TOP
+from pipelines.certificates.measured import measured_on, measured_span
+from pipelines.certificates.programmed import TOP, add
 from pipelines.chain.certify import certify
 from pipelines.export import unit_calibrations
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
@@ -24,7 +25,6 @@ from stations import open_station
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence
 
-    from pipelines.archive import Run
     from pipelines.certificates.validity import Calibration
     from pipelines.export import UnitCalibration
 
@@ -73,31 +73,65 @@ def program_run(
     certified again, to the same day, when its memory is verified.
     """
     root, ledger, day = run.archive.root, Ledger(run.archive.root), today()
-    serials = [unit.unit for _, unit in units]
-    held = {serial: _held(ledger, serial, run.id, day) for serial in serials}
-    numbers = {
-        # the end of a certificate that is valid is the next event, and the new certificate comes after it
-        serial: len(ledger.events(serial)) + 1 + _ends(ledger, serial, day) if held[serial] is not None else 0
-        for serial in serials
-    }
+    held: dict[str, Calibration | None] = {}
 
-    def end_certificate(serial: str) -> None:
+    def end_certificate(serial: str) -> int:
+        held[serial] = _held(ledger, serial, run.id, day)
         if _ends(ledger, serial, day):
             ledger.revoke(serial, REASON, day=day)
+        return len(ledger.events(serial)) + 1 if held[serial] is not None else 0
 
     choice = Choice(choice.form, choice.with_offsets, choice.tolerance_ug, int(datetime.now(UTC).strftime("%Y%m%d")))
     with _station(run, config) as (station, saved), alone(root / TOP, wait=True):
+        for _, unit in units:
+            _refuse_older(ledger, run, unit.unit, day)
         recipe = Recipe.model_validate(run.about["recipe"])
-        worker = Programmer(station, root, run.id, recipe, choice, numbers, end_certificate, report, saved)
+        door = config.suspenders.door
+        worker = Programmer(station, root, run.id, recipe, choice, door, end_certificate, report, saved)
         outcomes = worker.program(units)
     given: dict[str, str] = {}
     for one in outcomes:
-        old = held[one.serial]
+        old = held.get(one.serial)
         if one.outcome == "proved" and old is not None:
-            reason = f"written into the device, copy {one.copy.upper()}, sequence {one.document()['sequence']}"
-            done = certify(ledger, run, [one.serial], day, old.stated_until, reason=reason, keys=public_keys())
-            given[one.serial] = done.events[0].certificate
+            renewed = _renewed(ledger, run, one, day, old.stated_until)
+            if renewed:
+                given[one.serial] = renewed
     return outcomes, given
+
+
+def _renewed(ledger: Ledger, run: Run, one: ProgrammingOutcome, day: str, until: str) -> str:
+    """The certificate of a unit whose memory is verified; empty where it would not have the number that the device contains."""
+    reason = f"written into the device, copy {one.copy.upper()}, sequence {one.document()['sequence']}"
+    event = certify(ledger, run, [one.serial], day, until, reason=reason, keys=public_keys()).events[0]
+    if event.sequence == one.certificate:
+        return event.certificate
+    ledger.revoke(one.serial, REASON, day=day, certificate=event.sequence)
+    one.outcome, one.step = "failed", "certify"
+    one.reason = (
+        f"the device contains certificate number {one.certificate}, and another process wrote to the ledger, so that its number "
+        f"became {event.sequence}; repeat the command"
+    )
+    add(run.archive.root, one.serial, "failed", {"run": run.id, "reason": one.reason, **one.document()})
+    return ""
+
+
+def _refuse_older(ledger: Ledger, run: Run, serial: str, day: str) -> None:
+    """Refuse coefficients that were not measured after those of another run that are certified for the unit today."""
+    for one in ledger.calibrations(serial):
+        if one.run == run.id or not one.holds(day):
+            continue
+        theirs, ours = _measured_at(Run(run.archive, one.run)), _measured_at(run)
+        if theirs >= ours:
+            raise WrongUse(
+                f"program: unit {serial}: certificate {one.certificate} is of run {one.run}, measured {theirs}, and run {run.id} "
+                f"was measured {ours}, not after it; write that run, or end its certificate with 'tumbleline revoke {serial}'"
+            )
+
+
+def _measured_at(run: Run) -> str:
+    """Time, or day where that alone is known, at which the measurement of a run ended."""
+    span = measured_span(run)
+    return span[1] if span else measured_on(run)
 
 
 def _held(ledger: Ledger, serial: str, run: str, day: str) -> Calibration | None:

@@ -29,13 +29,16 @@ class Choice:
 
 @dataclass
 class ProgrammingOutcome:
-    """Outcome of a unit: ``proved``, or ``failed`` at a step for a reason."""
+    """Outcome of a unit: ``proved``, or ``failed`` at a step for a reason.
+
+    certificate : number of the certificate that the block contains; 0 without one
+    """
 
     serial: str
     slot: int
     unit: UnitCalibration
-    certificate: int
     memory: UnitMemory
+    certificate: int = 0
     outcome: str = "begun"
     step: str = ""
     reason: str = ""

@@ -6,7 +6,7 @@ a device uses it only when it is complete.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,13 +16,13 @@ from pipelines.certificates.programmed import add
 from pipelines.export.device_block import block_of, pack, unpack
 from pipelines.programming.checks import InPose, require_in_pose, require_moved, write_offsets_again
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
-from schemas.errors import OperatorNeeded, StationError, StationRefused, WrongUse
+from schemas.errors import OperatorNeeded, StationError, StationRefused, TumblelineError, WrongUse
 from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.devices.memory import COPIES
 from stations.safety.suspenders import require_released
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -44,8 +44,9 @@ class Programmer:
     """The programming of the devices of one run.
 
     run : its id; recipe : gives poses, dwell time and gravity of the verification
-    certificates : number of the certificate in the block, by serial; 0 without one
-    before_first_write : ends the certificate of a unit before its device changes
+    door_closed : whether the station's rules ask for a closed door
+    before_first_write : ends the certificate of a unit before its device changes; returns the number of its next certificate,
+        which the block contains, and 0 for a unit that gets none
     saved : called after every step, so that a simulated station can be continued
     """
 
@@ -54,8 +55,8 @@ class Programmer:
     run: str
     recipe: Recipe
     choice: Choice
-    certificates: Mapping[str, int]
-    before_first_write: Callable[[str], None]
+    door_closed: bool
+    before_first_write: Callable[[str], int]
     report: Callable[[str], None]
     saved: Callable[[], None]
 
@@ -67,10 +68,7 @@ class Programmer:
         StationError, LeaseLost, EmergencyStop
             The station fails for all units; every unit whose programming has begun is recorded as failed.
         """
-        outcomes = [
-            ProgrammingOutcome(unit.unit, slot, unit, self.certificates.get(unit.unit, 0), self._memory(slot))
-            for slot, unit in units
-        ]
+        outcomes = [ProgrammingOutcome(unit.unit, slot, unit, self._memory(slot)) for slot, unit in units]
         self._check(outcomes)
         step = "archive the memory"
         try:
@@ -85,9 +83,7 @@ class Programmer:
             step = "verify"
             self._verify(outcomes)
         except BaseException as problem:
-            for one in outcomes:
-                if one.open and one.block is not None:
-                    self._failed(one, step, str(problem) or type(problem).__name__)
+            self._all_failed(outcomes, step, problem)
             raise
         for one in outcomes:
             if one.open:
@@ -96,13 +92,33 @@ class Programmer:
         self.saved()
         return outcomes
 
+    def _all_failed(self, outcomes: Sequence[ProgrammingOutcome], step: str, problem: BaseException) -> None:
+        """Records every unit whose programming has begun as failed; one that cannot be recorded does not hide the others.
+
+        A beginning without an end counts as failed as well, so a missing record leaves no unit certified.
+        """
+        for one in outcomes:
+            if one.open and one.block is not None:
+                try:
+                    self._failed(one, step, str(problem) or type(problem).__name__)
+                except (TumblelineError, OSError) as second:
+                    problem.add_note(f"the failure of unit {one.serial} could not be recorded either: {second}")
+
     def _memory(self, slot: int) -> UnitMemory:
         return self.station.reader.slots[slot].memory(self.station.clock)
 
     def _require(self) -> None:
-        """Ends the programming where the lease is lost or the emergency stop is pressed; before power and axes change."""
+        """Ends the programming where the lease is lost, the emergency stop is pressed or the door is open.
+
+        Called before power and axes change, and after each dwell.
+        """
         self.station.require()
-        require_released(self.station.reader.guarded())
+        guarded = self.station.reader.guarded()
+        require_released(guarded)
+        if self.door_closed and guarded.door_open:
+            raise OperatorNeeded(
+                "station: the chamber's door is open, closed is needed; close it and repeat the command"
+            )
 
     def _check(self, outcomes: Sequence[ProgrammingOutcome]) -> None:
         """Refuses, before anything is written, units and stations that cannot be verified."""
@@ -162,19 +178,19 @@ class Programmer:
                 f"{memory.name}: copy {one.copy.upper()} has {status.erases[one.copy]} erasures, {status.endurance} are "
                 "specified; the memory is worn out: replace the device"
             )
-        offsets = self._offsets(one)
         block = block_of(
-            one.unit, self.choice.form, sequence=valid[newest].sequence + 1 if newest else 1, certificate=one.certificate,
-            date=self.choice.date, offsets=offsets, step=one.step_counts,
+            one.unit, self.choice.form, sequence=valid[newest].sequence + 1 if newest else 1, certificate=0,
+            date=self.choice.date, offsets=self._offsets(one), step=one.step_counts,
         )  # fmt: skip
-        one.content = pack(block)
+        pack(block)  # coefficients that the block cannot represent are refused while the certificate still holds
         before = {
             "copies": {copy.upper(): content.hex() for copy, content in there.items()},
             "erasures": {copy.upper(): status.erases[copy] for copy in COPIES},
             "offsets": list(memory.offsets()) if memory.offset_step else None,
         }
-        self.before_first_write(one.serial)
-        one.block = block
+        one.certificate = self.before_first_write(one.serial)
+        one.block = replace(block, certificate=one.certificate)
+        one.content = pack(one.block)
         add(self.root, one.serial, "begun", {
             "run": self.run, "station": self.station.name, "slot": one.slot, "before": before, **one.document(),
             "content": one.content.hex(),
@@ -272,4 +288,5 @@ class Programmer:
         reader.start(recipe.rate_hz)
         clock.sleep(recipe.dwell_s + 2.0 / recipe.rate_hz)
         reader.stop()
+        self._require()
         return {one.slot: reader.slots[one.slot].take().outputs.mean(axis=0) for one in outcomes if one.open}

@@ -78,7 +78,7 @@ CASES = {
     "lineage UNIT|RUN|FILE --json": ["lineage", "A1"],
     "import FILE… --json": ["import", "{folder}/rest.csv", *IMPORTED],
     "import FILE FILE… --json": ["import", "{folder}/rest.csv", "{folder}/rest.csv", *IMPORTED],
-    "correct FILE --json": ["correct", "{folder}/corrected.csv", "--calibration", "latest:A1", *CORRECTED],
+    "correct --json": ["correct", "{folder}/corrected.csv", "--calibration", "latest:A1", *CORRECTED],
     "station watch --json": ["station", "watch", "latest"],
     "station profiles --json": ["station", "profiles"],
     "archive clean --json": ["archive", "clean", "--dry-run"],
@@ -141,16 +141,17 @@ def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_pa
 
 
 def test_certify_prints_the_document_of_its_type(kept: Path) -> None:
-    validate(BY_HEAD["certify RUN --json"], (kept / "certify.json").read_text(encoding="utf-8"))
+    validate(BY_HEAD["certify --json"], (kept / "certify.json").read_text(encoding="utf-8"))
 
 
 def test_every_typed_document_is_printed_by_a_test() -> None:
     # lots of other tests' runs; tests/e2e/test_inquiry.py and test_operator.py
     untested = {"run --json (several fillings)", "show RUN --json (no grades)", "investigate --json", "operator --json"}
     untested |= {"certificate --json"}  # tests/unit/test_certificate_document.py
+    untested |= {"verify FILE… --json"}  # tests/unit/test_certificate_check.py
+    untested |= {"certify --json"}  # above, and tests/unit/test_certificate_check.py
+    untested |= {"program --json"}  # tests/faults/test_programming.py
     untested |= {"fit --json (an import)"}  # tests/e2e/test_imported_recording.py
-    untested |= {"certify RUN --json"}  # above
-    untested |= {"program RUN --json"}  # tests/faults/test_programming.py
     untested |= {"demo --auto --json", "demo --by-hand --json"}  # tests/e2e/test_diagnosis_commands.py
     untested |= {"station serve --json", "archive restore --json"}  # tests/e2e/test_station.py, test_backup.py
     assert set(BY_HEAD) - set(CASES) == untested

@@ -61,5 +61,8 @@ def test_an_effect_without_a_place_is_named_or_refused(name: str) -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_format_is_in_the_help_and_in_the_guide(name: str) -> None:
-    assert name in CliRunner().invoke(app, ["export", "--help"]).stdout
+    shown = " ".join(CliRunner().invoke(app, ["export", "--help"], env={"COLUMNS": "160"}).stdout.split())
+    own = FORMATS[name].__doc__
+    assert own is not None
+    assert f"{name}: {own.partition(': ')[2].partition('.')[0].replace('``', '')[:60]}" in shown
     assert f"`{name}`" in GUIDE.read_text(encoding="utf-8")

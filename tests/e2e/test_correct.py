@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from c_compiler import FIXED, REAL, compiled
 from capture_double import LSB_PER_G, CaptureDouble, small_job
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from inertial.correction import correct as correct_output
@@ -21,6 +22,7 @@ from pipelines.archive.signatures import VARIABLE
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.export import ExportSettings, export_text, unit_calibrations
+from pipelines.export.documents import CorrectDocument
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse
 
@@ -63,6 +65,7 @@ def correct(run: Run, *words: str) -> tuple[dict, int]:
     done = CliRunner().invoke(app, ["correct", *words, "--archive", str(run.archive.root), "--json"])
     if done.exception and not isinstance(done.exception, SystemExit):
         raise done.exception
+    TypeAdapter(CorrectDocument).validate_json(done.stdout, strict=True, extra="forbid")
     return json.loads(done.stdout), done.exit_code
 
 
@@ -185,6 +188,23 @@ def test_a_gap_in_the_recording_changes_neither_steps_nor_uncertainty(
     whole, gap = found
     np.testing.assert_allclose(gap[: n // 2], whole[: n // 2], rtol=1e-6)
     assert gap[n // 2] > whole[n // 2]  # the bias has drifted meanwhile
+
+
+def test_samples_after_the_last_whole_step_have_the_uncertainty_of_their_time(
+    run: Run, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    n, tail = 6050, 50  # half a step, an hour later
+    table = raw(run, np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 25.0), rng, np.zeros(3))
+    table["time_s"] += 3600.0 * (np.arange(n) >= n - tail)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    words = ["--calibration", "latest:A1", "--turn-on", "300", "--force", "0,0,1", "-o", str(tmp_path / "o.parquet")]
+    document, _ = correct(run, str(tmp_path / "a.csv"), *words)
+    found = pd.read_parquet(tmp_path / "o.parquet")
+    own = found["u_bias_x_ug"].to_numpy()
+    assert np.all(own[-tail:] > 2.0 * own[-tail - 1])
+    assert not found["updated"][-tail:].any()
+    assert (document["bias"]["updates"], document["bias"]["steps"]) == (60, 61)
+    assert document["bias"]["u_last_ug"]["x"] == pytest.approx(own[-1])
 
 
 def test_refusals_say_what_is_missing(

@@ -1,5 +1,6 @@
 """Coefficients in the memory of devices: they are proved, or the unit is not certified and its valid copy is untouched."""
 
+import json
 import os
 import re
 import shlex
@@ -15,6 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from programmed_lot import keep_state, lot_run, plant_of, programmed
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
@@ -28,8 +30,10 @@ from pipelines.export import UnitCalibration
 from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, unpack
 from pipelines.integrity import verify
 from pipelines.jobs.job import Job
-from pipelines.programming.job import REASON, _held, chosen_units
-from schemas.errors import StationRefused, StationTimeout, WrongUse
+from pipelines.programming.documents import ProgramDocument
+from pipelines.programming.job import REASON, _held, chosen_units, document
+from pipelines.tables.json_values import json_value
+from schemas.errors import ArchiveUnusable, OperatorNeeded, StationRefused, StationTimeout, WrongUse
 from schemas.fault import FaultOrder
 from stations.codec import Value
 from stations.devices.memory import UnitMemory
@@ -94,6 +98,8 @@ def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
     events = programming(run.archive.root, "A1")
     assert [entry["event"] for entry in events] == ["begun", "proved"]
     assert events[0]["before"]["copies"]["A"] == "ff" * 384
+    printed = json.dumps(json_value(document(run, list(done.values()), given)))
+    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")
     findings = verify(Archive(run.archive.root), [], keys={}).checked.findings
     assert findings == []
 
@@ -135,6 +141,8 @@ def test_a_fault_leaves_the_valid_copy_and_no_certificate(
     done, given = programmed(run)
     one = done["A1"]
     assert (one.outcome, one.step) == ("failed", step), one.reason
+    printed = json.dumps(json_value(document(run, list(done.values()), given)))
+    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")
     assert reason in one.reason
     newest = [block for content in copies(run) if (block := unpack(content)) is not None]
     assert [block.sequence for block in newest] == [1]  # never half written: the copy of the first time counts
@@ -385,3 +393,113 @@ def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> Non
     interrupted = _held(Held(REASON), "A1", "r", "2026-06-01")
     assert interrupted is not None
     assert interrupted.number == 2
+
+
+def newer(run: Run) -> Run:
+    """Another run of the same units, measured after it and certified for A1."""
+    from capture_double import small_run
+
+    folder = Path(str(run.archive.root)).parent
+    other = small_run(folder, None, ('"small"', '"later"'))
+    certify(Ledger(run.archive.root), other, ["A1"])
+    return other
+
+
+def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run) -> None:
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    ledger.revoke("A1", REASON, day=today())  # a writing of this run began once and was not completed
+    other = newer(run)
+    with pytest.raises(
+        WrongUse, match=rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
+    ):
+        programmed(run, ("A1",))
+    held = ledger.valid_at("A1", today())
+    assert held is not None
+    assert held.run == other.id
+    assert programming(run.archive.root, "A1") == []
+    programmed(run, ("A2",))  # the other units are not concerned
+
+
+def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_device_does_not_have(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process certifies the unit between the begin of the lock and the first write, and between proof and renewal."""
+    from pipelines.programming import job
+
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    real = job._station
+
+    def meanwhile(*words: object) -> object:
+        ledger.revoke("A1", "by another process", day=today())
+        certify(ledger, run, ["A1"], months=3)
+        return real(*words)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(job, "_station", meanwhile)
+        done, given = programmed(run, ("A1",))
+    block = done["A1"].block
+    assert block is not None
+    assert given == {"A1": f"A1/{block.certificate}"} == {"A1": "A1/5"}
+
+    real_certify = job.certify
+
+    def late(*words: object, **more: object) -> object:
+        real_certify(ledger, run, ["A1"], months=2)  # a process that had looked before the writing began
+        return real_certify(*words, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(job, "certify", late)
+        done, given = programmed(run, ("A1",))
+    assert given == {}
+    assert (done["A1"].outcome, done["A1"].step) == ("failed", "certify")
+    assert ledger.valid_at("A1", today()) is None
+    again, given = programmed(run, ("A1",))
+    written = again["A1"].block
+    assert written is not None
+    assert again["A1"].outcome == "proved"
+    assert given == {"A1": f"A1/{written.certificate}"}
+
+
+def test_an_open_door_is_refused_before_the_first_write_and_ends_the_verification(run: Run) -> None:
+    ledger = Ledger(run.archive.root)
+    certify(ledger, run, ["A1"])
+    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="door", at_s=0.0)))
+    with pytest.raises(OperatorNeeded, match="door is open"):
+        programmed(run, ("A1",))
+    assert programming(run.archive.root, "A1") == []
+    assert ledger.valid_at("A1", today()) is not None
+
+    def later(plant: Plant) -> None:
+        plant.inject(FaultOrder(kind="door", at_s=plant.now + 6.0))
+
+    keep_state(run, job_of(run), later)
+    with pytest.raises(OperatorNeeded, match="door is open"):
+        programmed(run, ("A1",))
+    assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "failed"]
+    assert ledger.valid_at("A1", today()) is None
+
+
+def test_a_failure_that_cannot_be_recorded_hides_neither_its_cause_nor_the_other_units(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipelines.programming import process
+
+    def off(_self: object) -> None:
+        raise KeyboardInterrupt
+
+    real = process.add
+
+    def full(root: object, serial: str, event: str, content: dict) -> object:
+        if serial == "A1" and event == "failed":
+            raise ArchiveUnusable("no space left on device")
+        return real(root, serial, event, content)
+
+    monkeypatch.setattr(process, "add", full)
+    monkeypatch.setattr(process.Programmer, "_power_cycle", off)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        programmed(run, ("A1", "A2"))
+    assert any("unit A1 could not be recorded either: no space" in note for note in caught.value.__notes__)
+    assert [entry["event"] for entry in programming(run.archive.root, "A2")] == ["begun", "failed"]
+    assert "has no end" in unproved(run.archive.root, "A1")

@@ -158,7 +158,7 @@ def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(run: Run) -> N
         "Example Drones Ltd", "quality@example.org", "Static multi-position calibration",
         "Accelerometer, Analog Devices, adxl355", "Date of calibration", "Date of issue", "relate only to the item",
         "J. Example, Head of calibration",
-        "Conditions", "9.81230 m/s²", "0.0 to 50.0 °C", "traceability", "no earlier calibration", "coverage factor",
+        "Conditions", "9.81230 m/s²", "0.0 to 50.0 °C", "traceability", "No earlier calibration", "coverage factor",
         "ILAC-G8:09/2019 guarded acceptance", "PFA", "End of certificate",
     ):  # fmt: skip
         assert part in paper, part
@@ -170,6 +170,18 @@ def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(run: Run) -> N
     ):  # fmt: skip
         assert tree.xpath(path, namespaces=NAMES), path
     assert [f"page {n} of {len(pages)}" in page for n, page in enumerate(pages, 1)] == [True] * len(pages)
+
+
+def test_the_head_of_a_budget_is_what_its_contributions_add_up_to(run: Run) -> None:
+    tables = content(run).budgets
+    assert {one.k is None for one in tables} == {
+        True,
+        False,
+    }  # the error over the period is a standard deviation itself
+    for one in tables:
+        if one.k is None:
+            assert np.sqrt(sum(row.u**2 for row in one.rows)) == pytest.approx(one.u, rel=2e-3)
+        assert all("[" not in row.source for row in one.rows)
 
 
 def test_values_of_the_xml_are_those_of_the_archive_in_si_units(run: Run) -> None:

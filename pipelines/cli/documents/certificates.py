@@ -114,35 +114,11 @@ _Entry = TypedDict(
 )
 
 
-class CertifiedEntry(_Entry):
-    """An entry of the ledger that certifies a unit."""
-
-    certificate: str
-    was_there: Annotated[bool, "certified before by the same run"]
-
-
-class CertifyDocument(TypedDict):
-    """``certify RUN --json``: the certified units of a run."""
-
-    run: str
-    certified: list[CertifiedEntry]
-    left_out: Annotated[dict[str, str], "units without a certificate, with the reason"]
-
-
 class RevokeDocument(_Entry):
     """``revoke UNIT --json``: the entry of the ledger that ends calibrations."""
 
     unit: str
     revoked: Annotated[list[str], "certificates that it ends"]
-
-
-class StatedCertificate(Validity):
-    """The certificate of coefficients."""
-
-    certificate: str
-    state: Literal["valid", "superseded", "revoked"]
-    reason: str
-    valid_now: bool
 
 
 class LineageNode(TypedDict):

@@ -1,0 +1,110 @@
+"""Who signed a certificate, and whether a certificate of the reader's own vouches for it."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509 import Certificate, load_pem_x509_certificates
+
+from pipelines.importers.library import library
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+EXTRA, WHERE = "signatures", "verify"
+
+
+@dataclass(frozen=True)
+class Signer:
+    """A signature that holds, and its signer.
+
+    certificate : the signer's own; chain : the other certificates beside the signature
+    when : the time that the signer stated, UTC; None where the signature has none
+    """
+
+    certificate: Certificate
+    chain: tuple[Certificate, ...]
+    when: datetime | None
+
+    @property
+    def name(self) -> str:
+        """Subject of the signer's certificate, with the beginning of its fingerprint."""
+        from cryptography.hazmat.primitives.hashes import SHA256
+
+        return f"{self.certificate.subject.rfc4514_string()} (SHA-256 {self.certificate.fingerprint(SHA256()).hex()[:16]}…)"
+
+
+def read_trusted(paths: Sequence[Path]) -> tuple[Certificate, ...]:
+    """The certificates of PEM files: of laboratories, or of the authorities that issue their certificates.
+
+    Raises
+    ------
+    WrongUse
+        A file cannot be read or holds no certificate.
+    """
+    found: list[Certificate] = []
+    for path in paths:
+        try:
+            found += load_pem_x509_certificates(path.read_bytes())
+        except (OSError, ValueError) as problem:
+            raise WrongUse(
+                f"--trust: {path} holds no certificate that can be read ({problem}); give a PEM file with the certificate of "
+                "the laboratory or of its authority"
+            ) from None
+    return tuple(found)
+
+
+def not_trusted(signer: Signer, trusted: Sequence[Certificate], issued: str) -> str:
+    """Why none of the trusted certificates vouches for a signer; empty where one does.
+
+    A certificate that is among the trusted ones vouches for itself. Any other must lead to one of them, on the day of the
+    check or, where it has expired since, at the time that the signature or the document states.
+
+    Parameters
+    ----------
+    issued : date of issue that the document states, ISO; may be empty.
+    """
+    own = signer.certificate
+    if any(own == one for one in trusted):
+        return ""
+    moment = _moment(signer, issued)
+    if moment is None:
+        return f"the signer's certificate is valid from {own.not_valid_before_utc:%Y-%m-%d} to {own.not_valid_after_utc:%Y-%m-%d}"
+    return _path_problem(signer, trusted, moment)
+
+
+def _moment(signer: Signer, issued: str) -> datetime | None:
+    """A time at which the signer's certificate is valid: now, else the time of the signature or of the issue."""
+    own = signer.certificate
+    stated = [datetime.fromisoformat(issued).replace(tzinfo=UTC)] if re.fullmatch(r"\d{4}-\d\d-\d\d", issued) else []
+    times = [datetime.now(UTC), *([signer.when] if signer.when is not None else []), *stated]
+    return next((time for time in times if own.not_valid_before_utc <= time <= own.not_valid_after_utc), None)
+
+
+def _path_problem(signer: Signer, trusted: Sequence[Certificate], moment: datetime) -> str:
+    """Why no path of certificates leads from a signer to a trusted one at a time; empty where one does."""
+    certvalidator = library("pyhanko_certvalidator", EXTRA, WHERE)
+    asn1 = library("asn1crypto.x509", EXTRA, WHERE)
+
+    def loaded(one: Certificate) -> object:
+        return asn1.Certificate.load(one.public_bytes(Encoding.DER))
+
+    context = certvalidator.ValidationContext(
+        trust_roots=[loaded(one) for one in trusted], moment=moment, best_signature_time=moment, allow_fetching=False
+    )
+    validator = certvalidator.CertificateValidator(
+        loaded(signer.certificate), [loaded(one) for one in signer.chain], validation_context=context
+    )
+    errors = library("pyhanko_certvalidator.errors", EXTRA, WHERE)
+    try:
+        asyncio.run(validator.async_validate_path())
+    except (errors.ValidationError, errors.PathError, ValueError) as problem:
+        return " ".join(str(problem).split()).rstrip(".")
+    return ""

@@ -1,0 +1,109 @@
+"""The check of certificate files by ``tumbleline verify FILE…``, as text and as JSON."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipelines.cli.options import console, print_json
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.archive import Archive
+    from pipelines.certificate_document.file_check import CheckedFile
+
+ENDINGS = (".pdf", ".xml", ".sig")
+STYLES = {"good": None, "bad": "bold red", "not checked": "yellow"}
+
+
+def certificate_files(names: Sequence[str]) -> list[Path]:
+    """The names as files of certificates; empty where none is one.
+
+    Raises
+    ------
+    WrongUse
+        Files and runs are mixed, or a file is not there.
+    """
+    files = [Path(name) for name in names if Path(name).suffix.lower() in ENDINGS]
+    if not files:
+        return []
+    if len(files) < len(names):
+        other = next(name for name in names if Path(name) not in files)
+        raise WrongUse(
+            f"verify: {other} is no file of a certificate, and {files[0]} is one; give files or runs, not both"
+        )
+    missing = [path for path in files if not path.is_file()]
+    if missing:
+        raise WrongUse(f"verify: {missing[0]} is not there, the file of a certificate is needed; correct the name")
+    return files
+
+
+def check_certificates(files: Sequence[Path], trust: Sequence[Path], archive: str | None, *, as_json: bool) -> bool:
+    """Check files of certificates and print the result; whether all are accepted."""
+    from pipelines.certificate_document.file_check import Against, check_file
+    from pipelines.certificate_document.signers import read_trusted
+
+    against = Against(read_trusted(trust), _archive(archive), demanded=archive is not None)
+    done = [check_file(path, against) for path in files]
+    accepted = all(one.accepted for one in done)
+    if as_json:
+        print_json({"files": [_document(one) for one in done], "accepted": accepted})
+    else:
+        for one in done:
+            _print(one)
+    return accepted
+
+
+def _archive(name: str | None) -> Archive | None:
+    """The archive that is given, or the usual one where there is one."""
+    from pipelines.archive import Archive
+
+    if name is None and not os.environ.get("TUMBLELINE_ARCHIVE") and not Path("archive").is_dir():
+        return None
+    found = Archive(name)
+    found.refuse_none()
+    return found
+
+
+def _document(one: CheckedFile) -> dict[str, Any]:
+    facts = one.facts
+    return {
+        "file": str(one.path),
+        "certificate": "" if facts is None else facts.number,
+        "serial": "" if facts is None else facts.serial,
+        "run": "" if facts is None else facts.run,
+        "issued": "" if facts is None else facts.issued,
+        "signers": one.signers,
+        "checks": [{"check": c.check, "state": c.state, "message": c.message} for c in one.checks],
+        "proven_by": list(one.proven_by),
+        "accepted": one.accepted,
+    }
+
+
+def _print(one: CheckedFile) -> None:
+    out = console()
+    head = f"{one.path}: certificate {one.facts.number}, unit {one.facts.serial}" if one.facts else str(one.path)
+    out.print(head, style="bold", markup=False, soft_wrap=True)
+    for check in one.checks:
+        mark = {"good": "ok", "bad": "WRONG", "not checked": "-"}[check.state]
+        out.print(
+            f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state], markup=False, soft_wrap=True
+        )
+    wrong = sum(check.state == "bad" for check in one.checks)
+    if wrong:
+        out.print(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red", markup=False)
+    elif one.accepted:
+        by = {"signature": "a trusted signature", "archive": "the archive"}
+        proven = " and ".join(by[name] for name in one.proven_by)
+        out.print(f"  accepted: nothing is wrong, proven by {proven}", style="bold green", markup=False)
+    else:
+        out.print(
+            "  not accepted: nothing is wrong, and nothing shows where the file comes from; give --trust FILE with the "
+            "certificate of the laboratory's key, or --archive",
+            style="bold yellow",
+            markup=False,
+            soft_wrap=True,
+        )

@@ -1,0 +1,42 @@
+"""The JSON document of a corrected recording: keys that other programs read."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from typing_extensions import TypedDict
+
+
+class TrackedBiasDocument(TypedDict):
+    """The bias that was tracked along a recording."""
+
+    last_ug: Annotated[dict[str, float], "bias at the end, by axis"]
+    u_last_ug: Annotated[dict[str, float], "its standard uncertainty, by axis"]
+    updates: Annotated[int, "steps in which the force was known"]
+    steps: int
+    rejected: Annotated[int, "innovations beyond 5 standard deviations"]
+    nis: Annotated[float | None, "mean of the squared normalised innovations; null: too few updates"]
+    nis_bounds: Annotated[list[float | None], "its 95 % bounds"]
+    lag_1: Annotated[float | None, "correlation of successive innovations"]
+    lag_1_bound: Annotated[float | None, "white below this magnitude"]
+    stated_uncertainty: Annotated[
+        Literal["consistent", "too small", "too large"] | None, "by the innovations; null: too few updates"
+    ]
+    processes_s: Annotated[list[float], "correlation times of the Gauss–Markov processes of the bias instability, s"]
+    processes_flat: Annotated[float, "largest relative deviation of their Allan deviation from a flat one"]
+
+
+class CorrectDocument(TypedDict):
+    """``correct --json``: a corrected recording, and the bias where it was tracked."""
+
+    file: str
+    run: str
+    unit: str
+    certificate: Annotated[dict[str, Any] | None, "that of the coefficients, as in `show UNIT`; null: not certified"]
+    samples: int
+    outside_temperature: Annotated[int, "samples outside the measured temperatures"]
+    temperatures_C: Annotated[list[float], "lowest and highest measured temperature"]
+    u_ug: Annotated[dict[str, float], "standard uncertainty of a sample, RMS, by axis"]
+    u_contains: Annotated[list[str], "what the uncertainty includes"]
+    output: Annotated[str | None, "the file that was written; null: none"]
+    bias: Annotated[TrackedBiasDocument | None, "null: the force is known nowhere, nothing was tracked"]

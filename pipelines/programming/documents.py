@@ -1,0 +1,44 @@
+"""The JSON document of the writing of coefficients into devices: keys that other programs read."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from typing_extensions import TypedDict
+
+
+class VerifiedPoseDocument(TypedDict):
+    """The verification of a device in one pose."""
+
+    pose: str
+    temperature_C: float
+    force_g: Annotated[list[float], "true force, x, y, z"]
+    output: Annotated[list[float], "mean output of the device"]
+    corrected_g: Annotated[list[float], "the output, corrected with the coefficients in the device"]
+    error_ug: list[float]
+    magnitude_g: float
+    from_archive_ug: Annotated[float, "largest difference from the correction with the archive's coefficients"]
+
+
+class ProgrammedUnitDocument(TypedDict):
+    """What became of one device."""
+
+    unit: str
+    outcome: Literal["proved", "failed"]
+    step: Annotated[str, "the step that failed; empty if none did"]
+    reason: Annotated[str, "empty if no step failed"]
+    copy: Annotated[Literal["A", "B"], "of the block, that was written"]
+    sequence: Annotated[int | None, "sequence number of the block; null: nothing was written"]
+    form: Annotated[Literal["float32", "q24"] | None, "null: nothing was written"]
+    crc32: Annotated[str, "hexadecimal"]
+    bytes: int
+    offsets: Annotated[list[int] | None, "steps of the offset registers; null: nothing was written"]
+    poses: list[VerifiedPoseDocument]
+    certificate: Annotated[str | None, "number of the renewed certificate; null: not certified"]
+
+
+class ProgramDocument(TypedDict):
+    """``program --json``: the devices whose memory was written."""
+
+    run: str
+    units: list[ProgrammedUnitDocument]

@@ -1,0 +1,429 @@
+"""``tumbleline verify FILE``: what a receiver of a certificate is told of good, forged, cut, re-signed and revoked files."""
+
+import base64
+import hashlib
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec, utils
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509.oid import NameOID
+from pydantic import TypeAdapter
+from signing_keys import made_key, pem
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive, Run
+from pipelines.certificate_document.documents import CertificateCheckDocument
+from pipelines.certificate_document.signature_check import canonical, parsed, xml_signature
+from pipelines.certificate_document.signing import SigningKey, sign_pdf, sign_xml
+from pipelines.certificates import Ledger
+from pipelines.certificates.documents import CertifyDocument
+from pipelines.chain.certify import certify
+from pipelines.cli import app
+from schemas.errors import WrongUse
+
+etree = pytest.importorskip("lxml.etree")
+xmlschema = pytest.importorskip("xmlschema")
+for name in ("typst", "signxml", "pyhanko"):
+    pytest.importorskip(name)
+
+DSIG = "http://www.w3.org/2000/09/xmldsig#"
+DCC = "https://ptb.de/dcc"
+LABORATORY = """
+[laboratory]
+name = "Example Sensor Works"
+address = "Am Kornfeld 7, 38116 Braunschweig"
+country = "DE"
+email = "calibration@example.com"
+[customer]
+name = "Example Drones Ltd"
+address = "12 Mill Lane, Cambridge"
+email = "quality@example.org"
+[signatory]
+name = "J. Example"
+role = "Head of calibration"
+[item]
+manufacturer = "Analog Devices"
+"""
+
+
+@dataclass(frozen=True)
+class Issued:
+    """A certified run, the key of its laboratory, and a folder with the files of two certificates, signed; one unsigned."""
+
+    run: Run
+    key: SigningKey
+    folder: Path
+    trust: Path
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Issued:
+    folder = tmp_path_factory.mktemp("issued")
+    run = small_run(folder)
+    run.seal()
+    done = CliRunner().invoke(app, ["certify", run.id, "--archive", str(run.archive.root), "--json"])
+    TypeAdapter(CertifyDocument).validate_json(done.stdout, strict=True, extra="forbid")
+    key = made_key(ec.generate_private_key(ec.SECP256R1()))
+    (folder / "laboratory.toml").write_text(LABORATORY, encoding="utf-8")
+    (folder / "key.pem").write_bytes(pem(key))
+    (folder / "trust.pem").write_bytes(key.certificate.public_bytes(Encoding.PEM))
+    words = ["certificate", run.id, "--laboratory", str(folder / "laboratory.toml"), "--archive", str(run.archive.root)]
+    for out, more in (("signed", ["--sign-with", str(folder / "key.pem")]), ("unsigned", [])):
+        done = CliRunner().invoke(app, [*words, "--output", str(folder / out), *more])
+        assert done.exit_code == 0, done.output
+    return Issued(run, key, folder, folder / "trust.pem")
+
+
+@pytest.fixture
+def issued(made: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Issued:
+    shutil.copytree(made.folder / "signed", tmp_path / "signed")
+    monkeypatch.chdir(tmp_path)  # no archive here
+    monkeypatch.delenv("TUMBLELINE_ARCHIVE", raising=False)
+    return Issued(made.run, made.key, tmp_path / "signed", made.trust)
+
+
+def checked(*words: object, status: int | None = None) -> dict:
+    """The document that the command prints, after its type was checked; ``status`` : that is expected."""
+    done = CliRunner().invoke(app, ["verify", *map(str, words), "--json"])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    TypeAdapter(CertificateCheckDocument).validate_json(done.stdout, strict=True, extra="forbid")
+    document = json.loads(done.stdout)
+    assert done.exit_code == (0 if document["accepted"] else 1)
+    if status is not None:
+        assert done.exit_code == status, done.stdout
+    return document
+
+
+def wrong(document: dict) -> dict[str, str]:
+    """Messages of the checks that are bad, by check."""
+    return {
+        one["check"]: one["message"] for file in document["files"] for one in file["checks"] if one["state"] == "bad"
+    }
+
+
+# second programs ------------------------------------------------------------------------------------------------------
+
+
+def openssl_accepts(document: bytes, trust: Path, folder: Path) -> bool:
+    """Whether ``openssl cms`` accepts the last signature of a PDF over the whole file."""
+    place = document.rindex(b"/ByteRange")
+    a, n, b, m = (int(part) for part in document[place : place + 200].split(b"[", 1)[1].split(b"]", 1)[0].split())
+    (folder / "data").write_bytes(document[a : a + n] + document[b : b + m])
+    (folder / "cms").write_bytes(bytes.fromhex(document[n + 1 : b - 1].decode()))
+    words = ["openssl", "cms", "-verify", "-binary", "-inform", "DER", "-in", "cms", "-content", "data", "-CAfile", str(trust),
+             "-purpose", "any", "-out", "out"]  # fmt: skip
+    good = subprocess.run(words, cwd=folder, capture_output=True, check=False).returncode == 0
+    return good and b + m == len(document)
+
+
+def own_implementation_accepts(signature: bytes, key: SigningKey) -> bool:
+    """XMLDSig by hand: digest of the canonical object, ECDSA over the canonical SignedInfo."""
+    root = etree.fromstring(signature)
+    signed = root.find(f"{{{DSIG}}}SignedInfo")
+    value = base64.b64decode(root.findtext(f"{{{DSIG}}}SignatureValue"))
+    half = len(value) // 2
+    r, s = (int.from_bytes(part, "big") for part in (value[:half], value[half:]))
+    method = signed.find(f"{{{DSIG}}}CanonicalizationMethod").get("Algorithm")
+    assert method == "http://www.w3.org/2006/12/xml-c14n11", method
+    public = key.certificate.public_key()
+    assert isinstance(public, ec.EllipticCurvePublicKey)
+    try:
+        public.verify(
+            utils.encode_dss_signature(r, s), etree.tostring(signed, method="c14n"), ec.ECDSA(hashes.SHA256())
+        )
+    except InvalidSignature:
+        return False
+    digest = base64.b64decode(signed.findtext(f".//{{{DSIG}}}DigestValue"))
+    return digest == hashlib.sha256(etree.tostring(root.find(f"{{{DSIG}}}Object"), method="c14n")).digest()
+
+
+def schema_accepts(document: bytes) -> bool:
+    from importlib.resources import files
+
+    folder = files("pipelines.certificate_document") / "schemas"
+    rules = xmlschema.XMLSchema(str(folder / "dcc.xsd"), locations={"https://ptb.de/si": str(folder / "SI_Format.xsd")},
+                                allow="local")  # fmt: skip
+    return rules.is_valid(BytesIO(document))
+
+
+# files as they were issued --------------------------------------------------------------------------------------------
+
+
+def test_signed_files_are_accepted_from_the_file_alone_and_by_second_programs(issued: Issued, tmp_path: Path) -> None:
+    files = [issued.folder / f"A1_1.{end}" for end in ("pdf", "xml", "xml.sig")]
+    document = checked(*files, "--trust", issued.trust, status=0)
+    assert [one["certificate"] for one in document["files"]] == ["A1/1"] * 3
+    assert all(one["proven_by"] == ["signature"] for one in document["files"])
+    assert openssl_accepts(files[0].read_bytes(), issued.trust, tmp_path)
+    assert own_implementation_accepts(files[2].read_bytes(), issued.key)
+    assert schema_accepts(files[1].read_bytes())
+
+
+def test_with_the_archive_the_numbers_are_compared_and_the_state_is_told(issued: Issued) -> None:
+    words = (issued.folder / "A1_1.pdf", "--trust", issued.trust, "--archive", issued.run.archive.root)
+    checks = {one["check"]: one for one in checked(*words, status=0)["files"][0]["checks"]}
+    assert checks["archive"]["state"] == checks["state"]["state"] == "good"
+    assert int(checks["archive"]["message"].split()[0]) > 20
+
+
+def test_a_good_signature_of_anybody_proves_nothing(issued: Issued) -> None:
+    document = checked(issued.folder / "A1_1.pdf", status=1)
+    assert not wrong(document)
+    printed = CliRunner().invoke(app, ["verify", str(issued.folder / "A1_1.pdf")]).stdout
+    assert "nothing shows where the file comes from; give --trust FILE" in printed
+
+
+def test_an_unsigned_xml_is_proven_by_the_archive_and_an_unsigned_pdf_is_not(made: Issued, issued: Issued) -> None:
+    folder, archive = made.folder / "unsigned", ("--archive", issued.run.archive.root)
+    assert checked(folder / "A1_1.xml", *archive, status=0)["files"][0]["proven_by"] == ["archive"]
+    document = checked(folder / "A1_1.pdf", *archive, status=1)
+    assert not wrong(document)
+    assert "nothing shows that its pages are unchanged" in json.dumps(document)
+    checked(folder / "A1_1.xml", status=1)
+
+
+# forgeries ------------------------------------------------------------------------------------------------------------
+
+
+def changed_digit(xml: bytes) -> bytes:
+    """The XML with another first digit of the first value of a result."""
+    place = xml.index(b"<si:value>", xml.index(b"<dcc:results>")) + len(b"<si:value>")
+    place += xml[place : place + 1] == b"-"
+    digit = b"1" if xml[place : place + 1] != b"1" else b"2"
+    return xml[:place] + digit + xml[place + 1 :]
+
+
+def test_a_changed_digit_is_found_by_the_signature_and_by_the_archive(issued: Issued) -> None:
+    path = issued.folder / "A1_1.xml"
+    path.write_bytes(changed_digit(path.read_bytes()))
+    found = wrong(checked(path, "--trust", issued.trust, status=1))
+    assert found == {"signature": "A1_1.xml.sig signs another document than this file"}
+    path.with_name("A1_1.xml.sig").unlink()
+    assert "the file says" in wrong(checked(path, "--archive", issued.run.archive.root, status=1))["archive"]
+
+
+def test_changed_bytes_of_the_signature_file_are_found_as_by_the_other_implementation(issued: Issued) -> None:
+    path = issued.folder / "A1_1.xml.sig"
+    path.write_bytes(changed_digit(path.read_bytes()))
+    assert "does not hold" in wrong(checked(path, "--trust", issued.trust, status=1))["signature"]
+    assert not own_implementation_accepts(path.read_bytes(), issued.key)
+
+
+def test_every_changed_byte_of_a_signed_pdf_is_found_as_by_openssl(issued: Issued, tmp_path: Path) -> None:
+    path = issued.folder / "A1_1.pdf"
+    whole = path.read_bytes()
+    hidden = whole.rindex(b"/Contents")
+    for place in (60, len(whole) // 3, len(whole) // 2, hidden - 200):
+        data = whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
+        path.write_bytes(data)
+        assert wrong(checked(path, "--trust", issued.trust, status=1)), place
+        assert not openssl_accepts(data, issued.trust, tmp_path)
+
+
+def test_what_is_added_after_signing_is_found(issued: Issued, tmp_path: Path) -> None:
+    """The attached XML replaced, and a page's text covered, by an incremental update: the signed bytes are untouched."""
+    from pyhanko.pdf_utils import generic
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+
+    path = issued.folder / "A1_1.pdf"
+    signed = path.read_bytes()
+    for kind in ("attachment", "page"):
+        writer = IncrementalPdfFileWriter(BytesIO(signed))
+        if kind == "attachment":
+            spec = writer.root["/Names"]["/EmbeddedFiles"]["/Names"][1]
+            stream = generic.StreamObject(stream_data=changed_digit(spec["/EF"]["/F"].data))
+            spec["/EF"]["/F"] = writer.add_object(stream)
+            writer.update_container(spec["/EF"])
+        else:
+            writer.add_stream_to_page(0, writer.add_object(generic.StreamObject(stream_data=b"q 0 0 99 99 re f Q")))
+        out = BytesIO()
+        writer.write(out)
+        assert out.getvalue().startswith(signed)
+        path.write_bytes(out.getvalue())
+        assert (
+            "something was added after signing" in wrong(checked(path, "--trust", issued.trust, status=1))["signature"]
+        )
+        assert not openssl_accepts(out.getvalue(), issued.trust, tmp_path)
+
+
+def test_a_second_signature_of_the_receiver_leaves_the_first_good(issued: Issued) -> None:
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.sign import PdfSignatureMetadata, PdfSigner, SimpleSigner
+
+    receiver = made_key(ec.generate_private_key(ec.SECP256R1()))
+    from cryptography.hazmat.primitives.serialization import NoEncryption, pkcs12
+
+    pair = pkcs12.serialize_key_and_certificates(None, receiver.key, receiver.certificate, None, NoEncryption())
+    out, path = BytesIO(), issued.folder / "A1_1.pdf"
+    signer = SimpleSigner.load_pkcs12_data(pair, other_certs=[], passphrase=None)
+    meta = PdfSignatureMetadata(field_name="Received", md_algorithm="sha256")
+    PdfSigner(meta, signer=signer).sign_pdf(IncrementalPdfFileWriter(BytesIO(path.read_bytes())), output=out)
+    path.write_bytes(out.getvalue())
+    assert len(checked(path, "--trust", issued.trust, status=0)["files"][0]["signers"]) == 2
+
+
+def test_files_signed_again_by_another_key_are_found(issued: Issued, made: Issued) -> None:
+    forger = made_key(ec.generate_private_key(ec.SECP256R1()))
+    xml = changed_digit((issued.folder / "A1_1.xml").read_bytes())
+    (issued.folder / "A1_1.xml").write_bytes(xml)
+    (issued.folder / "A1_1.xml.sig").write_bytes(sign_xml(xml, forger))
+    (issued.folder / "A2_1.pdf").write_bytes(sign_pdf((made.folder / "unsigned" / "A2_1.pdf").read_bytes(), forger))
+    for name in ("A1_1.xml", "A1_1.xml.sig", "A2_1.pdf"):
+        document = checked(issued.folder / name, "--trust", issued.trust, status=1)
+        assert "no certificate of --trust vouches for" in wrong(document)["signer"]
+        assert document["files"][0]["proven_by"] == []
+    archive = ("--archive", issued.run.archive.root)
+    assert "the file says" in wrong(checked(issued.folder / "A1_1.xml", *archive, status=1))["archive"]
+
+
+def test_a_document_beside_the_signed_one_is_not_taken_for_it(issued: Issued) -> None:
+    """Wrapping: a forged document is put into the signature's file, before and after the signed one."""
+    path = issued.folder / "A1_1.xml.sig"
+    good, signed = path.read_bytes(), (issued.folder / "A1_1.xml").read_bytes()
+    forged = etree.fromstring(changed_digit(signed))
+    for index in (0, -1):
+        root = etree.fromstring(good)
+        box = etree.Element(f"{{{DSIG}}}Object", Id="object")
+        box.append(forged)
+        root.insert(index, box) if index == 0 else root.append(box)
+        path.write_bytes(etree.tostring(root))
+        if checked(path, "--trust", issued.trust)["accepted"]:  # then it is for the document that was signed
+            assert canonical(xml_signature(path.read_bytes())[1]) == canonical(parsed(signed))
+        (path.parent / "forged.xml").write_bytes(etree.tostring(forged))
+        shutil.copy(path, path.parent / "forged.xml.sig")
+        assert checked(path.parent / "forged.xml", "--trust", issued.trust, status=1)["files"][0]["proven_by"] == []
+
+
+@pytest.mark.parametrize("name", ["A1_1.pdf", "A1_1.xml", "A1_1.xml.sig"])
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.95, 0.9999])
+def test_a_cut_file_is_wrong_and_never_a_traceback(name: str, share: float, issued: Issued) -> None:
+    path = issued.folder / name
+    data = path.read_bytes()
+    path.write_bytes(data[: min(int(share * len(data)), len(data) - 10)])
+    assert wrong(checked(path, "--trust", issued.trust, status=1))
+
+
+def test_other_bytes_are_wrong_and_never_a_traceback(issued: Issued) -> None:
+    bomb = b'<!DOCTYPE a [<!ENTITY b "bb">]><a>&b;</a>'
+    for end in ("pdf", "xml", "xml.sig"):
+        for data in (b"", b"%PDF-1.7\n", b"\x00\xff" * 500, b"<a/>", bomb, b"<a><b></a>"):
+            path = issued.folder / f"other.{end}"
+            path.write_bytes(data)
+            assert wrong(checked(path, "--trust", issued.trust, status=1)), (end, data[:20])
+
+
+def test_an_attachment_that_is_not_the_xml_beside_it_is_found(issued: Issued) -> None:
+    shutil.copy(issued.folder / "A2_1.xml", issued.folder / "A1_1.xml")
+    found = wrong(checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=1))
+    assert found == {"attachment": "the attached XML differs from A1_1.xml"}
+
+
+def test_an_xml_that_the_schema_does_not_allow_is_found_as_by_the_second_program(issued: Issued) -> None:
+    xml = (issued.folder / "A1_1.xml").read_bytes()
+    path = issued.folder / "other.xml"
+    for bad in (xml.replace(b"<dcc:mainSigner>true</dcc:mainSigner>", b"<dcc:mainSigner>yes</dcc:mainSigner>"),
+                xml.replace(b"<dcc:eMail>calibration@example.com</dcc:eMail>", b"")):  # fmt: skip
+        path.write_bytes(bad)
+        path.with_name("other.xml.sig").write_bytes(sign_xml(bad, issued.key))
+        assert "is not valid against DCC 3.0.0" in wrong(checked(path, "--trust", issued.trust, status=1))["schema"]
+        assert not schema_accepts(bad)
+    path.write_bytes(xml.replace(b'schemaVersion="3.0.0"', b'schemaVersion="3.3.0"'))
+    path.with_name("other.xml.sig").unlink()
+    states = {one["check"]: one["state"] for one in checked(path, status=1)["files"][0]["checks"]}
+    assert states["schema"] == "not checked"
+
+
+# states of the ledger -------------------------------------------------------------------------------------------------
+
+
+def test_revoked_amended_and_unknown_certificates_are_told_by_the_archive(issued: Issued, tmp_path: Path) -> None:
+    shutil.copytree(str(issued.run.archive.root), tmp_path / "copy")
+    archive = Archive(tmp_path / "copy")
+    words = ("--trust", issued.trust, "--archive", tmp_path / "copy")
+    Ledger(archive).revoke("A1", "dropped on the floor")
+    certify(Ledger(archive), archive.run(issued.run.id), ["A2"], months=6, reason="validity corrected")
+    revoked = wrong(checked(issued.folder / "A1_1.pdf", *words, status=1))
+    assert set(revoked) == {"state"}
+    assert revoked["state"].startswith("revoked on ")
+    assert revoked["state"].endswith("dropped on the floor")
+    amended = wrong(checked(issued.folder / "A2_1.xml", *words, status=1))
+    assert "amended and replaced by certificate A2/2" in amended["state"]
+    shutil.rmtree(tmp_path / "copy" / "calibrations")
+    assert (
+        "has no certificate A1/1 of unit A1" in wrong(checked(issued.folder / "A1_1.xml", *words, status=1))["archive"]
+    )
+
+
+def test_an_archive_that_is_only_there_by_chance_is_not_demanded(issued: Issued, tmp_path: Path) -> None:
+    """The usual place of the archive holds that of somebody else, who receives the certificate."""
+    Archive(tmp_path / "archive").prepare()
+    document = checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=0)
+    assert "has no certificate A1/1" in json.dumps(document)
+
+
+# whom the receiver trusts ---------------------------------------------------------------------------------------------
+
+
+def authority(subject: str, days: int = 30) -> tuple[ec.EllipticCurvePrivateKey, x509.Certificate]:
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, subject)])
+    now = datetime.now(UTC)
+    builder = (
+        x509.CertificateBuilder().subject_name(name).issuer_name(name).public_key(key.public_key()).serial_number(1)
+    )
+    builder = builder.not_valid_before(now - timedelta(days=400)).not_valid_after(now + timedelta(days=days))
+    return key, builder.add_extension(x509.BasicConstraints(True, None), critical=True).sign(key, hashes.SHA256())
+
+
+def test_a_certificate_of_an_authority_vouches_for_the_laboratories_that_it_named(issued: Issued, made: Issued) -> None:
+    root, own = authority("Example Authority")
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Example Sensor Works")])
+    now = datetime.now(UTC)
+    document = (made.folder / "unsigned" / "A1_1.pdf").read_bytes()
+    path, trust = issued.folder / "A1_1.pdf", issued.folder / "authority.pem"
+    xml = (issued.folder / "A1_1.xml").read_bytes()
+    signatures: list[Callable[[SigningKey], int]] = [
+        lambda k: path.write_bytes(sign_pdf(document, k)),
+        lambda k: path.with_name("A1_1.xml.sig").write_bytes(sign_xml(xml, k)),
+    ]
+    for begins, ends, good in ((-1, 30, True), (-90, -60, False)):
+        builder = x509.CertificateBuilder().subject_name(name).issuer_name(own.subject).public_key(key.public_key())
+        builder = (
+            builder.serial_number(5)
+            .not_valid_before(now + timedelta(days=begins))
+            .not_valid_after(now + timedelta(days=ends))
+        )
+        leaf = builder.sign(root, hashes.SHA256())
+        for sign in signatures:
+            sign(SigningKey(key, leaf, ()))
+        for file in (path, path.with_name("A1_1.xml.sig")):
+            for authority_pem, vouches in ((own, True), (authority("Example Authority")[1], False)):
+                trust.write_bytes(authority_pem.public_bytes(Encoding.PEM))
+                assert checked(file, "--trust", trust)["accepted"] is (good and vouches), (file.name, begins, vouches)
+
+
+def test_wrong_use_is_told(issued: Issued, tmp_path: Path) -> None:
+    (tmp_path / "none.pem").write_text("nothing", encoding="utf-8")
+    pdf = str(issued.folder / "A1_1.pdf")
+    for words, why in (
+        ([pdf, "latest"], "give files or runs, not both"),
+        ([str(tmp_path / "missing.pdf")], "is not there"),
+        ([pdf, "--trust", str(tmp_path / "none.pem")], "holds no certificate that can be read"),
+        (["latest", "--trust", str(issued.trust)], "no file of a certificate is given"),
+    ):
+        problem = CliRunner().invoke(app, ["verify", *words]).exception
+        assert isinstance(problem, WrongUse)
+        assert why in str(problem)
