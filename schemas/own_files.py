@@ -2,7 +2,8 @@
 
 A name is searched in the folder of its kind in the working folder (``recipes/NAME.toml``), and then in that of the user
 (``$XDG_CONFIG_HOME/tumbleline/recipes/NAME.toml``; XDG Base Directory Specification 0.8, by default ``~/.config``). A file with
-the name of a built-in one is refused, because the name would have different contents for different users.
+the name of a built-in one is refused, because the name would have different contents for different users. Where both folders have
+the name with different contents, a message names the file that is used and the other one, in workers too.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from schemas.errors import RecipeInvalid
 from schemas.foreign import is_file
+from schemas.log_lines import tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -24,6 +26,7 @@ SUFFIX = ".toml"
 
 _listeners: list[Callable[[str], None]] = []
 _reported: set[Path] = set()
+_told: set[tuple[Path, Path]] = set()
 
 
 def folders(kind: Kind) -> list[Path]:
@@ -59,11 +62,13 @@ def own_file(kind: Kind, name: str, built_in: Iterable[str] = ()) -> Path | None
     """
     if not name or Path(name).name != name or name.startswith("."):
         return None
-    path = next((path for folder in folders(kind) if is_file(path := folder / f"{name}{SUFFIX}")), None)
-    if path is None:
+    there = [path for folder in folders(kind) if is_file(path := folder / f"{name}{SUFFIX}")]
+    if not there:
         return None
+    path = there[0]
     refuse_built_in_name(kind, name, path, built_in)
     _report(kind, name, path)
+    _report_others(kind, name, there)
     return path
 
 
@@ -95,6 +100,15 @@ def report_to(listener: Callable[[str], None]) -> None:
     """Call ``listener``, and no earlier one, with one line for each file of the user that is used, at its first use."""
     _listeners[:] = [listener]
     _reported.clear()
+
+
+def _report_others(kind: Kind, name: str, there: list[Path]) -> None:
+    """Tell about a file of the same name and other content that is not used; each once in a process."""
+    used = there[0].resolve()
+    for other in there[1:]:
+        if (used, other) not in _told and other.read_bytes() != used.read_bytes():
+            _told.add((used, other))
+            tell(f"{kind}: '{name}' is {used}; {other} has other content and is not used", level="warning")
 
 
 def _report(kind: Kind, name: str, path: Path) -> None:

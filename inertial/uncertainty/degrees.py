@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_HALF_UP, Decimal
 
 import numpy as np
-from scipy import stats
+from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
 
 PROBABILITY = 0.9545
 """Of k = 2 for a normal distribution."""
 _LARGEST = 1e9
+FloatArray = NDArray[np.float64]
 
 
 def welch_satterthwaite(u: Sequence[float], dof: Sequence[float]) -> float:
@@ -18,11 +20,26 @@ def welch_satterthwaite(u: Sequence[float], dof: Sequence[float]) -> float:
     return float(np.sum(parts**2) ** 2 / below) if below > 0.0 else float("inf")
 
 
+def effective_degrees(u: FloatArray, dof: FloatArray) -> FloatArray:
+    """:func:`welch_satterthwaite` of every row: u and dof (n, c), result (n,)."""
+    parts = np.ascontiguousarray(u, dtype=float)
+    below = np.sum(np.ascontiguousarray(parts**4 / np.asarray(dof, dtype=float)), axis=1)
+    whole = np.sum(np.ascontiguousarray(parts**2), axis=1) ** 2
+    return np.divide(whole, below, out=np.full_like(below, np.inf), where=below > 0.0)
+
+
+def coverage_factors(dof: FloatArray, probability: float = PROBABILITY) -> FloatArray:
+    """:func:`coverage_factor` of every element."""
+    finite = dof < _LARGEST
+    whole = np.maximum(np.where(finite, dof, 1.0).astype(np.int64), 1)
+    return np.where(finite, stdtrit(whole, 0.5 * (1.0 + probability)), ndtri(0.5 * (1.0 + probability)))
+
+
 def coverage_factor(dof: float, probability: float = PROBABILITY) -> float:
     """K of Student's distribution for ν_eff truncated to a whole number (JCGM 100, G.4.1, table G.2); 2 for 95.45 % and ν = ∞."""
     if not dof < _LARGEST:
-        return float(stats.norm.ppf(0.5 * (1.0 + probability)))
-    return float(stats.t.ppf(0.5 * (1.0 + probability), max(int(dof), 1)))
+        return float(ndtri(0.5 * (1.0 + probability)))
+    return float(stdtrit(max(int(dof), 1), 0.5 * (1.0 + probability)))
 
 
 def from_reliability(relative: float) -> float:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
 from pipelines.archive.keys import digest
+from pipelines.archive.packed_path import with_packs
 from pipelines.archive.provenance import provenance
 from pipelines.archive.records import Records
 from pipelines.archive.run import START, Run
@@ -35,14 +36,14 @@ PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")  # a name that cannot lead els
 
 def default_root() -> Place:
     """The default place of the archive: the environment's TUMBLELINE_ARCHIVE, else ./archive."""
-    return place_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive")
+    return with_packs(place_of(os.environ.get("TUMBLELINE_ARCHIVE") or "archive"))
 
 
 class Archive:
     """A folder of captures and runs, on a disk or in an object store."""
 
     def __init__(self, root: Place | str | None = None) -> None:
-        self.root: Place = place_of(root) if root is not None else default_root()
+        self.root: Place = with_packs(place_of(root)) if root is not None else default_root()
 
     @property
     def address(self) -> str:

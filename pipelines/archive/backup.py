@@ -3,18 +3,21 @@
 Files of an archive are written once, so a repeated copy adds only new files. The chain is read first and copied last: every file
 that an entry of the copy names was copied before it. Files that the chain does not name yet (a lot that is being measured) are
 copied in their present state and completed by the next copy. Derived files (``index/``) are left out; they are made again.
+What is packed is copied as single files; the copy may be compacted by itself.
 
-A file of the copy that is as the chain or its manifest states is never replaced by one that differs: the one in the archive is
-damaged.
+A file of the copy is never replaced by a damaged one. Files are written once, so one that differs from its copy is copied only
+where the chain or its manifest states that it is sound; a capture's samples and records are stated by their record and by the
+record after it. Only what an archive makes again in its place (reports, seals, checkpoints) is replaced, where it can be read.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from pipelines.archive import files
+from pipelines.archive import files, packs
 from pipelines.archive.files import TEMPORARY
 from schemas.errors import ArchiveUnusable, WrongUse
 
@@ -26,8 +29,9 @@ if TYPE_CHECKING:
 
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record
-REPLACED = "/report.json"  # the one manifest that is made anew in its place
+REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/]+/state/.*|.*/lock|orchestrator/.*")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
+PAGE = ".html"
 
 
 @dataclass
@@ -88,23 +92,46 @@ def _sealed(root: Place, entries: set[str]) -> dict[str, str]:
 
 def _as_stated(root: Place, name: str, sealed: Mapping[str, str]) -> bool | None:
     """Whether a file is as the chain states, or a table as its manifest states; None where neither states its hash."""
-    if name.endswith(REPLACED):
-        return None
-    expected = sealed.get(name, "")
-    if not expected and name.endswith(WRITTEN_ONCE):
-        try:
-            manifest = files.read_json(root / f"{name.removesuffix(WRITTEN_ONCE)}.json")
-        except ArchiveUnusable:  # not written yet
-            return None
-        expected = str(manifest.get("sha256", ""))
+    expected = sealed.get(name, "") or _stated(root, name)
     return files.sha256(root / name) == expected if expected else None
+
+
+def _stated(root: Place, name: str) -> str:
+    """Hash of a file as the manifest beside it states it; empty where none does."""
+    folder, _, own = name.rpartition("/")
+    record = name.startswith("captures/") and own.endswith(WRITTEN_ONCE)
+    if not record and not own.endswith((WRITTEN_ONCE, PAGE)):
+        return ""
+    try:
+        manifest = files.read_json(root / folder / ("record.json" if record else f"{own.rpartition('.')[0]}.json"))
+    except ArchiveUnusable:  # not written yet, or damaged itself
+        return ""
+    stated = manifest.get("content", {}).get(own, "") if record else manifest.get("sha256", "")
+    return str(stated)
+
+
+def _is_damaged(source: Place, target: Place, name: str, sealed: Mapping[str, str]) -> bool:
+    """Whether a file of the source that differs from its copy must not replace it."""
+    sound = _as_stated(source, name, sealed)
+    if REMADE.fullmatch(name):
+        return name.endswith(".json") and not _is_readable(source / name)
+    if sound is not None:
+        return not sound and _as_stated(target, name, sealed) is not False
+    return _as_stated(target, name, sealed) is not False
+
+
+def _is_readable(place: Place) -> bool:
+    try:
+        return bool(files.read_json(place))
+    except ArchiveUnusable:
+        return False
 
 
 def _names(folder: Place, prefix: str) -> set[str]:
     """Names, below the root, of the files of a folder that are copied."""
     found: set[str] = set()
     for path, name in _walk(folder, prefix):
-        if PurePosixPath(name).parts[0] != INDEX:
+        if PurePosixPath(name).parts[0] not in {INDEX, packs.FOLDER}:
             found.add(name)
         del path
     return found
@@ -135,7 +162,7 @@ def _copy(source: Place, target: Place, name: str, sealed: Mapping[str, str], co
         if place.is_file() and _same(there, place, name):
             copied.present += 1
             return True
-        if place.is_file() and _as_stated(source, name, sealed) is False and _as_stated(target, name, sealed):
+        if place.is_file() and _is_damaged(source, target, name, sealed):
             return False
         data = there.read_bytes()
     except FileNotFoundError:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.archive import files, hash_chain
+from pipelines.archive import files, hash_chain, packs
 from pipelines.archive.locks import CLAIM, LEASE_S, alone
 from pipelines.archive.provenance import provenance
 from pipelines.archive.run import Run
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pipelines.archive.archive import Archive
     from pipelines.archive.store import Place
 
-FOLDERS = ("runs", "captures", "calibrations", hash_chain.FOLDER, "index")
+FOLDERS = ("runs", "captures", "calibrations", hash_chain.FOLDER, "index", packs.FOLDER)
 AT_ONCE = 1000  # calibrations named by one entry of the chain
 
 

@@ -147,6 +147,8 @@ def publish_first(path: Place, data: bytes) -> bool:
                 return False
             path.write_bytes(data)
             return True
+        if path.is_file():  # also one that is packed
+            return False
         with _aside(path.parent) as aside:
             _write_durably(aside, data)
             try:

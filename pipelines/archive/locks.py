@@ -16,7 +16,7 @@ import threading
 import time
 import uuid
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from pipelines.archive import files
 from pipelines.archive.store import ObjectPath
@@ -31,6 +31,7 @@ LEASE_S = 120.0
 RENEWAL_S = 30.0
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0
 CLAIM = "claim-"
+LOCK = "lock"
 
 
 @contextmanager
@@ -45,15 +46,33 @@ def alone(folder: Place, *, wait: bool = False) -> Generator[None, None, None]:
 
 @contextmanager
 def _locked(folder: Place, *, wait: bool) -> Generator[None, None, None]:
+    while True:
+        with _lock_file(folder) as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            except BlockingIOError:
+                raise OperatorNeeded(_busy(folder)) from None
+            if not _is_at(lock, str(folder / LOCK)):  # removed meanwhile with its folder, whose files were packed
+                continue
+            yield
+            return
+
+
+def _lock_file(folder: Place) -> TextIO:
+    """The open lock file of a folder; both are made where they do not exist."""
     with files.writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = open(str(folder / "lock"), "w", encoding="utf-8")  # noqa: PTH123, SIM115 - held for the block below
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError:
-            raise OperatorNeeded(_busy(folder)) from None
-        yield
+        while True:
+            folder.mkdir(parents=True, exist_ok=True)
+            with suppress(FileNotFoundError):  # the folder was removed meanwhile
+                return open(str(folder / LOCK), "w", encoding="utf-8")  # noqa: PTH123 - the caller closes it
+
+
+def _is_at(file: TextIO, name: str) -> bool:
+    """Whether an open file is still the one of this name."""
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), os.stat(name))  # noqa: PTH116 - as it was opened
+    except FileNotFoundError:
+        return False
 
 
 @contextmanager

@@ -5,14 +5,17 @@ A query engine with these data sets needs no access to files, so that it can be 
 
 from __future__ import annotations
 
+import mmap
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 
+from pipelines.archive.packed_path import member_of
 from pipelines.archive.store import first_line
 from schemas.errors import ArchiveUnusable
 
@@ -39,8 +42,8 @@ def of_index(names: Sequence[str], schema: pa.Schema) -> ds.Dataset:
     )
 
 
-def of_runs(names: Sequence[str]) -> ds.Dataset:
-    """Files ``…/<run>/<table>.parquet`` of a local archive as one table with the column ``run`` in front.
+def of_runs(places: Sequence[Path]) -> ds.Dataset:
+    """Files ``…/<run>/<table>.parquet`` of a local archive, packed or not, as one table with the column ``run`` in front.
 
     A column that some runs do not have is null there.
 
@@ -52,19 +55,20 @@ def of_runs(names: Sequence[str]) -> ds.Dataset:
     from pyarrow.fs import LocalFileSystem
 
     with ThreadPoolExecutor(READERS) as pool:
-        file_schemas = list(pool.map(_schema, names))
+        file_schemas = list(pool.map(_schema, places))
     try:
         columns = pa.unify_schemas(file_schemas, promote_options="permissive").remove_metadata()
     except (pa.ArrowInvalid, pa.ArrowTypeError) as problem:
         raise ArchiveUnusable(
-            f"query: tables {Path(names[0]).name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
+            f"query: tables {places[0].name} of the runs do not fit together ({first_line(problem)}); see 'tumbleline "
             "verify'"
         ) from None
     form, system = ds.ParquetFileFormat(), LocalFileSystem()
-    parts = [
-        form.make_fragment(name, system, partition_expression=ds.field("run") == Path(name).parent.name)
-        for name in names
-    ]
+    parts: list[Any] = []
+    for place in places:
+        run, source = ds.field("run") == place.parent.name, _source(place)
+        own = None if isinstance(source, pa.BufferReader) else system
+        parts.append(form.make_fragment(source, own, partition_expression=run))
     schema = pa.schema([("run", pa.string()), *(field for field in columns if field.name != "run")])
     return ds.FileSystemDataset(parts, schema=schema, format=form, filesystem=system)
 
@@ -78,11 +82,27 @@ def gathered(places: Iterable[Place]) -> pa.Table:
     return pa.concat_tables(parts, promote_options="default") if parts else pa.table({"run": pa.array([], pa.string())})
 
 
-def _schema(name: str) -> pa.Schema:
+def _source(place: Path) -> pa.BufferReader | str:
+    """Where the bytes of a file are: its own path, or its part of a pack, which is read when it is needed."""
+    member = member_of(place)
+    if member is None:
+        return str(place)
+    whole = _mapped(str(member.pack))
+    return pa.BufferReader(pa.py_buffer(memoryview(whole)[member.offset : member.offset + member.size]))
+
+
+@lru_cache(maxsize=512)
+def _mapped(pack: str) -> mmap.mmap:
+    """A pack in the address space, which is never changed; the file may be closed."""
+    with Path(pack).open("rb") as file:
+        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+
+
+def _schema(place: Path) -> pa.Schema:
     try:
-        return pq.read_schema(name).remove_metadata()
+        return pq.read_schema(_source(place)).remove_metadata()
     except (OSError, pa.ArrowInvalid) as problem:
         raise ArchiveUnusable(
-            f"query: {name} is not a complete Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
+            f"query: {place} is not a complete Parquet file ({first_line(problem)}); restore it from a copy, see 'tumbleline "
             "verify'"
         ) from None

@@ -25,10 +25,10 @@ from weakref import finalize
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipelines.archive import derived, files
+from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
-from pipelines.archive.store import ObjectPath, address_of, first_line, place_of
-from pipelines.audit.run_files import read_runs, stamps_of
+from pipelines.archive.store import ObjectPath, address_of, first_line
+from pipelines.audit.run_files import in_order_of_disk, read_runs, stamps_of
 from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
 from pipelines.parallel import map_partitions
 from schemas.errors import ArchiveUnusable
@@ -36,7 +36,6 @@ from schemas.errors import ArchiveUnusable
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from pipelines.archive import Archive
     from pipelines.archive.store import Place
     from pipelines.parallel import Distributor
 
@@ -143,14 +142,14 @@ def up_to_date(archive: Archive, distribute: Distributor | None = None, workers:
 def _refreshed(archive: Archive, place: Place, distribute: Distributor | None, workers: int) -> AuditIndex:
     stamps, version = stamps_of(archive.root), version_of_rows()
     parts = _believed(part_folders(place), version)
-    _remove(place, [part for part, runs in parts.items() if not runs])  # a new part may have its name
+    remove_parts(place, [part for part, runs in parts.items() if not runs])  # a new part may have its name
     good = {part: runs for part, runs in parts.items() if runs and runs.items() <= stamps.items()}
     good = _without_doubles(good)
     small = [part for part, runs in good.items() if len(runs) < RUNS_PER_PART // 2]
     if len(small) > MOST_SMALL:
         good = {part: runs for part, runs in good.items() if part not in small}
     there = {run for runs in good.values() for run in runs}
-    missing = sorted(stamps.keys() - there)
+    missing = in_order_of_disk(archive.root, list(stamps.keys() - there))
     chunks = [missing[k : k + RUNS_PER_PART] for k in range(0, len(missing), RUNS_PER_PART)]
     root = address_of(archive.root)
     own = "" if place == archive.root / FOLDER else str(place)
@@ -158,13 +157,13 @@ def _refreshed(archive: Archive, place: Place, distribute: Distributor | None, w
     new = [
         place / name for name in map_partitions(make_part, portions, distribute, workers=workers, name="audit index")
     ]
-    _remove(place, set(parts) - set(good) - set(new))
+    remove_parts(place, set(parts) - set(good) - set(new))
     return AuditIndex(tuple(sorted([*good, *new], key=str)), len(missing), len(there))
 
 
 def make_part(portion: Portion) -> str:
     """Make and publish a part of the index from the files of its runs; return its name."""
-    root = place_of(portion.archive)
+    root = Archive(portion.archive).root
     runs, place = root / "runs", Path(portion.place) if portion.place else root / FOLDER
     found = rows_of_runs(read_runs(runs, portion.runs))
     # ``runs`` last: it shows that all others exist
@@ -250,7 +249,7 @@ def _opened(file: Place) -> pa.BufferReader | str:
     return pa.BufferReader(file.read_bytes()) if isinstance(file, ObjectPath) else str(file)
 
 
-def _remove(place: Place, parts: Collection[Place]) -> None:
+def remove_parts(place: Place, parts: Collection[Place]) -> None:
     """Remove obsolete parts, unless another process may still read them; then a later update removes them."""
     if isinstance(place, ObjectPath):
         for part in parts:

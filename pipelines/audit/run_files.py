@@ -8,15 +8,19 @@ from __future__ import annotations
 import hashlib
 import os
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from pipelines.archive.packed_path import PackedPath
+from pipelines.archive.packs import read_together
 from pipelines.archive.store import ObjectPath
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from pipelines.archive.packs import PackedFolder
     from pipelines.archive.store import Place
 
 START = "run.json"
@@ -57,18 +61,44 @@ def stamps_of(root: Place) -> dict[str, str]:
         return _stamps_of_objects(runs)
     if not runs.is_dir():
         return {}
-    names = sorted(os.listdir(runs))  # noqa: PTH208 - ten thousand names, not paths
+    packed = _packed_marks(root)
+    names = sorted({*os.listdir(runs), *packed})  # noqa: PTH208 - ten thousand names, not paths
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
     out: dict[str, str] = {}
     with ThreadPoolExecutor(READERS) as pool:
-        for found in pool.map(lambda group: _stamps(str(runs), group), groups):
+        for found in pool.map(lambda group: _stamps(str(runs), group, packed), groups):
             out |= found
     return out
 
 
+def in_order_of_disk(root: Place, runs: Sequence[str]) -> list[str]:
+    """Runs in the order in which their files lie: those of the packs by pack, then the others by name."""
+    place: dict[str, int] = {}
+    for contents in root.known.contents("runs") if isinstance(root, PackedPath) else ():
+        for folder in contents.names():
+            place[folder.partition("/")[2]] = len(place)
+    return sorted(runs, key=lambda run: (place.get(run, len(place)), run))
+
+
+def stamps_among(root: Path, names: Sequence[str]) -> dict[str, str]:
+    """Stamps of some runs of a local archive."""
+    folders = {run: root.known.folder(f"runs/{run}") for run in names} if isinstance(root, PackedPath) else {}
+    return _stamps(str(root / "runs"), names, {run: _marks(found) for run, found in folders.items() if found})
+
+
 def _read(path: Place, stamp: str) -> RunFiles:
     content: dict[str, bytes] = {}
+    single = None
+    if isinstance(path, PackedPath) and (found := path.known.folder(f"runs/{path.name}")) is not None:
+        single = set(_names(str(path)))
+        packed = {name: found.files[name] for name in WATCHED if name in found.files and name not in single}
+        try:
+            content = read_together(packed)
+        except OSError as trouble:
+            return RunFiles(path.name, stamp, content, str(trouble).splitlines()[0])
     for name in WATCHED:
+        if name in content or (single is not None and name not in single):
+            continue
         try:
             content[name] = _bytes(path, name)
         except FileNotFoundError:
@@ -80,18 +110,43 @@ def _read(path: Place, stamp: str) -> RunFiles:
 
 def _bytes(path: Place, name: str) -> bytes:
     if isinstance(path, Path):
-        with open(f"{path}/{name}", "rb", buffering=0) as file:  # noqa: PTH123 - a hundred thousand of these
+        with suppress(FileNotFoundError), open(f"{path}/{name}", "rb", buffering=0) as file:  # noqa: PTH123 - many
             return file.readall()
     return (path / name).read_bytes()
 
 
-def _stamps(runs: str, names: Iterable[str]) -> dict[str, str]:
+def _stamps(runs: str, names: Iterable[str], packed: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
     out: dict[str, str] = {}
     for run in names:
-        marks = [_mark(f"{runs}/{run}/{name}") for name in WATCHED]
+        also = packed.get(run, {})
+        single = _names(f"{runs}/{run}") if also else WATCHED  # a packed run has few or none
+        marks = [(_mark(f"{runs}/{run}/{name}") if name in single else "") or also.get(name, "") for name in WATCHED]
         if marks[0]:  # a run without run.json has not started
             out[run] = _short(marks)
     return out
+
+
+def _packed_marks(root: Place) -> dict[str, dict[str, str]]:
+    """Sizes and times of the packed files of runs, as they were before they were packed."""
+    out: dict[str, dict[str, str]] = {}
+    for contents in root.known.contents("runs") if isinstance(root, PackedPath) else ():
+        for folder, found in contents.folders():
+            kind, _, run = folder.partition("/")
+            if kind == "runs":
+                out.setdefault(run, {}).update(_marks(found))
+    return out
+
+
+def _marks(found: PackedFolder) -> dict[str, str]:
+    there = {name: found.files[name] for name in WATCHED if name in found.files}
+    return {name: f"{one.size}.{one.mtime_ns}" for name, one in there.items()}
+
+
+def _names(folder: str) -> list[str]:
+    try:
+        return os.listdir(folder)  # noqa: PTH208 - names are enough
+    except (FileNotFoundError, NotADirectoryError):
+        return []
 
 
 def _mark(path: str) -> str:

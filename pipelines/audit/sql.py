@@ -155,10 +155,10 @@ def _of_runs(archive: Archive, name: str) -> Any:
     runs = archive.root / "runs"
     if not isinstance(runs, Path):
         return datasets.gathered(runs.glob(f"*/{name}.parquet"))
-    names = sorted(str(place) for place in runs.glob(f"*/{name}.parquet"))
-    if not names:
+    places = sorted(runs.glob(f"*/{name}.parquet"))
+    if not places:
         raise WrongUse(f"query: no run in {archive.root} has a table '{name}', one is needed; query another view")
-    return datasets.of_runs(names)
+    return datasets.of_runs(places)
 
 
 LEDGER: Mapping[str, Callable[[Calibration], str]] = {  # columns of the view, with the keys of a calibration's document

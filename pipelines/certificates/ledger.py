@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from pipelines.archive import Archive, files, hash_chain
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
-from pipelines.archive.store import ObjectPath, place_of
+from pipelines.archive.store import ObjectPath
 from pipelines.certificates.days import LAST, today
 from pipelines.certificates.entries import LedgerEntry, event_of, folder_of
 from pipelines.certificates.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
@@ -41,7 +41,7 @@ class Ledger:
     """
 
     def __init__(self, archive: Archive | Place | str) -> None:
-        self.root = archive.root if isinstance(archive, Archive) else place_of(archive)
+        self.root = (archive if isinstance(archive, Archive) else Archive(archive)).root
 
     def events(self, serial: str) -> list[LedgerEntry]:
         """The events of a unit's calibrations, in order; empty for an unknown unit."""

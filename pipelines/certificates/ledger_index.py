@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pipelines.archive import derived, files
+from pipelines.archive.packed_path import PackedPath
 from pipelines.archive.store import ObjectPath, first_line
 from pipelines.certificates.entries import FOLDER, LedgerEntry, event_of, folder_of
 from schemas.errors import ArchiveUnusable
@@ -127,8 +128,11 @@ def _read(top: Place, name: str) -> LedgerEntry | str:
         if isinstance(top, ObjectPath):
             data = (top / name).read_bytes()
         else:
-            with open(f"{top}/{name}", "rb", buffering=0) as file:  # noqa: PTH123 - a hundred thousand of these
-                data = file.readall()
+            try:
+                with open(f"{top}/{name}", "rb", buffering=0) as file:  # noqa: PTH123 - a hundred thousand of these
+                    data = file.readall()
+            except FileNotFoundError:  # packed
+                data = (top / name).read_bytes()
         return event_of(files.parsed(data, top / name), f"{top}/{name}")
     except ArchiveUnusable as problem:
         return str(problem).partition(": ")[2]
@@ -202,7 +206,17 @@ def stamps_of(top: Place) -> dict[str, dict[str, str]]:
     with ThreadPoolExecutor(READERS) as pool:
         for name, found in zip(shards, pool.map(lambda shard: _of_shard(top, shard), shards), strict=True):
             out.setdefault(name[0], {}).update(found)
+    for name, stamp in _packed(top):
+        out.setdefault(name[0], {}).setdefault(name, stamp)
     return out
+
+
+def _packed(top: Path) -> Iterable[tuple[str, str]]:
+    """Places of the packed events, with their sizes and times before they were packed."""
+    for folder, found in top.known.folders(FOLDER).items() if isinstance(top, PackedPath) else ():
+        start = folder.removeprefix(f"{FOLDER}/")
+        for name, one in found.files.items():
+            yield f"{start}/{name}", f"{one.size}.{one.mtime_ns}"
 
 
 def _of_shard(top: Path, shard: str) -> dict[str, str]:

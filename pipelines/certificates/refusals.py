@@ -9,7 +9,6 @@ from pipelines.archive import Run
 from pipelines.certificates.days import months_after, today
 from pipelines.certificates.measured import measured_on
 from schemas.errors import WrongUse
-from schemas.limits import MOST_MONTHS, VALIDITY_MONTHS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,6 +49,11 @@ def refuse_period(run: Run, first: str, last: str) -> None:
 
 def allowed_months(run: Run) -> int:
     """Longest that a certificate of a run may hold, months: by its limits, else by policy."""
+    from schemas.limits import (
+        MOST_MONTHS,
+        VALIDITY_MONTHS,
+    )  # slow to import, and who only reads the ledger does without
+
     stated = (run.about.get("limits") or {}).get("validity_months")
     allowed = stated if type(stated) is int and 1 <= stated <= MOST_MONTHS else VALIDITY_MONTHS
     figures = ((run.about.get("recipe") or {}).get("certificate") or {}).get("validity_months")

@@ -1,4 +1,4 @@
-"""``tumbleline archive``: the signing key, the temporary files of killed writers, backup and restore."""
+"""``tumbleline archive``: the signing key, the temporary files of killed writers, compaction, backup and restore."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from schemas.counts import number_of
 
 PART = "Certificates, trace, audit"
 ORDER = 460
-SUMMARY = "Maintain the archive: signing key, leftovers of interrupted commands, backup, restore."
+SUMMARY = "Maintain the archive: signing key, leftovers, compaction, backup, restore."
 EXAMPLES = (
-    "tumbleline archive clean --dry-run",
+    "tumbleline archive compact --before 2026-05-01",
     "tumbleline archive backup /mnt/copy --database /mnt/copies",
 )
 
@@ -134,6 +134,49 @@ def backup(
     out.print(counted, markup=False, soft_wrap=True)
     if made is not None:
         out.print(f"database  {made}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def compact(
+    archive: ArchiveOption = None,
+    before: Annotated[
+        str, typer.Option("--before", metavar="DATE", help="Only runs that began before this day; default: all.")
+    ] = "",
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Put the files of finished runs, their captures and the calibrations into a few large files, one for each month.
+
+    Refused while a run is being written. Nothing changes for any other command: hashes, chain and signatures are those of the
+    single files, which 'unzip' of the files in packed/ restores. Reports stay single files.
+    """
+    from datetime import date
+
+    from pipelines.archive import Archive
+    from pipelines.archive.compaction import compact as compacted
+    from pipelines.audit.index import up_to_date
+    from schemas.errors import WrongUse
+
+    try:
+        day = date.fromisoformat(before).isoformat() if before else ""
+    except ValueError:
+        raise WrongUse(f"archive compact: --before {before!r} is no date, one such as 2026-05-01 is needed") from None
+    store = Archive(archive)
+    store.refuse_none()
+    done = compacted(store, day)
+    up_to_date(store)
+    if as_json:
+        print_json({"archive": str(store.root), **asdict(done)})
+        return
+    out = console()
+    for name in done.packs:
+        out.print(f"written  packed/{name}", markup=False, soft_wrap=True)
+    for name in done.kept:
+        out.print(f"kept     {name}: changed, or in use; the next compaction packs it", markup=False, soft_wrap=True)
+    for name in done.unfinished:
+        out.print(f"open     {name}: not finished, left as it is", markup=False, soft_wrap=True)
+    packed = f"{number_of(done.packed, 'file')} packed ({number_of(done.bytes, 'byte')})"
+    out.print(f"{packed}, {number_of(done.freed, 'single file')} removed", markup=False, soft_wrap=True)
 
 
 @app.command()

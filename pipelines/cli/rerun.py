@@ -77,9 +77,11 @@ def command(
     if check:
         _check(store, runs, change, (dask, count), as_json=as_json)
         return
+    from pipelines.audit.index_growth import add_runs
     from pipelines.rerun.partition import run_again
 
     outcomes: list[RerunOutcome] = _mapped(run_again, store, runs, (change, dask, count), report=report)
+    add_runs(store, [one.new for one in outcomes if one.new])
     document = {"archive": str(store.root), "runs": [asdict(one) for one in outcomes], **_counts(outcomes)}
     if as_json:
         print_json(document)

@@ -110,6 +110,7 @@ def command(
 
 def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks: bool) -> Run:
     """The run of one filling of the fixture."""
+    from pipelines.audit.index_growth import add_runs
     from pipelines.chain.attendance import JUDGED, Attendance
     from pipelines.chain.runner import Runner
     from pipelines.cli.terminal import Terminal
@@ -128,6 +129,7 @@ def _measured(request: Request, job: Job, store: Archive, *, direct: bool, asks:
             report_stage(done)
             if beside is not None and done.stage == JUDGED:
                 beside.unload(runner.run)
+        add_runs(store, [runner.run.id])
         return runner.run
 
 

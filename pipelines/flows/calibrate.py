@@ -17,6 +17,7 @@ from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
 from prefect.runtime import flow_run
 from prefect.states import Cancelled
 
+from pipelines.audit.index_growth import add_runs
 from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
@@ -114,6 +115,7 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
         report_stage(stage(name, runner))
         if beside is not None and name == JUDGED:
             beside.unload(runner.run)
+    add_runs(store, [runner.run.id])
     return runner.run.id
 
 

@@ -13,16 +13,24 @@ import subprocess
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from types import FrameType
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 STOPS = (signal.SIGTERM, signal.SIGINT)
 
 
-def run_until_orphans_end(command: Sequence[str]) -> int:
+def run_until_orphans_end(
+    command: Sequence[str], begun: Callable[[subprocess.Popen[bytes]], None] = lambda _child: None
+) -> int:
     """Run a command, wait for it and its orphans, and return its exit status.
 
+    Parameters
+    ----------
+    begun : called with the child; only this function waits for it.
+
+    Notes
+    -----
     A SIGTERM to this process is passed to the command, not to its orphans. The exit status of a child that a
     signal ended is 128 plus the signal's number, as in shells.
     """
@@ -39,6 +47,7 @@ def run_until_orphans_end(command: Sequence[str]) -> int:
     for number in STOPS:
         signal.signal(number, pass_on)
     child = subprocess.Popen(command, start_new_session=True)  # noqa: S603 - this process passes Ctrl-C on once
+    begun(child)
     if stopped:
         child.terminate()
     status = 0

@@ -99,9 +99,22 @@ def _cancel_missed(client: SyncPrefectClient, pool: str, queue: str, now: dateti
         policy = policy_of_tags(runs[-1].tags)
         for run in runs[:-1] if policy.missed == "latest" else runs:
             message = MISSED.format(when=_text(_start(run)), limit=policy.latest_start_min, missed=policy.missed)
-            client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
-            texts.append(f"run {run.name} is cancelled: {message}")
+            texts += _cancelled(client, run, message)
     return texts
+
+
+def _cancelled(client: SyncPrefectClient, run: FlowRun, message: str) -> list[str]:
+    """Cancel a run that has not been taken; the sentence about it, none where a worker was faster.
+
+    The state is read again immediately before, and is not forced: a run that a worker takes in between is refused its start
+    by the server, which does not let a cancelled run begin.
+    """
+    if client.read_flow_run(run.id).state_type != StateType.SCHEDULED:
+        return []
+    client.set_flow_run_state(run.id, Cancelled(message=message))
+    if client.read_flow_run(run.id).state_type != StateType.CANCELLED:
+        return []
+    return [f"run {run.name} is cancelled: {message}"]
 
 
 def _skip_where_busy(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
@@ -115,8 +128,7 @@ def _skip_where_busy(client: SyncPrefectClient, pool: str, queue: str, now: date
     texts: list[str] = []
     for run in due:
         message = SKIPPED.format(when=_text(_start(run)), other=working[0].name)
-        client.set_flow_run_state(run.id, Cancelled(message=message), force=True)
-        texts.append(f"run {run.name} is cancelled: {message}")
+        texts += _cancelled(client, run, message)
     return texts
 
 

@@ -4,8 +4,9 @@
     python -m pipelines.flows.worker stop --station line-1 --wait 60
 
 ``start`` allows one worker at a time for a station on this computer, closes runs that died with the previous worker, and applies
-the policies of the deployments (:mod:`pipelines.flows.queue_rules`) now and while it runs. It ends when the worker has ended and
-the processes that a killed flow left (the watchdog of the station) have ended.
+the policies of the deployments (:mod:`pipelines.flows.queue_rules`) now and while it runs. It ends a worker that hangs
+(:mod:`pipelines.flows.worker_health`), and ends itself when the worker has ended and the processes that it left (a run in
+progress, the watchdog of the station) have ended.
 ``stop`` pauses the station's queue and waits for the run in progress; the next ``start`` resumes the queue.
 """
 
@@ -18,18 +19,20 @@ import platform
 import re
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from pipelines.flows.child_reaper import run_until_orphans_end
 from pipelines.flows.server_check import POLL_S, check_server
 from pipelines.flows.settings import CLIENT_KEY, JSON_FORMAT, STARTUP_S, use_key
+from pipelines.flows.worker_health import heartbeat_of, period_s, watched
 from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
 from stations.safety.folder import state_folder
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Generator, Sequence
     from pathlib import Path
 
@@ -87,8 +90,10 @@ def start(
             command += ["--work-queue", queue]
         command += ["--run-once"] if once else []
         command += ["--with-healthcheck"] if healthcheck else []
-        with applied(pool, (station, *queues)):
-            return run_until_orphans_end(command)
+        child: list[subprocess.Popen[bytes]] = []
+        health = watched(lambda: heartbeat_of(pool, name), lambda: child[0] if child else None, period_s())
+        with applied(pool, (station, *queues)), nullcontext() if once else health:
+            return run_until_orphans_end(command, child.append)
 
 
 def stop(pool: str, station: str, wait_s: float) -> list[str]:

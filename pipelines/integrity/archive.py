@@ -17,6 +17,7 @@ from pipelines.integrity.captures import check_capture, check_strangers
 from pipelines.integrity.causes import by_cause
 from pipelines.integrity.chain import check_chain
 from pipelines.integrity.findings import MISSING, SIGNATURE, IntegrityFinding, VerifiedPart
+from pipelines.integrity.packs import check_packs
 from pipelines.integrity.runs import check_run
 from pipelines.integrity.seals import check_seals
 from pipelines.integrity.surroundings import SHOWN, check_links, check_mark, check_surroundings
@@ -119,6 +120,7 @@ def verify(
     check_seals(archive.root, chosen, chain, total, everything=not runs)
     check_mark(archive, total)
     if not runs:
+        check_packs(archive, total)
         _check_owners(chosen, captures, total)
         check_surroundings(archive, total)
         check_list(archive, total)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
 from pipelines.archive.names import NameLeadsOut
+from pipelines.archive.packed_path import member_of
 from pipelines.archive.signatures import BAD, UNKNOWN, UNSIGNED, check
 from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
@@ -151,12 +152,13 @@ def _read(place: Place) -> tuple[str, int | None, int]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    data = place.read_bytes() if isinstance(place, ObjectPath) else b""
-    actual = files.hash_of(data) if isinstance(place, ObjectPath) else files.sha256(place)
-    size = len(data) if isinstance(place, ObjectPath) else place.stat().st_size
+    inside = isinstance(place, ObjectPath) or member_of(place) is not None  # of a store or of a pack
+    data = place.read_bytes() if inside else b""
+    actual = files.hash_of(data) if inside else files.sha256(place)
+    size = len(data) if inside else place.stat().st_size
     if place.suffix != ".parquet":
         return actual, None, size
-    source = pa.BufferReader(data) if isinstance(place, ObjectPath) else str(place)
+    source = pa.BufferReader(data) if inside else str(place)
     try:
         return actual, pq.read_metadata(source).num_rows, size
     except (pa.ArrowInvalid, OSError):  # the hash shows it

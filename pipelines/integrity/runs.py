@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files, parquet, stage_key
 from pipelines.archive.listing import SEALED
+from pipelines.archive.packed_path import member_of
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import START
 from pipelines.archive.store import ObjectPath
@@ -128,7 +129,8 @@ def table_mark(place: Place) -> str:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    source = pa.BufferReader(place.read_bytes()) if isinstance(place, ObjectPath) else str(place)
+    inside = isinstance(place, ObjectPath) or member_of(place) is not None
+    source = pa.BufferReader(place.read_bytes()) if inside else str(place)
     try:
         metadata = pq.read_metadata(source).metadata or {}
     except (pa.ArrowInvalid, OSError):

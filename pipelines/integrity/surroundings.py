@@ -23,6 +23,7 @@ OURS = re.compile(
     r"|runs/[^/]+/(lock|report\.html|[^/.]+\.json)"
     r"|programming/(lock|station/[0-9a-f]+\.bin|[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json)"
     r"|calibrations/lock|calibrations/[0-9a-f]{2}/[0-9a-f]{16}/\d+\.json|chain/\d+/\d+\.json"
+    r"|packed/(lock|\d{6}-[0-9a-z-]+\.(zip|toc))"
     r"|(releases|whatif)/(lock|[0-9a-f-]+\.json)"
 )
 KEY_MARK, KEY_BYTES = b"PRIVATE KEY-----", 16_384

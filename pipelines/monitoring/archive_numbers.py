@@ -8,17 +8,19 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from pipelines.archive import files
 from pipelines.archive.run_files import SEALED
 from pipelines.capture.interruptions import interruptions
 from pipelines.certificates.days import today
 from pipelines.certificates.ledger import Ledger
-from schemas.errors import TumblelineError
+from schemas.errors import ArchiveUnusable, TumblelineError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from pipelines.archive import Archive
     from pipelines.archive.listing import RunInfo
+    from pipelines.archive.store import Place
 
 DUE_DAYS = (0, 30)
 """Periods, days: a certificate is due where it ends within the period."""
@@ -56,7 +58,7 @@ class LineNumbers:
 class ArchiveNumbers:
     """Numbers of an archive.
 
-    lag_s : age of the oldest finished run that is not in the chain yet, s; 0 without one
+    lag_s : time since the end of the oldest finished run that is not in the chain yet, s; 0 without one
     free_bytes : free space on its disk; None for an object store
     due : number of units whose certificate ends within a period, by the period in days
     """
@@ -132,7 +134,7 @@ class ArchiveReader:
                 self._sealed.add(info.id)
                 continue
             numbers.unsealed += 1
-            numbers.lag_s = max(numbers.lag_s, (at - datetime.fromisoformat(info.started)).total_seconds())
+            numbers.lag_s = max(numbers.lag_s, (at - _finished(path, info)).total_seconds())
 
     def _due(self, numbers: ArchiveNumbers) -> None:
         days = {within: _day_after(within) for within in DUE_DAYS}
@@ -144,6 +146,14 @@ class ArchiveReader:
         for until in last.values():
             for within, day in days.items():
                 numbers.due[within] += until <= day
+
+
+def _finished(path: Place, info: RunInfo) -> datetime:
+    """When the report of a run, its last file before the seal, was written; its start where that cannot be read."""
+    try:
+        return datetime.fromisoformat(str(files.read_json(path / "report.json")["when"]))
+    except (ArchiveUnusable, KeyError, ValueError):
+        return datetime.fromisoformat(info.started)
 
 
 def _day_after(days: int) -> str:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
-from inertial.uncertainty.degrees import coverage_factor, welch_satterthwaite
+from inertial.uncertainty.degrees import coverage_factors, effective_degrees
 from pipelines.tables.frames import empty_table, picked
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -70,6 +71,22 @@ def empty() -> dict[str, pd.DataFrame]:
     }
 
 
+@dataclass(frozen=True)
+class _Contributions:
+    """The contributions to one quantity of every unit, (units, c) where not said otherwise.
+
+    names : c of them; u : standard uncertainties; about : columns of the table that are the same for every unit, c values each
+    stated, dof, sensitivity : of each unit
+    """
+
+    names: list[str]
+    u: Array
+    about: dict[str, list[Any]]
+    stated: Array
+    dof: Array
+    sensitivity: Array
+
+
 def rows_of_quantities(
     units: Sequence[str],
     quantities: Sequence[BudgetQuantity],
@@ -77,115 +94,172 @@ def rows_of_quantities(
     terms: BudgetTerms,
     known: Mapping[str, UncertaintySource],
 ) -> dict[str, pd.DataFrame]:
-    """Tables ``budget`` and ``uncertainties``."""
+    """Tables ``budget`` and ``uncertainties``, unit by unit; every quantity is computed for all units at once."""
     names = np.array(found.fit.source.contributions, dtype=object)
     groups = list(dict.fromkeys(names.tolist()))
     places = {group: np.flatnonzero(names == group) for group in groups}
-    rows: list[dict[str, Any]] = []
-    sums: list[dict[str, Any]] = []
-    for number, unit in enumerate(units):
-        for one in quantities:
-            parts = _parts(one, number, groups, places)
-            head = {"unit": unit, "quantity": one.name, "axis": one.axis, "unit_text": one.unit}
-            square = sum(u**2 for u in parts.values())
-            own: list[dict[str, Any]] = [
-                {
-                    **head,
-                    **_about(name, u, one, number, found, places, known, terms),
-                    "share": u**2 / square if square > 0.0 else 0.0,
-                }
-                for name, u in parts.items()
-            ]
-            rows += own
-            sums.append(_sum(unit, one, number, own, terms))
-    return {"budget": pd.DataFrame(rows), "uncertainties": pd.DataFrame(sums)}
+    parts = [_contributions(one, groups, places, found, known, terms) for one in quantities]
+    return {
+        "budget": _budget_rows(units, quantities, parts),
+        "uncertainties": _sum_rows(units, quantities, parts, terms),
+    }
 
 
-def _parts(
-    one: BudgetQuantity, unit: int, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]]
-) -> dict[str, float]:
-    """Standard uncertainty of every contribution."""
+def _contributions(
+    one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]], found: VarianceParts,
+    known: Mapping[str, UncertaintySource],
+    terms: BudgetTerms,
+) -> _Contributions:  # fmt: skip
+    own = _parts(one, groups, places)
+    u = np.ascontiguousarray(np.stack(list(own.values()), axis=1))
+    stated, dof, sensitivity = u.copy(), np.full(u.shape, np.inf), np.full(u.shape, np.nan)
+    about: dict[str, list[Any]] = {name: [] for name in SAME}
+    for column, name in enumerate(own):
+        if name == NOISE or name in BEYOND:
+            row = _beyond(name, terms)
+            if name in {NOISE, "run"}:
+                dof[:, column] = one.dof_noise
+        else:
+            row = _referred(known[name], found.visible[places[name]])
+            stated[:, column], dof[:, column] = known[name].stated.stated, float(known[name].entry.dof or np.inf)
+            single = known[name].stated.stated / known[name].stated.divisor if known[name].stated.unit else float("nan")
+            if single > 0.0:
+                sensitivity[:, column] = u[:, column] / single
+        for key in SAME:
+            about[key].append(row[key])
+    return _Contributions(list(own), u, about, stated, dof, sensitivity)
+
+
+def _parts(one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
+    """Standard uncertainty of every contribution, (units,) each."""
     if one.extra:
-        return {name: float(values[unit]) for name, values in one.extra.items()}
-    out = {NOISE: float(one.noise[unit])}
+        return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}
+    out = {NOISE: np.asarray(one.noise, dtype=float)}
     for group in groups:
-        out[group] = float(np.sqrt(np.sum(one.parts[unit, places[group]] ** 2)))
+        out[group] = np.sqrt(np.sum(np.ascontiguousarray(one.parts[:, places[group]]) ** 2, axis=1))
     return out
 
 
-def _about(
-    name: str, u: float, one: BudgetQuantity, unit: int, found: VarianceParts, places: Mapping[str, NDArray[np.intp]],
-    known: Mapping[str, UncertaintySource], terms: BudgetTerms,
-) -> dict[str, Any]:  # fmt: skip
-    """The source of a contribution."""
-    plain = {"contribution": name, "u": u, "visible": float("nan"), "sensitivity": float("nan")}
-    if name == NOISE or name in BEYOND:
-        dof = float(one.dof_noise[unit]) if name in {NOISE, "run"} else float("inf")
-        kind = "A" if name in {NOISE, "run", "flicker"} else "B"
-        where = (
-            "the dwells of the run"
-            if kind == "A"
-            else f"[stability], {terms.stability.source}"
-            if terms.stability
-            else ""
-        )
-        scope = "unit"
-        return {**plain, "type": kind, "distribution": "normal", "scope": scope, "input_unit": "", "divisor": 1.0, "stated": u,
-                "dof": dof, "source": where if name != "budget" else "[uncertainty]"}  # fmt: skip
-    source = known[name]
+SAME = ("visible", "type", "distribution", "scope", "input_unit", "divisor", "source")
+
+
+def _beyond(name: str, terms: BudgetTerms) -> dict[str, Any]:
+    """The source of the noise, or of a contribution beyond the run; its stated value is its uncertainty."""
+    kind = "A" if name in {NOISE, "run", "flicker"} else "B"
+    stability = f"[stability], {terms.stability.source}" if terms.stability else ""
+    source = "the dwells of the run" if kind == "A" else stability
+    return {"visible": float("nan"), "type": kind, "distribution": "normal", "scope": "unit", "input_unit": "", "divisor": 1.0,
+            "source": source if name != "budget" else "[uncertainty]"}  # fmt: skip
+
+
+def _referred(source: UncertaintySource, shares: Array) -> dict[str, Any]:
+    """The source of a contribution that station or recipe state."""
     entry, stated = source.entry, source.stated
-    single = stated.stated / stated.divisor if stated.unit else float("nan")
-    shares = found.visible[places[name]]
     return {
-        **plain,
+        "visible": float(np.sqrt(np.mean(shares**2))) if shares.size else float("nan"),
         "type": "B",
         "distribution": stated.distribution,
         "scope": entry.scope,
         "input_unit": stated.unit,
         "divisor": stated.divisor,
-        "stated": stated.stated,
-        "dof": float(entry.dof or np.inf),
-        "sensitivity": u / single if single > 0.0 else float("nan"),
-        "visible": float(np.sqrt(np.mean(shares**2))) if shares.size else float("nan"),
         "source": f"reference {entry.reference}" if entry.reference else entry.origin,
     }
 
 
-def _sum(
-    unit: str, one: BudgetQuantity, number: int, own: Sequence[dict[str, Any]], terms: BudgetTerms
-) -> dict[str, Any]:
-    """The quantity with its combined and expanded uncertainty."""
-    if (
-        one.extra
-    ):  # the quantity is an expected RMS: its contributions make its value, its uncertainty is that of the RMS
-        a, b = float(one.noise[number]), 0.0
-        dof = float(one.dof_noise[number])
-    else:
-        a = float(one.noise[number])
-        b = float(np.sqrt(sum(row["u"] ** 2 for row in own if row["type"] == "B")))
-        dof = welch_satterthwaite([row["u"] for row in own], [row["dof"] for row in own])
-    u = float(np.hypot(a, b))
-    k = coverage_factor(dof)
-    largest = sorted(own, key=lambda row: -row["u"])[:3]
-    return {
-        "unit": unit,
-        "quantity": one.name,
-        "axis": one.axis,
-        "unit_text": one.unit,
-        "value": float(one.value[number]),
-        "u_a": a,
-        "u_b": b,
-        "u": u,
-        "dof": dof,
-        "k": k,
-        "expanded": k * u,
-        "shown": float("nan") if one.shown is None else float(one.shown[number]),
-        "unseen": float("nan") if one.unseen is None else float(one.unseen[number]),
-        "largest": ", ".join(
-            f"{LABELS[r['contribution']]} {100.0 * r['share']:.0f} %" for r in largest if r["share"] > 0.0
-        ),
-        "frame": terms.certificate.frame,
-    }
+def _share(u: Array) -> Array:
+    """Share of each contribution in the sum of the squares, (units, c); zero where all are."""
+    square = _summed(u**2)
+    return np.divide(u**2, square[:, None], out=np.zeros_like(u), where=square[:, None] > 0.0)
+
+
+def _summed(values: Array) -> Array:
+    """Sums over the columns, one after the other: their order decides the last digit."""
+    total = np.zeros(len(values))
+    for column in values.T:
+        total = total + column
+    return total
+
+
+def _budget_rows(
+    units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions]
+) -> pd.DataFrame:
+    many = len(units)
+    counts = [len(own.names) for own in parts]
+
+    def each(of: Callable[[BudgetQuantity], str]) -> list[str]:
+        """A text of the quantities in every row of theirs."""
+        return [text for one, count in zip(quantities, counts, strict=True) for text in [of(one)] * count] * many
+
+    def same(of: Callable[[_Contributions], list[Any]]) -> list[Any]:
+        return [value for own in parts for value in of(own)] * many
+
+    def together(of: Callable[[_Contributions], Array]) -> Array:
+        return np.concatenate([of(own) for own in parts], axis=1).ravel() if parts else np.empty(0)
+
+    return pd.DataFrame(
+        {
+            "unit": [unit for unit in units for _ in range(sum(counts))],
+            "quantity": each(lambda one: one.name),
+            "axis": each(lambda one: one.axis),
+            "unit_text": each(lambda one: one.unit),
+            "contribution": same(lambda own: own.names),
+            "u": together(lambda own: own.u),
+            "visible": same(lambda own: own.about["visible"]),
+            "sensitivity": together(lambda own: own.sensitivity),
+            **{name: same(lambda own, name=name: own.about[name]) for name in SAME[1:-2]},
+            "divisor": same(lambda own: own.about["divisor"]),
+            "stated": together(lambda own: own.stated),
+            "dof": together(lambda own: own.dof),
+            "source": same(lambda own: own.about["source"]),
+            "share": together(lambda own: _share(own.u)),
+        }
+    )
+
+
+def _sum_rows(
+    units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions], terms: BudgetTerms
+) -> pd.DataFrame:
+    """Every quantity with its combined and expanded uncertainty."""
+    columns: dict[str, list[Array]] = {name: [] for name in SUM_NUMBERS.split()}
+    largest: list[list[str]] = []
+    for one, own in zip(quantities, parts, strict=True):
+        a = np.asarray(one.noise, dtype=float)
+        if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
+            b, dof = np.zeros_like(a), np.asarray(one.dof_noise, dtype=float)
+        else:
+            stated = [k for k, kind in enumerate(own.about["type"]) if kind == "B"]
+            b, dof = np.sqrt(_summed(own.u[:, stated] ** 2)), effective_degrees(own.u, own.dof)
+        u, k = np.hypot(a, b), coverage_factors(dof)
+        none = np.full_like(a, np.nan)
+        row = {"value": one.value, "u_a": a, "u_b": b, "u": u, "dof": dof, "k": k, "expanded": k * u,
+               "shown": none if one.shown is None else one.shown,
+               "unseen": none if one.unseen is None else one.unseen}  # fmt: skip
+        for name, values in row.items():
+            columns[name].append(np.asarray(values, dtype=float))
+        largest.append(_largest(own))
+    many, count = len(units), len(quantities)
+    texts = {"quantity": [one.name for one in quantities] * many, "axis": [one.axis for one in quantities] * many,
+             "unit_text": [one.unit for one in quantities] * many}  # fmt: skip
+    numbers = {name: np.stack(values, axis=1).ravel() if values else np.empty(0) for name, values in columns.items()}
+    return pd.DataFrame(
+        {
+            "unit": [unit for unit in units for _ in range(count)],
+            **texts,
+            **numbers,
+            "largest": [own[unit] for unit in range(many) for own in largest],
+            "frame": [terms.certificate.frame] * (many * count),
+        }
+    )
+
+
+def _largest(own: _Contributions) -> list[str]:
+    """The three largest contributions of every unit with their shares, as text."""
+    order, share = np.argsort(-own.u, axis=1, kind="stable")[:, :3], _share(own.u)
+    labels = [LABELS[name] for name in own.names]
+    return [
+        ", ".join(f"{labels[c]} {100.0 * share[unit, c]:.0f} %" for c in chosen if share[unit, c] > 0.0)
+        for unit, chosen in enumerate(order.tolist())
+    ]
 
 
 def covariance_rows(units: Sequence[str], covariance: Array) -> pd.DataFrame:

@@ -230,6 +230,35 @@ def test_a_damaged_file_of_the_archive_does_not_replace_the_sound_one_of_the_cop
     assert copy_archive(archive, copy).files == 0
 
 
+@pytest.mark.parametrize("name", ["samples.parquet", "record.json", "complete.json"])
+def test_damaged_samples_and_records_of_a_capture_do_not_replace_the_sound_ones(
+    made: Path, tmp_path: Path, name: str
+) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    copy_archive(archive, copy)
+    damaged = min((tmp_path / "line" / "archive" / "captures").rglob(name))
+    sound = damaged.read_bytes()
+    for wrong in (sound[:-1], b"", sound[:10] + b"\x00" * 20 + sound[10:]):
+        damaged.write_bytes(wrong)
+        with pytest.raises(ArchiveUnusable, match=rf"1 files of .* damaged .*{name}"):
+            copy_archive(archive, copy)
+        there = tmp_path / "copy" / damaged.relative_to(tmp_path / "line" / "archive")
+        assert there.read_bytes() == sound
+    damaged.write_bytes(sound)
+    assert copy_archive(archive, copy).files == 0
+
+
+def test_a_damaged_file_of_the_copy_is_mended_from_the_sound_one(made: Path, tmp_path: Path) -> None:
+    archive, copy = Archive(made / "archive"), Archive(tmp_path / "copy")
+    copy_archive(archive, copy)
+    samples = min((tmp_path / "copy" / "captures").rglob("samples.parquet"))
+    sound = samples.read_bytes()
+    samples.write_bytes(sound[:-1])
+    assert copy_archive(archive, copy).files == 1
+    assert samples.read_bytes() == sound
+
+
 def test_a_database_that_a_server_has_open_is_not_replaced(tmp_path: Path) -> None:
     live, copy = tmp_path / "prefect.db", tmp_path / "one.db"
     database(live, 5)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
 import pytest
 import yaml
 from capture_double import recipe_file
@@ -156,3 +157,28 @@ def second_worker(line: Orchestrator) -> tuple[int, str]:
     command = [sys.executable, "-m", "pipelines.flows.worker", "start", "--station", "line-1", "--once"]
     done = subprocess.run(command, cwd=ROOT, env=line.environment, capture_output=True, text=True, check=False)
     return done.returncode, done.stderr
+
+
+def test_a_worker_that_hangs_is_ended_and_its_service_can_start_it_again(line: Orchestrator, tmp_path: Path) -> None:
+    """The worker of Prefect is stopped as it lives: its heartbeats end, and the server goes on to answer."""
+    python(line.environment, "-m", "pipelines.flows.deploy", deployments(tmp_path))
+    beating = Orchestrator(
+        line.home, line.port, line.key, {**line.environment, "PREFECT_WORKER_HEARTBEAT_SECONDS": "2"}
+    )
+    with worker(beating, tmp_path) as process:
+        first = line.until(lambda: heartbeat(line), "a heartbeat", 120.0)
+        line.until(lambda: heartbeat(line) != first, "a second one", 60.0)
+        [child] = [one for one in psutil.Process(process.pid).children() if "worker" in one.cmdline()]
+        child.suspend()
+        assert process.wait(90) == 128 + signal.SIGKILL
+    assert "it hangs and is ended" in (tmp_path / "worker.log").read_text()
+    with worker(beating, tmp_path) as process:
+        before = heartbeat(line)
+        line.until(lambda: heartbeat(line) != before, "heartbeats again", 120.0)
+        assert process.poll() is None
+
+
+def heartbeat(line: Orchestrator) -> str:
+    """Time of the last heartbeat of the pool's worker as the server has it; empty without one."""
+    _, workers = line.ask("/api/work_pools/line/workers/filter", {})
+    return str(workers[0]["last_heartbeat_time"]) if workers else ""

@@ -1,6 +1,7 @@
-"""Shifts of orders at three stations with random faults: workers, server and disk fail, and nothing is lost, twice or unsafe.
+"""Shifts of orders at three stations with random faults (worker, server, disk, clock): nothing is lost, twice or unsafe.
 
-The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (3): some ten minutes on two free cores; 90 is a month of one shift a day.
+The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (4): some ten minutes on two free cores; 90 is a month of one shift a day.
+Clocks are those of the workers' processes, by libfaketime where it is installed; the clock of this computer is left alone.
 """
 
 import os
@@ -13,7 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ from pipelines.integrity.archive import verify
 from stations.opening import open_devices
 from stations.safety.folder import read_log
 
-SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "3"))
+SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "4"))
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200 + 600 * SHIFTS)]
 
 STATIONS = ("line-1", "line-2", "line-3")
@@ -51,6 +52,10 @@ QUICK = (
 SAFE_S = 90.0
 SHIFT_S = 900.0
 FULL_S = 5.0
+OUTAGE_S = 75.0  # longer than Prefect's worker tolerates: it ends, or hangs and is ended
+OFF_S = 3600.0  # by how much a clock is wrong
+WRONG_S = 25.0
+FAKETIME = Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
 GROWTH_MB = 150.0
 GROWTH_FILES = 30
 
@@ -122,9 +127,12 @@ class Soak:
             "worker": self.worker_dies,
             "server": self.server_dies,
         }
+        if FAKETIME.is_file():
+            self.faults["clock"] = self.clock_jumps
         if disk:
             self.faults["disk"] = self.disk_fills
         self.happened: Counter[str] = Counter()
+        self.again = 0
 
     def set_up(self) -> None:
         shutil.copy(ROOT / "deploy" / "recipes" / "line-quick.limits.toml", self.folder)
@@ -147,8 +155,26 @@ class Soak:
 
     def start_worker(self, name: str) -> None:
         own = ExitStack()
-        process = own.enter_context(worker(self.line, self.folder / name, name, f"host-of-{name}"))
+        line = replace(self.line, environment={**self.line.environment, **self.clock(name)})
+        process = own.enter_context(worker(line, self.folder / name, name, f"host-of-{name}"))
         self.workers[name] = (own, process)
+
+    def clock(self, name: str, wrong_s: float = 0.0) -> dict[str, str]:
+        """Set the clock of a worker's processes; their environment."""
+        if not FAKETIME.is_file():
+            return {}
+        place = self.folder / f"{name}.clock"
+        place.write_text(f"{wrong_s:+.0f}", encoding="ascii")
+        return {"LD_PRELOAD": str(FAKETIME), "FAKETIME_TIMESTAMP_FILE": str(place), "FAKETIME_NO_CACHE": "1",
+                "FAKETIME_DONT_FAKE_MONOTONIC": "1"}  # fmt: skip
+
+    def clock_jumps(self, chance: random.Random) -> None:
+        """The clock of a station is an hour wrong while it measures, then right again."""
+        name = chance.choice(STATIONS)
+        self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
+        self.clock(name, chance.choice((-OFF_S, OFF_S)))
+        time.sleep(WRONG_S)
+        self.clock(name)
 
     def worker_dies(self, chance: random.Random) -> None:
         """The service of a worker is killed, with its flow; its station is safe before the service comes back."""
@@ -162,9 +188,9 @@ class Soak:
         self.start_worker(name)
 
     def server_dies(self, chance: random.Random) -> None:
-        """The server is killed and comes back after some seconds."""
+        """The server is killed and comes back after some seconds or a minute."""
         self.server.kill()
-        time.sleep(chance.uniform(0.0, 5.0))
+        time.sleep(OUTAGE_S if not self.happened["server"] else chance.uniform(0.0, OUTAGE_S))
         self.server.start()
 
     def disk_fills(self, chance: random.Random) -> None:
@@ -206,6 +232,7 @@ class Soak:
                 if process.poll() is not None:  # the service manager starts it again
                     own.close()
                     self.start_worker(name)
+                    self.again += 1
                 if not self.under_way(name, number):
                     self.order(name, number)  # it failed (a full disk): a person orders the same again
             time.sleep(2.0)
@@ -269,6 +296,7 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
             assert memory[-1] - memory[0] < GROWTH_MB, f"{name}: {memory} MB"
             assert files[-1] - files[0] < GROWTH_FILES, f"{name}: {files} open files"
         assert soak.happened.total() == SHIFTS
+        print(dict(soak.happened), f"workers started again: {soak.again}", sizes)  # noqa: T201 - the figures of the soak
 
 
 def free_port() -> int:

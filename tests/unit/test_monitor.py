@@ -19,7 +19,7 @@ from capture_double import small_run
 from prometheus_client.parser import text_string_to_metric_families
 from root_process import ROOT
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, files
 from pipelines.monitoring import snapshot as snapshots
 from pipelines.monitoring.alerts import Poster, alerts_of
 from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader, LineNumbers
@@ -126,6 +126,9 @@ def test_the_numbers_of_an_archive_are_those_of_its_tables(tmp_path: Path) -> No
     again = ArchiveReader(Archive(tmp_path / "archive"), 30).read(datetime.now(UTC) + timedelta(hours=2))
     assert again.unsealed == 1
     assert again.lag_s == pytest.approx(7200.0, abs=600.0)
+    end = datetime.fromisoformat(files.read_json(made.path / "report.json")["when"])
+    measured = ArchiveReader(Archive(tmp_path / "archive"), 30).read(end + timedelta(seconds=7.0))
+    assert measured.lag_s == pytest.approx(7.0), "the lag begins with the end of the run"
     later = ArchiveReader(Archive(tmp_path / "archive"), 30).read(datetime.now(UTC) + timedelta(days=31))
     assert later.lines == {}, "outside of the window"
 

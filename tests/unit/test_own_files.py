@@ -43,6 +43,19 @@ def test_a_recipe_is_found_in_the_working_folder_before_that_of_the_user(home: P
     assert "my" in recipe_names()
 
 
+def test_a_shadowed_file_of_other_content_is_told_once_and_the_same_content_is_not(
+    home: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, mine in (("other", "dwell_s = 20.0"), ("same", "dwell_s = 10.0")):
+        put(home, "recipes", name, RECIPE.replace("dwell_s = 10.0", mine))
+        put(Path(), "recipes", name, RECIPE)
+        load_recipe(name)
+        load_recipe(name)
+    said = capsys.readouterr().err
+    assert said.count("has other content and is not used") == 1
+    assert str(home / "recipes" / "other.toml") in said
+
+
 def test_limits_a_station_a_profile_and_a_preset_are_found(home: Path) -> None:
     put(home, "limits", "mine", SAMPLES.joinpath("limits-consumer.toml").read_text("utf-8"))
     assert read_limits("mine").figures

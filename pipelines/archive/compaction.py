@@ -1,0 +1,298 @@
+"""Compaction: the files of finished runs, of their captures, and of the ledger go into packs, one for a month and kind.
+
+A pack is written aside, read back and published with its table of contents last; only then the single files are removed,
+folder by folder under the folder's lock, and only those that are still as they were packed. A process that is killed at any
+time leaves every file at least once; the next compaction removes what lies twice.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import time
+import zipfile
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from pipelines.archive import derived, files, packs
+from pipelines.archive.capture_journal import is_number
+from pipelines.archive.locks import LOCK, alone
+from pipelines.archive.records import COMPLETE
+from pipelines.archive.run import START
+from pipelines.archive.run_files import SEALED
+from schemas.errors import ArchiveUnusable, OperatorNeeded, WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from pipelines.archive.archive import Archive
+
+LARGEST = 2**30  # bytes of one pack: more begins the next, so that a killed compaction has little to do again
+LEAST_AGE_S = 3600.0  # of an event of the ledger: a process that decides on the next one has read it long ago
+LEDGER = "calibrations"
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date of a zip; equal files give equal packs
+MONTH = re.compile(r"\d{4}-\d{2}")
+PAGE = "report.html"  # stays: a browser opens it
+
+
+class Found(NamedTuple):
+    """A folder to pack: its name below the root, time of its last change, and its files with size and time each."""
+
+    name: str
+    mtime_ns: int
+    files: dict[str, tuple[int, int]]
+
+
+@dataclass
+class Compacted:
+    """The result of a compaction.
+
+    packed, bytes : files that are in packs now and were not before · freed : single files that were removed
+    kept : folders with single files that changed, or that another process used, while they were packed
+    unfinished : runs that are left as they are
+    """
+
+    packs: list[str] = field(default_factory=list[str])
+    packed: int = 0
+    bytes: int = 0
+    freed: int = 0
+    kept: list[str] = field(default_factory=list[str])
+    unfinished: list[str] = field(default_factory=list[str])
+
+
+def compact(archive: Archive, before: str = "") -> Compacted:
+    """Pack what is finished in a local archive.
+
+    Parameters
+    ----------
+    before : only runs that began before this day; all where empty
+
+    Raises
+    ------
+    WrongUse
+        The archive is in an object store.
+    OperatorNeeded
+        A run is being measured, or another compaction is active.
+    """
+    if not isinstance(archive.root, Path):
+        raise WrongUse(
+            f"archive compact: {archive.root} is an object store, a local archive is needed; a store has no cost for a small "
+            "object that a pack would save"
+        )
+    root, done = Path(str(archive.root)), Compacted()
+    with _compacting(root):
+        _refuse_open(root)
+        files.sweep(root / packs.FOLDER)
+        _drop_incomplete(root)
+        known = packs.Packs(root)
+        months = _runs_by_month(archive, root, before, done)
+        for month, folders in sorted(months.items()):
+            _pack(root, month, _new(root, known, folders), done)
+        _pack(root, LEDGER, _new(root, known, _ledger(root)), done)
+        known = packs.Packs(root)
+        for name in _below(root, "runs", "captures"):  # also what a killed compaction packed and did not remove
+            _free(root, known, name, done)
+        with alone(root / LEDGER, wait=True):  # nobody certifies meanwhile
+            for name in _ledger(root):
+                _free(root, known, name, done)
+    return done
+
+
+class _compacting:  # noqa: N801 - used as a block
+    """A block in which no other process compacts."""
+
+    def __init__(self, root: Path) -> None:
+        self._lock = alone(root / packs.FOLDER)
+
+    def __enter__(self) -> None:
+        try:
+            self._lock.__enter__()
+        except OperatorNeeded:
+            raise OperatorNeeded(
+                "archive compact: another process is compacting this archive; wait for its end"
+            ) from None
+
+    def __exit__(self, *problem: object) -> None:
+        self._lock.__exit__(None, None, None)
+
+
+def _refuse_open(root: Path) -> None:
+    """Refuse while a process measures a lot or computes a run."""
+    for kind in ("captures", "runs"):
+        for lock in (root / kind).glob(f"*/{LOCK}"):
+            try:
+                with alone(lock.parent):
+                    continue
+            except OperatorNeeded:
+                raise OperatorNeeded(
+                    f"archive compact: {kind}/{lock.parent.name} is being written, an archive without open runs is needed; give "
+                    "the command again after its end (nothing was changed)"
+                ) from None
+
+
+def _drop_incomplete(root: Path) -> None:
+    """Remove the zip of a compaction that was killed before its table of contents was there."""
+    for place in (root / packs.FOLDER).glob(f"*{packs.CONTAINER}"):
+        if not place.with_suffix(packs.CONTENTS).is_file():
+            place.unlink()
+
+
+def _runs_by_month(archive: Archive, root: Path, before: str, done: Compacted) -> dict[str, list[str]]:
+    """Folders of finished runs with single files and of their captures, by the month in which the run began."""
+    out: dict[str, list[str]] = {}
+    captures: set[str] = set()
+    there = sorted(place.name for place in (root / "runs").iterdir()) if (root / "runs").is_dir() else []
+    for name in there:
+        if not (archive.root / "runs" / name / START).is_file():
+            continue
+        about = files.read_json(archive.root / "runs" / name / START)
+        began, capture = str(about.get("when", ""))[:10], str(about.get("capture") or "")
+        if before and began >= before:
+            continue
+        if not (archive.root / "runs" / name / SEALED).is_file():
+            done.unfinished.append(name)
+            continue
+        own = out.setdefault(began[:7] if MONTH.fullmatch(began[:7]) else "undated", [])
+        own.append(f"runs/{name}")
+        if capture and capture not in captures and (root / "captures" / capture / COMPLETE).is_file():
+            captures.add(capture)
+            own.append(f"captures/{capture}")
+    return out
+
+
+def _below(root: Path, *kinds: str) -> list[str]:
+    """Folders that lie by themselves, by their names below the root."""
+    tops = ((kind, root / kind) for kind in kinds)
+    return [f"{kind}/{place.name}" for kind, top in tops if top.is_dir() for place in sorted(top.iterdir())]
+
+
+def _ledger(root: Path) -> list[str]:
+    """Folders of units with calibrations that lie by themselves."""
+    top = root / LEDGER
+    return sorted(f"{LEDGER}/{shard.name}/{unit}" for shard in top.glob("??") for unit in os.listdir(shard))  # noqa: PTH208 - names
+
+
+def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Found]:
+    """The folders with files that no pack has as they are; files of killed writers, locks and young events are left out."""
+    latest = time.time_ns() - int(LEAST_AGE_S * 1e9)
+    for name in names:
+        there = known.folder(name)
+        single = dict(_single(root / name))
+        if name.startswith(f"{LEDGER}/"):
+            single = {one: at for one, at in single.items() if at[1] < latest and is_number(one.removesuffix(".json"))}
+        new = {one: at for one, at in single.items() if there is None or not _is_packed(there, one, at)}
+        if new:
+            yield Found(name, (root / name).stat().st_mtime_ns, new)
+
+
+def _is_packed(folder: packs.PackedFolder, name: str, at: tuple[int, int]) -> bool:
+    member = folder.files.get(name)
+    return member is not None and (member.size, member.mtime_ns) == at
+
+
+def _single(folder: Path, prefix: str = "") -> Iterator[tuple[str, tuple[int, int]]]:
+    """Names below a folder, with size and time of each file that the archive wrote."""
+    with os.scandir(folder) as inside:
+        for one in sorted(inside, key=lambda entry: entry.name):
+            if one.name.startswith(files.TEMPORARY) or one.is_symlink() or one.name in {LOCK, PAGE}:
+                continue
+            if one.is_dir():
+                yield from _single(Path(one.path), f"{prefix}{one.name}/")
+            else:
+                about = one.stat()
+                yield f"{prefix}{one.name}", (about.st_size, about.st_mtime_ns)
+
+
+def _pack(root: Path, what: str, found: Iterable[Found], done: Compacted) -> None:
+    """Write packs of the folders, each up to :data:`LARGEST` bytes."""
+    portion, size = list[Found](), 0
+    for one in found:
+        portion.append(one)
+        size += sum(length for length, _ in one.files.values())
+        if size >= LARGEST:
+            _write(root, what, portion, done)
+            portion, size = [], 0
+    if portion:
+        _write(root, what, portion, done)
+
+
+def _write(root: Path, what: str, portion: Sequence[Found], done: Compacted) -> None:
+    """Write and publish one pack: the zip first, its table of contents last."""
+    top = root / packs.FOLDER
+    numbers = [int(place.name[:6]) for place in top.glob(f"*{packs.CONTENTS}") if is_number(place.name[:6])]
+    name = f"{max(numbers, default=0) + 1:06d}-{what}"
+    aside, place = top / f"{files.TEMPORARY}{name}", top / f"{name}{packs.CONTAINER}"
+    with files.writing(top, "archive compact", "make room; nothing was removed"):
+        try:
+            lines, total = _filled(root, aside, portion)
+            aside.replace(place)
+        finally:
+            aside.unlink(missing_ok=True)
+    about = files.json_bytes({"zip": place.name, "sha256": total, "bytes": place.stat().st_size})
+    content = b" ".join(about.split()) + b"\n" + b"".join(lines)
+    files.publish(top / f"{name}{packs.CONTENTS}", derived.framed(content), "archive compact")
+    done.packs.append(place.name)
+    done.packed += sum(len(one.files) for one in portion)
+    done.bytes += sum(length for one in portion for length, _ in one.files.values())
+
+
+def _filled(root: Path, aside: Path, portion: Sequence[Found]) -> tuple[list[bytes], str]:
+    """The lines of the table of contents and the hash of the zip, after the zip was read back from the disk's cache."""
+    lines, hashes = list[bytes](), list[tuple[int, int, bytes]]()
+    with aside.open("xb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as container:
+        for folder in portion:
+            where: dict[str, tuple[int, int, int]] = {}
+            for name, (_, mtime_ns) in folder.files.items():
+                data = (root / folder.name / name).read_bytes()
+                container.writestr(zipfile.ZipInfo(f"{folder.name}/{name}", EPOCH), data)
+                where[name] = (stream.tell() - len(data), len(data), mtime_ns)
+                hashes.append((where[name][0], len(data), hashlib.sha256(data).digest()))
+            lines.append(packs.line_of(folder.name, folder.mtime_ns, where))
+        container.close()
+        stream.flush()
+        os.fsync(stream.fileno())
+    with aside.open("rb") as stream:
+        for offset, size, expected in hashes:
+            stream.seek(offset)
+            if hashlib.sha256(stream.read(size)).digest() != expected:
+                raise ArchiveUnusable(
+                    f"archive compact: {aside} was read differently than it was written; check the disk"
+                )
+    return lines, files.sha256(aside)
+
+
+def _free(root: Path, known: packs.Packs, name: str, done: Compacted) -> None:
+    """Remove the single files of a folder that a pack has, with the folder where nothing else is in it."""
+    folder, packed = root / name, known.folder(name)
+    if packed is None or not folder.is_dir():
+        return
+    try:
+        with nullcontext() if name.startswith(f"{LEDGER}/") else alone(folder):
+            left = _remove_packed(folder, packed.files, done)
+            if not left:
+                (folder / LOCK).unlink(missing_ok=True)
+    except OperatorNeeded:
+        left = True
+    if left and not name.startswith(f"{LEDGER}/"):  # young events stay
+        done.kept.append(name)
+    for inside in sorted(Path(folder).rglob("*"), reverse=True):
+        with suppress(OSError):
+            inside.rmdir()
+    with suppress(OSError):  # another process has begun to write there
+        folder.rmdir()
+
+
+def _remove_packed(folder: Path, packed: Mapping[str, packs.Member], done: Compacted) -> bool:
+    """Remove the files that are as a pack has them; whether another one is left."""
+    left = False
+    for name, at in list(_single(folder)):
+        member = packed.get(name)
+        if member is None or (member.size, member.mtime_ns) != at or packs.read(member) != (folder / name).read_bytes():
+            left = True
+            continue
+        (folder / name).unlink()
+        done.freed += 1
+    return left

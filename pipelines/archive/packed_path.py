@@ -1,0 +1,187 @@
+"""Paths of a local archive that also find files in packs.
+
+A file that lies by itself is used as it is; only where there is none the packs are asked. So writers and locks work as with
+:class:`pathlib.Path`, and readers do not see whether a file is packed. A pack is published before the single files are
+removed, and a file lies in both for a while: what lists a folder looks at the single files first.
+
+The functions of :mod:`os` stand here where the methods of a path would ask the packs again.
+"""
+# ruff: noqa: PTH100, PTH110, PTH112, PTH113, PTH116, PTH123, PTH208
+
+from __future__ import annotations
+
+import io
+import os
+from fnmatch import fnmatchcase
+from functools import cache
+from pathlib import Path
+from stat import S_IFDIR, S_IFREG
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pipelines.archive import packs
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from pipelines.archive.store import Place
+
+    Base = Path
+else:
+    Base = type(Path())  # before Python 3.12 only the class of the system can be derived from
+
+MARKS = "*?["
+
+
+class PackedPath(Base):
+    """A place in a local archive with packs; each archive has its own class, so that every derived path knows its packs."""
+
+    known: ClassVar[packs.Packs]
+    __slots__ = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return overlay, (str(self.known.root), str(self))
+
+    def stat(self, *, follow_symlinks: bool = True) -> os.stat_result:
+        """Size and time; those before packing of a packed file or folder."""
+        try:
+            return os.stat(self, follow_symlinks=follow_symlinks)
+        except (FileNotFoundError, NotADirectoryError):
+            found = self._packed()
+            if isinstance(found, packs.Member):
+                return _stated(S_IFREG | 0o444, found.size, found.mtime_ns)
+            if found is not None:
+                return _stated(S_IFDIR | 0o555, 0, found)
+            raise
+
+    def exists(self, *, follow_symlinks: bool = True) -> bool:
+        """Whether there is anything here, by itself or packed."""
+        alone = os.path.exists(self) if follow_symlinks else os.path.lexists(self)
+        return alone or self._packed() is not None
+
+    def is_file(self, **_: bool) -> bool:
+        """Whether a file is here, by itself or packed."""
+        return os.path.isfile(self) or (not os.path.exists(self) and isinstance(self._packed(), packs.Member))
+
+    def is_dir(self, **_: bool) -> bool:
+        """Whether a folder is here, by itself or with packed files."""
+        return os.path.isdir(self) or (not os.path.exists(self) and isinstance(self._packed(), int))
+
+    def open(self, mode: str = "r", *arguments: Any, **options: Any) -> Any:
+        """The file, for reading also from a pack."""
+        try:
+            return open(self, mode, *arguments, **options)
+        except (FileNotFoundError, NotADirectoryError):
+            found = self._packed() if mode in {"r", "rb"} else None
+            if not isinstance(found, packs.Member):
+                raise
+            data = io.BytesIO(packs.read(found))
+            return data if mode == "rb" else io.TextIOWrapper(data, options.get("encoding") or "utf-8")
+
+    def read_bytes(self) -> bytes:
+        """The whole file."""
+        with self.open("rb") as file:
+            return file.read()
+
+    def read_text(self, encoding: str | None = None, errors: str | None = None, newline: str | None = None) -> str:
+        """The whole file as text."""
+        with io.TextIOWrapper(io.BytesIO(self.read_bytes()), encoding or "utf-8", errors, newline) as file:
+            return file.read()
+
+    def iterdir(self) -> Generator[Any, None, None]:
+        """What lies directly below, by itself or packed, in no particular order."""
+        try:
+            names = set(os.listdir(self))
+        except FileNotFoundError:
+            names = self._packed_names()
+            if not names:
+                raise
+        else:
+            names |= self._packed_names()
+        yield from [self / name for name in names]
+
+    def glob(self, pattern: str, **options: Any) -> Generator[Any, None, None]:
+        """What lies below and has such a name; with packs every part of the pattern is one level."""
+        if "**" in pattern or not self.known.contents():
+            yield from super().glob(pattern, **options)
+            return
+        first, _, rest = pattern.partition("/")
+        if not any(mark in first for mark in MARKS):
+            matches = [self / first]
+        else:
+            inside = self.iterdir() if self.is_dir() else ()
+            matches = sorted(one for one in inside if fnmatchcase(one.name, first))
+        for one in matches:
+            if rest:
+                yield from one.glob(rest)
+            elif one.exists():
+                yield one
+
+    def _below_root(self) -> str:
+        """The name below the root of the archive, with slashes; empty for the root and outside."""
+        name = str(self)
+        for root in (str(self.known.root), str(self.known.top.parent)):
+            if name.startswith(f"{root}/"):
+                return name[len(root) + 1 :]
+        return name if str(self.known.root) == "." and not name.startswith("/") else ""
+
+    def _packed(self) -> packs.Member | int | None:
+        """The packed file of this name, or the time of the packed folder; None where no pack has it."""
+        name = self._below_root()
+        if not name or not self.known.contents():
+            return None
+        parts = packs.split(name)
+        if parts is None:
+            return 0 if self.known.below(name) else None
+        folder, rest = parts
+        found = self.known.folder(folder)
+        if found is None:
+            return None
+        if not rest:
+            return found.mtime_ns
+        if rest in found.files:
+            return found.files[rest]
+        return found.mtime_ns if any(one.startswith(f"{rest}/") for one in found.files) else None
+
+    def _packed_names(self) -> set[str]:
+        """Names of what is packed directly below."""
+        name = self._below_root()
+        if not name or not self.known.contents():
+            return set()
+        parts = packs.split(name)
+        if parts is None:
+            return self.known.below(name)
+        found = self.known.folder(parts[0])
+        start = f"{parts[1]}/" if parts[1] else ""
+        own = found.files if found is not None else ()
+        return {one[len(start) :].partition("/")[0] for one in own if one.startswith(start)}
+
+
+def overlay(root: str, place: str = "") -> Path:
+    """The place of an archive, by default its root, as a path that also finds what is packed there."""
+    return _class_of(root, os.path.abspath(root))(place or root)
+
+
+def with_packs(place: Place) -> Place:
+    """The root of an archive that also finds what is packed there; one in an object store has no packs."""
+    return overlay(str(place)) if isinstance(place, Path) and not isinstance(place, PackedPath) else place
+
+
+def member_of(place: object) -> packs.Member | None:
+    """The packed file of a place that has none by itself; None for any other place."""
+    if not isinstance(place, PackedPath) or os.path.exists(place):
+        return None
+    found = place._packed()  # noqa: SLF001 - the question of this module
+    return found if isinstance(found, packs.Member) else None
+
+
+@cache
+def _class_of(root: str, _absolute: str) -> type[PackedPath]:
+    return type("PackedPath", (PackedPath,), {"known": packs.Packs(Path(root)), "__slots__": ()})
+
+
+def _stated(mode: int, size: int, mtime_ns: int) -> os.stat_result:
+    seconds = mtime_ns / 1e9
+    whole = int(seconds)
+    times = {"st_atime": seconds, "st_mtime": seconds, "st_ctime": seconds}
+    named = {**times, "st_atime_ns": mtime_ns, "st_mtime_ns": mtime_ns, "st_ctime_ns": mtime_ns}
+    return os.stat_result((mode, 0, 0, 1, 0, 0, size, whole, whole, whole), named)

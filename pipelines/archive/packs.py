@@ -1,0 +1,222 @@
+"""Packs: many small files of an archive in one file each, read in place.
+
+``packed/<number>-<what>.zip`` holds files uncompressed, ``<number>-<what>.toc`` its table of contents: a line with the
+seal, a line about the zip, then a line for each folder (of a run, of a capture, of a unit's calibrations) with the place,
+size and time of every file. A pack counts when both exist, and is never changed; where two packs have the same file, that
+of the higher number counts. Any program that unpacks zip files restores the single files.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import re
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from schemas.errors import ArchiveUnusable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+FOLDER = "packed"
+CONTENTS, CONTAINER = ".toc", ".zip"
+NAME = re.compile(r"\d{6}-[0-9a-z-]+")
+FOLDERS_OF = {"runs": 2, "captures": 2, "calibrations": 3}  # parts of the name of a folder that is packed as a whole
+TICK_NS = 2_000_000_000
+LATELY = 256  # folders that are kept
+BEGINNING = re.compile(rb'\n\{"folder":("(?:[^"\\]|\\.)*")')
+
+
+class Member(NamedTuple):
+    """A file in a pack: the zip, the place of its bytes there, and the time of its last change, ns since 1970."""
+
+    pack: Path
+    offset: int
+    size: int
+    mtime_ns: int
+
+
+@dataclass(frozen=True)
+class PackedFolder:
+    """The packed files of a folder by their names below it.
+
+    mtime_ns : time of the last change of the folder before it was packed, ns since 1970
+    """
+
+    mtime_ns: int
+    files: Mapping[str, Member]
+
+
+class Contents:
+    """The table of contents of one pack, searched where it lies."""
+
+    def __init__(self, place: Path) -> None:
+        self.place, self.pack, self.identity = place, place.with_suffix(CONTAINER), identity_of(place)
+        with place.open("rb") as file:
+            self._lines = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+
+    def folder(self, name: str) -> PackedFolder | None:
+        """A folder; None where the pack does not have it."""
+        start = self._lines.find(b'\n{"folder":' + _text(name) + b",")
+        return None if start < 0 else self._at(start + 1)[1]
+
+    def folders(self) -> Iterator[tuple[str, PackedFolder]]:
+        """Every folder with its name, in the order of the pack."""
+        for found in BEGINNING.finditer(self._lines):
+            yield self._at(found.start() + 1)
+
+    def names(self) -> Iterator[str]:
+        """Names of the folders."""
+        for found in BEGINNING.finditer(self._lines):
+            yield json.loads(found.group(1))
+
+    def about(self) -> dict[str, Any]:
+        """The line about the zip: its hash and its size."""
+        start = self._lines.find(b"\n") + 1
+        return json.loads(self._lines[start : self._lines.find(b"\n", start)])
+
+    def _at(self, start: int) -> tuple[str, PackedFolder]:
+        try:
+            line = json.loads(self._lines[start : self._lines.find(b"\n", start)])
+            files = {name: Member(self.pack, *where) for name, where in line["files"].items()}
+            return line["folder"], PackedFolder(line["mtime_ns"], files)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise ArchiveUnusable(
+                f"archive: {self.place} is damaged, the table of contents of a pack is needed; restore it from a copy"
+            ) from None
+
+
+class Packs:
+    """All packs of a local archive; packs that another process makes are seen at the next question.
+
+    Parameters
+    ----------
+    root : folder of the archive
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root, self.top = root, Path(root).absolute() / FOLDER
+        self._stamp, self._known, self._lock = 0, list[Contents](), Lock()
+        self._folders: dict[str, PackedFolder | None] = {}  # asked for lately
+
+    def contents(self, kind: str = "") -> list[Contents]:
+        """The tables of contents, oldest first.
+
+        Parameters
+        ----------
+        kind : ``calibrations``, or another first part of a name: those that may have such folders; empty: all
+        """
+        try:
+            stamp = self.top.stat().st_mtime_ns
+        except OSError:
+            return []
+        if stamp != self._stamp:
+            with self._lock:
+                self._folders.clear()
+                known = {one.identity: one for one in self._known}
+                places = sorted(place for place in self.top.iterdir() if _is_contents(place))
+                self._known = [known.get(identity_of(place)) or Contents(place) for place in places]
+                # a change within the same tick of the clock leaves the time as it is
+                self._stamp = stamp if time.time_ns() - stamp > TICK_NS else 0
+        if not kind:
+            return self._known
+        ledger = kind == "calibrations"
+        return [one for one in self._known if one.place.stem.endswith("-calibrations") == ledger]
+
+    def folder(self, name: str) -> PackedFolder | None:
+        """The packed files of a folder; None where no pack has it.
+
+        Parameters
+        ----------
+        name : below the root, with slashes, such as ``runs/line-six-0123456789``
+        """
+        tables = self.contents(name.partition("/")[0])
+        if name not in self._folders:
+            found = [one for contents in tables if (one := contents.folder(name))]
+            if len(self._folders) >= LATELY:
+                self._folders.clear()
+            self._folders[name] = _together(found) if found else None
+        return self._folders.get(name)
+
+    def folders(self, kind: str) -> dict[str, PackedFolder]:
+        """All packed folders of a kind (``runs``, ``captures``, ``calibrations``), each by its name below the root."""
+        out: dict[str, PackedFolder] = {}
+        for contents in self.contents(kind):
+            for name, one in contents.folders():
+                if name.startswith(f"{kind}/"):
+                    out[name] = _together([out[name], one]) if name in out else one
+        return out
+
+    def below(self, name: str) -> set[str]:
+        """First parts of the names of what lies below a folder that is not packed as a whole, such as ``runs``."""
+        start = f"{name}/"
+        own = (one for contents in self.contents(name.partition("/")[0]) for one in contents.names())
+        return {one.removeprefix(start).partition("/")[0] for one in own if one.startswith(start)}
+
+
+def read_together(members: Mapping[str, Member]) -> dict[str, bytes]:
+    """The bytes of files of a folder, by name, in one read for each pack: a disk reads on faster than it seeks."""
+    out: dict[str, bytes] = {}
+    for pack in {one.pack for one in members.values()}:
+        own = {name: one for name, one in members.items() if one.pack == pack}
+        start = min(one.offset for one in own.values())
+        end = max(one.offset + one.size for one in own.values())
+        whole = memoryview(read(Member(pack, start, end - start, 0)))
+        out |= {name: bytes(whole[one.offset - start : one.offset - start + one.size]) for name, one in own.items()}
+    return out
+
+
+def identity_of(place: Path) -> tuple[str, int, int]:
+    """What tells a file from another one of the same name: an archive may be removed and restored."""
+    about = place.stat()
+    return place.name, about.st_ino, about.st_mtime_ns
+
+
+def read(member: Member) -> bytes:
+    """The bytes of a packed file.
+
+    Raises
+    ------
+    OSError
+        The zip is not there or ends before the file does.
+    """
+    with member.pack.open("rb", buffering=0) as file:
+        file.seek(member.offset)
+        data = file.read(member.size)
+    if len(data) != member.size:
+        raise OSError(f"{member.pack} is truncated")
+    return data
+
+
+def split(name: str) -> tuple[str, str] | None:
+    """The folder that is packed as a whole and the rest, of a name below the root; None above such folders."""
+    parts = name.split("/")
+    count = FOLDERS_OF.get(parts[0], 0)
+    return ("/".join(parts[:count]), "/".join(parts[count:])) if 0 < count <= len(parts) else None
+
+
+def line_of(folder: str, mtime_ns: int, files: Mapping[str, tuple[int, int, int]]) -> bytes:
+    """The line of a folder in a table of contents; ``files``: offset, size and time of each."""
+    listed = json.dumps({name: list(where) for name, where in files.items()}, separators=(",", ":"))
+    return b'{"folder":' + _text(folder) + f',"mtime_ns":{mtime_ns},"files":{listed}}}\n'.encode()
+
+
+def _text(name: str) -> bytes:
+    return json.dumps(name).encode()
+
+
+def _is_contents(place: Path) -> bool:
+    named = place.suffix == CONTENTS and NAME.fullmatch(place.stem) is not None
+    return named and place.with_suffix(CONTAINER).is_file() and place.stat().st_size > 0
+
+
+def _together(found: list[PackedFolder]) -> PackedFolder:
+    """A folder of several packs, the newest last."""
+    files: dict[str, Member] = {}
+    for one in found:
+        files |= one.files
+    return PackedFolder(max(one.mtime_ns for one in found), files)

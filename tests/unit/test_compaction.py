@@ -1,0 +1,212 @@
+"""Compaction: packed files read like single ones, for every reader; a killed compaction loses nothing; open runs refuse it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+
+from pipelines.archive import Archive, files, packs
+from pipelines.archive.backup import copy_archive
+from pipelines.archive.compaction import compact
+from pipelines.archive.locks import alone
+from pipelines.archive.packed_path import PackedPath
+from pipelines.audit.index import up_to_date
+from pipelines.audit.sql import ask
+from pipelines.certificates.ledger import Ledger
+from pipelines.chain.certify import certify
+from pipelines.integrity.archive import verify
+from schemas.errors import ArchiveUnusable, OperatorNeeded
+
+HOUR_S = 3600.0
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An archive with a finished run whose units are certified, all two hours old."""
+    root = tmp_path_factory.mktemp("made") / "archive"
+    run = small_run(root.parent)
+    run.seal()
+    certify(Ledger(root), run)
+    before = time.time() - 2.0 * HOUR_S
+    for place in root.rglob("*"):
+        os.utime(place, (before, before))
+    return root
+
+
+@pytest.fixture
+def archive(made: Path, tmp_path: Path) -> Archive:
+    shutil.copytree(made, tmp_path / "archive")
+    return Archive(tmp_path / "archive")
+
+
+def logical(archive: Archive) -> dict[str, bytes]:
+    """Every file of an archive as its readers see it, but for locks and what is derived."""
+
+    def below(folder: Path, name: str) -> Iterator[tuple[str, bytes]]:
+        for place in folder.iterdir():
+            here = f"{name}{place.name}"
+            if place.is_dir():
+                yield from below(place, f"{here}/")
+            elif place.name != "lock":
+                yield here, place.read_bytes()
+
+    return {k: v for k, v in below(archive.root, "") if k.partition("/")[0] not in {"index", packs.FOLDER}}
+
+
+def single(archive: Archive) -> list[Path]:
+    return [p for p in Path(str(archive.root)).rglob("*") if p.is_file() and p.name != "lock"]
+
+
+def test_every_reader_sees_the_same_files(archive: Archive) -> None:
+    before, run = logical(archive), archive.run("latest")
+    tables = {name: run.table(name) for name in run.tables()}
+    serials = [unit["serial"] for unit in run.about["lot"]["units"]]
+    listed, events = archive.runs(), [Ledger(archive).events(serial) for serial in serials]
+    count = len(single(archive))
+    done = compact(archive)
+    assert done.packed == done.freed > 100
+    assert not done.kept
+    assert len(single(archive)) < count // 10
+    again = Archive(str(archive.root))
+    assert logical(again) == before
+    assert again.runs() == listed
+    assert [Ledger(again).events(serial) for serial in serials] == events
+    assert all(events)
+    run = again.run("latest")
+    assert all(run.table(name).equals(table) for name, table in tables.items())
+    assert len(run.table("samples"))
+    report = verify(again, keys={})
+    assert report.whole, report.checked.findings
+
+
+def test_index_and_queries_are_as_before(archive: Archive) -> None:
+    question = "SELECT count(*), sum(value) FROM coefficients"
+    first = up_to_date(archive)
+    expected = ask(archive, question, compact=False).rows
+    compact(archive)
+    second = up_to_date(archive)
+    assert (second.made, second.kept) == (0, first.made)  # stamps are those of the single files
+    assert ask(archive, question, compact=False).rows == expected
+    shutil.rmtree(archive.root / "index")
+    assert up_to_date(archive).made == first.made
+    assert ask(archive, question).rows == expected
+
+
+def test_finished_command_finds_its_packed_run(archive: Archive) -> None:
+    compact(archive)
+    before = single(archive)
+    again = small_run(Path(str(archive.root)).parent)
+    assert again.id == archive.run("latest").id
+    assert {p.suffix for p in set(single(archive)) - set(before)} <= {".html", ".json"}
+
+
+def test_refused_while_a_run_is_open(archive: Archive) -> None:
+    run = archive.run("latest")
+    before = logical(archive)
+    with alone(run.path), pytest.raises(OperatorNeeded, match="without open runs is needed"):
+        compact(archive)
+    assert not (archive.root / packs.FOLDER / "000001-calibrations.zip").exists()
+    assert logical(archive) == before
+
+
+def test_unfinished_run_stays(archive: Archive) -> None:
+    run = archive.run("latest")
+    (run.path / "sealed.json").unlink()
+    done = compact(archive)
+    assert done.unfinished == [run.id]
+    assert (Path(str(run.path)) / "run.json").stat().st_size
+
+
+def test_next_event_follows_the_packed_ones(archive: Archive) -> None:
+    compact(archive)
+    serial = archive.run("latest").about["lot"]["units"][0]["serial"]
+    ledger = Ledger(archive)
+    assert [event.action for event in ledger.events(serial)] == ["certify"]
+    ledger.revoke(serial, "dropped")
+    assert [event.sequence for event in ledger.events(serial)] == [1, 2]
+    assert not compact(archive).kept
+    first = ledger.root / "calibrations"
+    place = next(one for one in first.glob("*/*/000001.json"))
+    assert not files.publish_first(place, b"another")
+    assert isinstance(place, PackedPath)
+
+
+def test_copy_of_a_compacted_archive_is_of_single_files(archive: Archive, tmp_path: Path) -> None:
+    expected = logical(archive)
+    compact(archive)
+    copy = Archive(tmp_path / "copy")
+    copy_archive(archive, copy)
+    assert logical(copy) == expected
+    assert not (copy.root / packs.FOLDER).exists()
+    compact(copy)
+    assert copy_archive(archive, copy).files == 0
+
+
+def test_unzip_restores_the_single_files(archive: Archive) -> None:
+    expected = logical(archive)
+    compact(archive)
+    for place in Path(str(archive.root / packs.FOLDER)).glob("*.zip"):
+        with zipfile.ZipFile(place) as container:
+            container.extractall(archive.root)
+    shutil.rmtree(archive.root / packs.FOLDER)
+    assert logical(Archive(str(archive.root))) == expected
+
+
+@pytest.mark.parametrize("what", ["a byte of the zip", "the zip is gone", "the table of contents"])
+def test_damage_is_found(archive: Archive, what: str) -> None:
+    compact(archive)
+    top = Path(str(archive.root / packs.FOLDER))
+    zip_, toc = next(iter(sorted(top.glob("*.zip")))), next(iter(sorted(top.glob("*.toc"))))
+    if what == "the zip is gone":
+        zip_.unlink()
+    else:
+        place = zip_ if what == "a byte of the zip" else toc
+        data = bytearray(place.read_bytes())
+        data[len(data) // 2] ^= 1
+        place.write_bytes(data)
+    try:
+        report = verify(Archive(str(archive.root)), keys={})
+    except ArchiveUnusable:
+        return
+    assert not report.whole
+    assert any(packs.FOLDER in finding.path for finding in report.checked.findings)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from pipelines.archive import Archive, compaction
+left = int(sys.argv[2])
+def counted(event, arguments):
+    global left
+    if event in {"os.rename", "os.remove", "os.rmdir", "os.truncate"} or (event == "open" and "packed" in str(arguments[0])):
+        left -= 1
+        if left < 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+sys.addaudithook(counted)
+compaction.compact(Archive(sys.argv[1]))
+"""
+
+
+def test_killed_at_any_step_leaves_every_file(made: Path, tmp_path: Path) -> None:
+    expected = logical(Archive(str(made)))
+    killed = 0
+    for step in (1, 5, 7, 20, 150):  # before a zip, before its contents, between the packs, among the removals
+        root = tmp_path / f"archive-{step}"
+        shutil.copytree(made, root)
+        ended = subprocess.run([sys.executable, "-c", KILLED, str(root), str(step)], check=False)
+        killed += ended.returncode == -signal.SIGKILL
+        assert logical(Archive(str(root))) == expected
+        compact(Archive(str(root)))
+        assert logical(Archive(str(root))) == expected
+        assert len(single(Archive(str(root)))) < len(expected) // 10
+        shutil.rmtree(root)
+    assert killed == 5
