@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from stations.plant.device import Devices, Truth, draw_truth, rotate, rotation, stream
+from stations.plant.device import PlantDevices, Truth, draw_truth, rotate, rotation, stream
 from stations.plant.hidden.table import LevelError
 from stations.plant.preset import Preset, load_preset
 
@@ -199,7 +199,7 @@ def lot_output(lot: Lot, preset: Preset, force: np.ndarray, temperature: np.ndar
     force : (n, 3), the vertical of the station in the frame of the fixture; temperature : (n, s), °C
     """
     turned = rotate(np.stack([t.slot_rotation for t in lot.truths]), force[:, None, :])
-    return Devices(preset, lot.truths).output(turned, temperature)
+    return PlantDevices(preset, lot.truths).output(turned, temperature)
 
 
 def table_force(outer_deg: np.ndarray, inner_deg: np.ndarray, up: np.ndarray) -> np.ndarray:

@@ -171,7 +171,7 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
 def one(task: tuple[str, int, int, float]) -> Outcome:
     """One inquiry in an archive of its own."""
     from pipelines.archive import Archive
-    from pipelines.inquiry.loop import Participants, Settings, run_inquiry
+    from pipelines.inquiry.loop import InquirySettings, Participants, run_inquiry
 
     name, seed, units, share = task
     scene = next(s for s in SCENES if s.name == name)
@@ -179,7 +179,7 @@ def one(task: tuple[str, int, int, float]) -> Outcome:
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         job = job_of(scene, seed, units)
-        terms = Settings(job.recipe.effects, None if share <= 0.0 else share, scene.unseen)
+        terms = InquirySettings(job.recipe.effects, None if share <= 0.0 else share, scene.unseen)
         document = run_inquiry(job, Archive(folder), terms, Participants(diagnosed=looks.append, stage=quickly))
     return outcome(scene, seed, looks, document, time.perf_counter() - begin)
 

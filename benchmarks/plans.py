@@ -35,8 +35,8 @@ from pipelines.planning.textbook import seen_by, textbook  # noqa: E402
 from pipelines.schedule.timing import spent  # noqa: E402
 from schemas.errors import TumblelineError  # noqa: E402
 from schemas.station import load_station  # noqa: E402
-from stations.plant.device import Devices, Truth, draw_truth, rotation, stream  # noqa: E402
-from stations.plant.noise import Noise  # noqa: E402
+from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream  # noqa: E402
+from stations.plant.noise import UnitNoise  # noqa: E402
 from stations.plant.preset import Preset, load_preset  # noqa: E402
 
 Array = np.ndarray
@@ -98,8 +98,8 @@ def measured(course: Course, preset: Preset, truths: list[Truth], seed: int) -> 
 
 
 def _chunk(course: Course, preset: Preset, truths: list[Truth], seed: int) -> tuple[Array, Array]:
-    devices = Devices(preset, truths)
-    noise = Noise(preset, [stream(seed, t.serial, "noise") for t in truths])
+    devices = PlantDevices(preset, truths)
+    noise = UnitNoise(preset, [stream(seed, t.serial, "noise") for t in truths])
     n, before, means, sds = round(course.rate * course.duration), 0.0, [], []
     lsb = float(np.float32(preset.lsb))
     force = force_from_angles(np.radians(course.outer), np.radians(course.inner))

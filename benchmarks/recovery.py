@@ -25,8 +25,8 @@ from inertial.fits.linear import fit_lot  # noqa: E402
 from inertial.fits.wander import fit_lot_with_wander  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from inertial.state import State  # noqa: E402
-from stations.plant.device import Devices, Truth, draw_truth, rotation, stream  # noqa: E402
-from stations.plant.noise import Noise  # noqa: E402
+from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream  # noqa: E402
+from stations.plant.noise import UnitNoise  # noqa: E402
 from stations.plant.preset import Preset, load_preset, preset_names  # noqa: E402
 
 Array = np.ndarray
@@ -94,8 +94,8 @@ def measured(preset: Preset, units: int, seed: int) -> Measured:
 
 def chunk(preset: Preset, truths: list[Truth], seed: int, dwells: tuple[Array, Array, Array]) -> tuple[Array, Array]:
     """Means and standard deviations (units, dwells, 3) of a sample, output unit, of some units."""
-    devices = Devices(preset, truths)
-    noise = Noise(preset, [stream(seed, t.serial, "noise") for t in truths])
+    devices = PlantDevices(preset, truths)
+    noise = UnitNoise(preset, [stream(seed, t.serial, "noise") for t in truths])
     n, before, means, sds = round(RATE * DWELL_S), 0.0, [], []
     lsb = float(np.float32(preset.lsb))
     for force, heat, start in zip(*dwells, strict=True):

@@ -34,11 +34,12 @@ NAMES = {str: "text", bool: "true or false", int: "integer", float: "number", An
 def documents() -> list[type]:
     """The type of every document that a command prints, in the order of the help.
 
-    A document is a TypedDict in a module ``documents`` of a package of pipelines; its docstring begins with the command.
+    A document is a TypedDict in a module ``documents`` of a package of pipelines, or in a module of such a package; its docstring
+    begins with the command.
     """
-    modules = [
-        import_module(f"pipelines.{path.parent.name}.documents") for path in ROOT.glob("pipelines/*/documents.py")
-    ]
+    places = [*ROOT.glob("pipelines/*/documents.py"), *ROOT.glob("pipelines/*/documents/*.py")]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in places]
+    modules = [import_module(name) for name in names]
     types = {
         item
         for module in modules

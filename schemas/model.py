@@ -16,7 +16,7 @@ from schemas.toml_files import explain, parse_toml, read_text
 MOST_VERSIONS = 1_000_000
 
 
-class ModelChange(Strict):
+class VersionStep(Strict):
     """One step of a model's history: the version that it led to, the effect added or removed, by whom, when, why.
 
     ``run`` is the run or file of dwells that the change was decided on.
@@ -43,7 +43,7 @@ class ModelFile(Strict):
 
     model: ModelHead
     formula: list[FormulaSpec] = Field(default_factory=list)
-    change: list[ModelChange] = Field(default_factory=list)
+    change: list[VersionStep] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _consistent(self) -> ModelFile:

@@ -161,7 +161,7 @@ class Pace(Strict):
     room_C: Celsius = 23.0
 
 
-class Link(Strict):
+class LinkSettings(Strict):
     """Patience of the links."""
 
     timeout_s: Seconds = 3.0
@@ -226,7 +226,7 @@ class StationConfig(Strict):
     limits: Limits = Limits()
     soak: Soak = Soak()
     pace: Pace = Pace()
-    link: Link = Link()
+    link: LinkSettings = LinkSettings()
     suspenders: Suspenders = Suspenders()
     safety: Safety = Safety()
     self_test: SelfTest = SelfTest()

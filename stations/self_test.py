@@ -57,7 +57,7 @@ class Standard:
 
 
 @dataclass
-class Bench:
+class SelfTestBench:
     """The self-test of one station; it collects the results, and continues with the other parts after a failure."""
 
     station: Station

@@ -44,7 +44,7 @@ class Served:
 
 
 @dataclass(frozen=True)
-class Reading:
+class RegisterReading:
     """Present value of one register; ``fault`` is the error where it cannot be read."""
 
     device: str
@@ -137,7 +137,7 @@ def _free_port_pair(host: str) -> int:
     return 0
 
 
-def look(config: StationConfig, lot: Lot | None) -> list[Reading]:
+def look(config: StationConfig, lot: Lot | None) -> list[RegisterReading]:
     """Present value of every readable register of every device, with the slots that the reader reports as occupied.
 
     ``lot`` has the units of a simulated station; hardware needs none.
@@ -157,7 +157,7 @@ def look(config: StationConfig, lot: Lot | None) -> list[Reading]:
         links.close()
 
 
-def _look(config: StationConfig, links: Links) -> Iterator[Reading]:
+def _look(config: StationConfig, links: Links) -> Iterator[RegisterReading]:
     slots: list[int] = []
     for device in served(config, []):
         for reading in _values(links, device):
@@ -169,7 +169,7 @@ def _look(config: StationConfig, links: Links) -> Iterator[Reading]:
         yield from _values(links, device)
 
 
-def _values(links: Links, device: Served) -> Iterator[Reading]:
+def _values(links: Links, device: Served) -> Iterator[RegisterReading]:
     """Values of one device; after the first request without an answer its other registers are not read."""
     profile = profile_of(getattr(links.config.devices, device.place))
     if profile.commands:
@@ -178,9 +178,11 @@ def _values(links: Links, device: Served) -> Iterator[Reading]:
             try:
                 value = commands.text(command.name)
             except StationError as problem:
-                yield Reading(device.name, device.device_id, command.name, number, "", command.unit, str(problem))
+                yield RegisterReading(
+                    device.name, device.device_id, command.name, number, "", command.unit, str(problem)
+                )
                 return
-            yield Reading(device.name, device.device_id, command.name, number, value, command.unit)
+            yield RegisterReading(device.name, device.device_id, command.name, number, value, command.unit)
         return
     registers = Registers(device.name, links.registers(device.place), device.device_id, profile)
     for register in profile.registers:
@@ -194,8 +196,8 @@ def _values(links: Links, device: Served) -> Iterator[Reading]:
         yield _reading(device, register, _shown(register, value), "")
 
 
-def _reading(device: Served, register: Register, value: str, fault: str) -> Reading:
-    return Reading(device.name, device.device_id, register.name, register.address, value, register.unit, fault)
+def _reading(device: Served, register: Register, value: str, fault: str) -> RegisterReading:
+    return RegisterReading(device.name, device.device_id, register.name, register.address, value, register.unit, fault)
 
 
 def _shown(register: Register, value: Value) -> str:

@@ -23,7 +23,7 @@ from schemas.fault import parse_fault
 from schemas.recipe import Pose, Recipe
 from schemas.station import StationConfig, load_station
 from stations.opening import make_plant, serve_plant
-from stations.plant.device import Devices
+from stations.plant.device import PlantDevices
 from stations.plant.faults.catalogue import kinds
 from stations.plant.plant import Plant
 
@@ -121,7 +121,7 @@ def far_from_the_truth(plant: Plant, sink: MemorySink, verdicts: pd.DataFrame, r
     by_serial = {truth.serial: truth for truth in (plant.truth(unit.serial) for unit in lot_of(UNITS).units)}
     for row in dwells.itertuples():
         truth = by_serial[row.unit]
-        device = Devices(plant.preset, [truth])
+        device = PlantDevices(plant.preset, [truth])
         force = (truth.slot_rotation @ np.array([row.force_x, row.force_y, row.force_z]))[None, None, :]
         true = device.output(force, np.array([[row.unit_C]]))[0, 0]
         measured = np.array([row.out_x, row.out_y, row.out_z]) / plant.preset.scale

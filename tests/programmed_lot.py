@@ -1,5 +1,6 @@
 """A run whose samples are those of the simulated station's own units, made in a second, to be written into these units."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,13 +8,15 @@ from typing import Any
 
 import numpy as np
 from capture_double import CaptureDouble, small_job
+from pydantic import TypeAdapter
 
 from pipelines.archive import Archive, Run
 from pipelines.certificates.programmed import TOP
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job
-from pipelines.programming.job import chosen_units, program_run, station_of
-from pipelines.programming.outcome import Choice, Outcome
+from pipelines.programming.documents import ProgramDocument
+from pipelines.programming.job import chosen_units, document, program_run, station_of
+from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from stations.opening import make_plant
 from stations.plant.plant import Plant
 
@@ -57,9 +60,13 @@ def keep_state(run: Run, job: Job, prepare: Callable[[Plant], None]) -> None:
     place.write_bytes(plant.journal.state(plant.now_us))
 
 
-def programmed(run: Run, serials: tuple[str, ...] = (), **choice: Any) -> tuple[dict[str, Outcome], dict[str, str]]:
+def programmed(
+    run: Run, serials: tuple[str, ...] = (), **choice: Any
+) -> tuple[dict[str, ProgrammingOutcome], dict[str, str]]:
     """The units written, by serial, and their certificates."""
     outcomes, given = program_run(run, chosen_units(run, serials), station_of(run), Choice(**choice), lambda text: None)
+    printed = json.dumps(document(run, outcomes, given))
+    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")  # as --json prints it
     return {one.serial: one for one in outcomes}, given
 
 

@@ -16,11 +16,11 @@ from inertial.criticism.comparison import rms as rms_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
 from inertial.criticism.evidence import GROSS, Evidence, evidence, not_judged
-from inertial.criticism.examination import Named, Part, Run, Search, examined, worst
+from inertial.criticism.examination import EffectSearch, ExaminedRun, LotPart, Named, examined, worst
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.heldout import fit_rms
-from inertial.criticism.influence import Carried, carried_by, influence
+from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
 from inertial.criticism.likelihood import shared_noise
 from inertial.criticism.model import Model, Term
@@ -73,7 +73,7 @@ class Diagnosis:
     ladder: tuple[Rival, ...]
     handled: tuple[Named, ...] = ()
     removed: tuple[BadDwell, ...] = ()
-    carried: Carried = field(default_factory=Carried)
+    carried: CarriedEvidence = field(default_factory=CarriedEvidence)
     unseen_in_part: tuple[tuple[str, tuple[UnseenRange, ...]], ...] = ()
     smallest: tuple[Smallest, ...] = ()
     evidence: Evidence | None = None
@@ -94,9 +94,9 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     return _concluded(run, found, rng)
 
 
-def _concluded(run: Run, search_: Search, rng: Generator) -> Diagnosis:
+def _concluded(run: ExaminedRun, search_: EffectSearch, rng: Generator) -> Diagnosis:
     """The diagnosis by the result of the search."""
-    base, fields, found = search_.base, search_.field, search_.found
+    base, fields, found = search_.base, search_.field, search_.result
     problem = base.problem
     drivers = drivers_of(problem)
     log_p = adequacy(fields, drivers, base, rng)
@@ -144,18 +144,18 @@ def _concluded(run: Run, search_: Search, rng: Generator) -> Diagnosis:
     )
 
 
-def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carried:
+def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> CarriedEvidence:
     """The largest residuals where nothing is named, and the probability of the others; not that without a generator."""
     dwells = influence(base, None)
     if rng is None or not dwells:
-        return Carried(dwells)
+        return CarriedEvidence(dwells)
     lot = base.problem.lot
     error = lot.error.copy()
     for one in dwells:
         error[one.unit, one.dwell] = np.inf
     problem = Problem(replace(lot, error=error), slope=base.problem.slope)
     model = Model(problem, base.terms, near=base.noise)
-    return Carried(dwells, adequacy(Candidates(problem, fields.effects), drivers_of(problem), model, rng))
+    return CarriedEvidence(dwells, adequacy(Candidates(problem, fields.effects), drivers_of(problem), model, rng))
 
 
 def _verdict(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
@@ -219,7 +219,7 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
     return None
 
 
-def _beyond(part: Part, base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
+def _beyond(part: LotPart, base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
     """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
     instead = better_curve(part.base, found.added, part.suspected) if found.added else None
     if instead is not None:

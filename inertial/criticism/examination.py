@@ -17,7 +17,7 @@ from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
 from inertial.criticism.handling.base import Exchangeable, Handling, Misfit
 from inertial.criticism.heldout import fit_rms
-from inertial.criticism.influence import Carried, carried_by
+from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.model import Model, Term, refuse_without_freedom
 from inertial.criticism.penalty import cost_of_model
@@ -54,7 +54,7 @@ class Named:
     units: tuple[int, ...] = ()
     dwells: tuple[int, ...] = ()
     evidence: str = ""
-    carried: Carried = field(default_factory=Carried)
+    carried: CarriedEvidence = field(default_factory=CarriedEvidence)
 
     @property
     def predicts(self) -> bool:
@@ -66,7 +66,7 @@ class Named:
 
 
 @dataclass
-class Run:
+class ExaminedRun:
     """A lot under examination: the corrections so far, and the terms that stay in the model beside the judged effects."""
 
     lot: Lot
@@ -92,13 +92,13 @@ class Run:
         return base if not self.beside else Model(problem, [*base.terms, *self.beside], near=base.noise)
 
 
-def examined(lot: Lot, effects: Sequence[str]) -> "tuple[Run, Search]":
+def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSearch]":
     """A run without bad dwells and handling errors, and the search for effects in it."""
-    run = Run(lot, tuple(effects))
+    run = ExaminedRun(lot, tuple(effects))
     run.removed = bad_dwells(run.model())
     found = mended(run)
     for _ in range(_TURNS):
-        if not run.handled and not found.found.added:
+        if not run.handled and not found.result.added:
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=found.base.problem.slope)
@@ -111,21 +111,21 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[Run, Search]":
 
 
 @dataclass(frozen=True)
-class Search:
+class EffectSearch:
     """A search that ended without a further alternative."""
 
     base: Model
     field: Candidates
-    part: "Part"
-    found: SearchResult
+    part: "LotPart"
+    result: SearchResult
 
     @property
     def model(self) -> Model:
         """The model with all added terms."""
-        return self.found.model
+        return self.result.model
 
 
-def mended(run: Run) -> Search:
+def mended(run: ExaminedRun) -> EffectSearch:
     """The search for effects; a handling error that ranks first is reported and removed before the next search."""
     while True:
         base = run.model()
@@ -135,11 +135,11 @@ def mended(run: Run) -> Search:
         if found.handling is None and part.field is not fields:
             found = replace(search(fields, base, stop=part.imitates, start=found.added), ladder=found.ladder)
         if found.handling is None or len(run.handled) >= _MENDED:
-            return Search(base, fields, part, found)
+            return EffectSearch(base, fields, part, found)
         _mend(run, part.field, found, found.handling)
 
 
-def _mend(run: Run, fields: Candidates, found: SearchResult, term: Term) -> None:
+def _mend(run: ExaminedRun, fields: Candidates, found: SearchResult, term: Term) -> None:
     """Remove a handling error from a run, and record it."""
     model = found.model.with_term(term)
     group = class_of(fields, model, term)
@@ -203,7 +203,7 @@ def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
 
 
 @dataclass(frozen=True)
-class Part:
+class LotPart:
     """The part of a lot that the search for effects needs: effects common to a large lot are visible in two dozen units."""
 
     field: Candidates
@@ -226,15 +226,15 @@ class Part:
         return by_far or not anything(self.field, fit.model)
 
 
-def _part(field: Candidates, base: Model) -> Part:
+def _part(field: Candidates, base: Model) -> LotPart:
     lot = field.problem.lot
     if lot.state.time.shape[0] <= _MANY:
-        return Part(field, base)
+        return LotPart(field, base)
     pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
     slope = field.problem.slope
     problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])
     terms = [t for t in base.terms if not isinstance(t.effect, Handling)]
-    return Part(
+    return LotPart(
         Candidates(problem, field.effects, [a for a in field.handling if a.fewest_units > 1]), Model(problem, terms)
     )
 

@@ -69,17 +69,17 @@ def _whole_dwells(share: Array) -> tuple[Influence, ...]:
 
 
 @dataclass(frozen=True)
-class Carried:
+class CarriedEvidence:
     """Dwells of largest influence on a term, and the log probability of the term when they are left out."""
 
     dwells: tuple[Influence, ...] = ()
     log_p_without: float | None = None
 
 
-def carried_by(model: Model, term: Term) -> Carried:
+def carried_by(model: Model, term: Term) -> CarriedEvidence:
     """The dwells of largest influence on a term of a model, and the verdict without them."""
     dwells = influence(model, term)
-    return Carried(dwells, log_p_without(model, term, dwells) if dwells else None)
+    return CarriedEvidence(dwells, log_p_without(model, term, dwells) if dwells else None)
 
 
 def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> float:

@@ -30,7 +30,7 @@ _STOPS = 8
 
 
 @dataclass(frozen=True)
-class Reach:
+class TableReach:
     """What the station may do.
 
     outer, inner : rad, bounds of the table
@@ -66,17 +66,17 @@ class StepSequence:
         return StepSequence(self.kind, self.steps * repeats)
 
 
-def reach_of(state: State) -> Reach:
+def reach_of(state: State) -> TableReach:
     """The capabilities of the station that the run shows: its angles, and its temperatures if they varied."""
     settle = 2.0 if state.since_move is None else float(np.clip(np.median(state.since_move), 0.0, 60.0))
     if state.temperature is None or float(np.ptp(state.temperature)) < _VARIED_K:
-        return Reach(settle=settle)
-    return Reach(
+        return TableReach(settle=settle)
+    return TableReach(
         settle=settle, temperature=(round(float(np.min(state.temperature))), round(float(np.max(state.temperature))))
     )
 
 
-def pose_grid(reach: Reach, temperature: float) -> list[SequenceStep]:
+def pose_grid(reach: TableReach, temperature: float) -> list[SequenceStep]:
     """Directions that respond to any curve of the force: a lattice, edges and corners, rings near 0.24, 0.5 and 0.75 g.
 
     Two attitudes of the table give one direction of the force; both are included: the errors of the table differ.
@@ -102,7 +102,7 @@ def _ring(axis: int, level: float) -> Array:
     return np.degrees(np.stack([outer, inner], axis=1))
 
 
-def temperatures(here: float, reach: Reach) -> list[float]:
+def temperatures(here: float, reach: TableReach) -> list[float]:
     """Temperatures of further soaks: the ends and the middle of the range, without the present temperature."""
     if reach.temperature is None:
         return []
@@ -118,7 +118,7 @@ def present(state: State, pace: StationPace) -> float:
     return T_REFERENCE if state.temperature is None else round(float(np.mean(state.temperature[..., -1])), 1)
 
 
-def courses(state: State, reach: Reach, best: Sequence[SequenceStep], here: float) -> list[StepSequence]:
+def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here: float) -> list[StepSequence]:
     """Sequences that are not a selection of single poses.
 
     Parameters
@@ -142,7 +142,7 @@ def courses(state: State, reach: Reach, best: Sequence[SequenceStep], here: floa
     return [c for c in found if c.steps and all(reach.allows(s) for s in c.steps)]
 
 
-def _spread(best: Sequence[SequenceStep], reach: Reach, here: float) -> list[SequenceStep]:
+def _spread(best: Sequence[SequenceStep], reach: TableReach, here: float) -> list[SequenceStep]:
     """Two opposed faces, and the two best poses."""
     faces = [SequenceStep(0.0, 0.0, here, reach.settle), SequenceStep(np.pi, 0.0, here, reach.settle)]
     return [*faces, *(replace(s, temperature=here) for s in best[:2])]
@@ -169,7 +169,7 @@ def _waits(here: float) -> list[StepSequence]:
     return found
 
 
-def _approaches(state: State, reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+def _approaches(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Poses reached from both sides of each axis; the poses of the run in the opposite order."""
     found: list[StepSequence] = []
     for count in (2, 4):
@@ -207,7 +207,7 @@ def _power_cycles(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     return found
 
 
-def _excursions(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+def _excursions(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Soaks away from the present temperature and back, up and down, far and near."""
     if reach.temperature is None:
         return []
@@ -227,7 +227,7 @@ def _excursions(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> li
     return found
 
 
-def _between(state: State, reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+def _between(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Soaks half-way between those of the run, from the nearer end: only they show a curvature between two soaks."""
     soaks = np.array(sorted(levels(first_unit(state))))
     apart = np.flatnonzero(np.diff(soaks) > _VARIED_K)
@@ -245,7 +245,7 @@ def _between(state: State, reach: Reach, here: float, chosen: Sequence[SequenceS
     return found
 
 
-def _ramps(reach: Reach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
+def _ramps(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Dwell after dwell while the devices follow the air, one way and back."""
     if reach.temperature is None:
         return []

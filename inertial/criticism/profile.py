@@ -29,7 +29,7 @@ _ROUNDS = 3
 _AXES = 3
 
 
-class Profile:
+class LikelihoodProfile:
     """Truths that a model does not have, and the part of them that a wrong effect cannot explain.
 
     Parameters

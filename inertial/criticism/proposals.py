@@ -9,7 +9,7 @@ from inertial import effects as catalogue
 from inertial.criticism.aims import Objective, RivalDiscrimination, Sighting
 from inertial.criticism.classes import EffectClass
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.menus import Kind, Reach, StepSequence, courses, pose_grid, present, reach_of, temperatures
+from inertial.criticism.menus import Kind, StepSequence, TableReach, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.model import Model, Term
 from inertial.criticism.separation import FEW, MANY, Rivals, rivals_of
 from inertial.criticism.twins import never_apart, twins_of
@@ -63,7 +63,7 @@ class Proposal:
 class Circumstances:
     """Limits of a proposal: the station's reach and pace, its time for steps, and the minutes that may be spent."""
 
-    reach: Reach | None = None
+    reach: TableReach | None = None
     pace: StationPace = field(default_factory=StationPace)
     minutes: Minutes | None = None
     budget: float = float("inf")

@@ -17,7 +17,7 @@ from inertial.criticism.decisions import AXES_DIFFER
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.profile import Profile
+from inertial.criticism.profile import LikelihoodProfile
 from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
 from inertial.criticism.turn_on import with_turn_on
@@ -133,7 +133,7 @@ def apart(
     noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
     rest = Model(problem, with_turn_on(problem.lot.state, rivals.rest))
     to_lot = rivals.weight / rivals.variance
-    profile = Profile(rest, predictions(rivals, problem), noise, AXES_DIFFER / to_lot)
+    profile = LikelihoodProfile(rest, predictions(rivals, problem), noise, AXES_DIFFER / to_lot)
     left = np.stack([profile.left(wrong, fine=fine) for wrong in rivals.terms], axis=1)
     np.fill_diagonal(left, 0.0)
     return Apart(left * to_lot, profile.whole * to_lot)

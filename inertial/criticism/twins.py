@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from inertial.criticism.menus import Reach, courses, pose_grid, present, reach_of, temperatures
+from inertial.criticism.menus import TableReach, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.separation import Rivals, apart
 from inertial.planning.sequences import SequenceStep, StationPace
 from inertial.state import State
@@ -13,7 +13,7 @@ NOTHING = 1e-6
 _EVERY, _FURTHER = 4, 12
 
 
-def everything(state: State, reach: Reach, pace: StationPace) -> list[SequenceStep]:
+def everything(state: State, reach: TableReach, pace: StationPace) -> list[SequenceStep]:
     """Steps of every kind that a station can take: directions, temperatures, waits, approaches, ramps, power."""
     here = present(state, pace)
     poses = pose_grid(reach, here)
@@ -28,7 +28,7 @@ def everything(state: State, reach: Reach, pace: StationPace) -> list[SequenceSt
     return steps
 
 
-def never_apart(rivals: Rivals, reach: Reach | None, pace: StationPace) -> np.ndarray:
+def never_apart(rivals: Rivals, reach: TableReach | None, pace: StationPace) -> np.ndarray:
     """Whether (r, r) the rival of a column explains the prediction of the rival of a row, under every step of the station."""
     state = rivals.lot.state
     steps = everything(state, reach or reach_of(state), pace)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
-from inertial.dynamics.missing_effects import missing_classes, p_value
+from inertial.dynamics.missing_effects import breakers_of, missing_classes, p_value
 from inertial.dynamics.transfer_diagnosis import ADEQUATE_P, FEWEST_DOF
 from inertial.errors import NotIdentified
 
@@ -129,9 +129,6 @@ def _verdict(
 ) -> SpinDiagnosis:
     base, best = fits
     left = [_left_out(points, output, error, one.effects) for one in fits]
-    breakers = dict.fromkeys(
-        EFFECTS[name].breaker for one in classes if len(one.effects) > 1 for name in one.effects[:2]
-    )
     return SpinDiagnosis(
         adequate,
         reason,
@@ -142,7 +139,7 @@ def _verdict(
         float(np.sqrt(np.mean(base.residuals**2))),
         float(np.sqrt(np.mean(best.residuals**2))),
         (left[0], left[1]),
-        tuple(breakers),
+        breakers_of(classes, EFFECTS),
     )
 
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from inspect import isabstract
-from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from scipy.stats import chi2
@@ -13,9 +10,7 @@ from scipy.stats import chi2
 from inertial.dynamics.transfer_diagnosis import ADDED_P, ADEQUATE_P, CLASS_WIDTH, MOST_ADDED, EffectClass
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-Found = TypeVar("Found")
+    from collections.abc import Callable, Mapping, Sequence
 
 
 class Fitted(Protocol):
@@ -35,35 +30,21 @@ class Fitted(Protocol):
 AnyFit = TypeVar("AnyFit", bound=Fitted)
 
 
-class IncompleteEffect(Exception):
-    """A module without exactly one effect of its own name; its author must correct it."""
-
-
-def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str, Found]:
-    """One effect of each module of a package, by name.
-
-    Raises
-    ------
-    IncompleteEffect
-        A module does not define exactly one effect with its own name.
-    """
-    found: dict[str, Found] = {}
-    for info in iter_modules(list(path)):
-        if info.name == "base":
-            continue
-        content = vars(import_module(f"{package}.{info.name}")).values()
-        own: list[Any] = [
-            one for one in content if isinstance(one, type) and issubclass(one, base) and not isabstract(one)
-        ]
-        if len(own) != 1 or own[0].id != info.name:
-            raise IncompleteEffect(f"{package}.{info.name}: one effect with id '{info.name}' is needed; define it")
-        found[info.name] = own[0]()
-    return found
-
-
 def p_value(fit: Fitted) -> float:
     """Probability of a larger χ² where the model is right; nan without degrees of freedom."""
     return float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
+
+
+class Separated(Protocol):
+    """An effect with the measurement that separates it from others."""
+
+    breaker: ClassVar[str]
+
+
+def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, Separated]) -> tuple[str, ...]:
+    """The measurements that separate the first two members of each class of several effects."""
+    open_classes = [one for one in classes if len(one.effects) > 1]
+    return tuple(dict.fromkeys(effects[name].breaker for one in open_classes for name in one.effects[:2]))
 
 
 def missing_classes(

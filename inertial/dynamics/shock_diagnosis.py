@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from inertial.dynamics.missing_effects import missing_classes, p_value
+from inertial.dynamics.missing_effects import breakers_of, missing_classes, p_value
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.transfer_diagnosis import ADEQUATE_P, FEWEST_DOF
 from inertial.errors import NotIdentified
@@ -227,9 +227,6 @@ def _verdict(
     classes: tuple[EffectClass, ...],
 ) -> ShockDiagnosis:
     left = _left_out(record, base.effects), (_left_out(record, best.effects) if classes else np.nan)
-    breakers = dict.fromkeys(
-        EFFECTS[name].breaker for one in classes if len(one.effects) > 1 for name in one.effects[:2]
-    )
     return ShockDiagnosis(
         adequate,
         reason,
@@ -241,7 +238,7 @@ def _verdict(
         _percent(record, list(base.residuals)),
         _percent(record, list(best.residuals)),
         (left[0], left[1] if classes else left[0]),
-        tuple(breakers),
+        breakers_of(classes, EFFECTS),
     )
 
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Stability:
+class StabilityFigures:
     """Stability of a bias record, in the record's unit; the definitions differ by up to thirty times for one unit.
 
     Attributes
@@ -51,7 +51,7 @@ def error_of_mean(record: Array, parts: int = 10) -> Array:
     return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(float(parts)))
 
 
-def stability(record: Array, rate_hz: float) -> Stability:
+def stability(record: Array, rate_hz: float) -> StabilityFigures:
     """The figures of a bias record (n,).
 
     Raises
@@ -74,7 +74,7 @@ def stability(record: Array, rate_hz: float) -> Stability:
     curve = overlapping(second, rate, np.array([1, 3, 10, 30, round(100.0 * rate)]))
     allan = float(curve.deviation[-1])
     sd = float(hundred.std(ddof=1))
-    return Stability(
+    return StabilityFigures(
         sd_100s=sd,
         sd_100s_error=_error_of_sd(hundred, time, noise),
         sd_1s=float(second.std(ddof=1)),

@@ -48,7 +48,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class TransferDiagnosis:
     """The verdict on a model of a transfer function.
 
     adequate : None where it cannot be judged, with ``reason``
@@ -77,7 +77,7 @@ class Diagnosis:
 
 def diagnose_transfer(
     points: Points, effects: Sequence[str] = ("second_order", "delay"), *, highest_hz: float | None = None
-) -> Diagnosis:
+) -> TransferDiagnosis:
     """The verdict on a model, with the classes of effects that would mend it.
 
     Parameters
@@ -144,9 +144,9 @@ def _verdict(
     *,
     unexplained: bool,
     highest: float | None,
-) -> Diagnosis:
+) -> TransferDiagnosis:
     left = (_left_out(points, base.effects), _left_out(points, extended.effects) if classes else np.nan)
-    return Diagnosis(
+    return TransferDiagnosis(
         adequate,
         reason,
         base,

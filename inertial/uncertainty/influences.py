@@ -61,7 +61,7 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class Influence:
+class InputQuantity:
     """One input quantity with its standard uncertainty.
 
     contribution : the entry of the budget that it belongs to; several influences may belong to one
@@ -107,7 +107,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class Model:
+class MeasurementModel:
     """A calibrated model: its output under any force and temperature.
 
     effects : ids; coefficients : (..., 3, p); nonlinear : by effect id
@@ -153,7 +153,7 @@ def harmonic(angle: Array, order: int, phase: str) -> Array:
 
 
 def sensitivity(
-    model: Model, state: State, influences: Sequence[Influence], scattered: Sequence[Scattered] = ()
+    model: MeasurementModel, state: State, influences: Sequence[InputQuantity], scattered: Sequence[Scattered] = ()
 ) -> Sensitivity:
     """J·u of all influences, by central differences of the predicted output at the fitted coefficients.
 
@@ -167,7 +167,7 @@ def sensitivity(
     dof: list[float] = []
     seen: list[bool] = []
 
-    def enter(changes: Array, one: Influence | Scattered) -> None:
+    def enter(changes: Array, one: InputQuantity | Scattered) -> None:
         count = changes.shape[-1]
         columns.append(changes)
         contributions.extend([one.contribution] * count)
@@ -188,7 +188,7 @@ def sensitivity(
     return Sensitivity(changes, tuple(contributions), tuple(scopes), tuple(dof), tuple(seen))
 
 
-def difference(model: Model, state: State, errors: Errors) -> Array:
+def difference(model: MeasurementModel, state: State, errors: Errors) -> Array:
     """Change of the outputs (..., n, 3) per unit of some errors."""
     step = STEP_K if np.any(errors.temperature) else STEP
     return (model.output(state, errors.times(step)) - model.output(state, errors.times(-step))) / (2.0 * step)

@@ -14,7 +14,7 @@ from inertial import design
 from inertial.fits.linear import response_matrix
 from inertial.norm_fit import is_free
 from inertial.state import State
-from inertial.uncertainty.influences import Model, Sensitivity
+from inertial.uncertainty.influences import MeasurementModel, Sensitivity
 from inertial.uncertainty.propagation import Propagated
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ class NormDesign:
         return np.einsum("nj,njq->nq", self.along, changes)
 
 
-def norm_design(model: Model, state: State, covariance: Array, used: NDArray[np.bool_]) -> NormDesign:
+def norm_design(model: MeasurementModel, state: State, covariance: Array, used: NDArray[np.bool_]) -> NormDesign:
     """The map of a norm fit of one unit.
 
     Parameters

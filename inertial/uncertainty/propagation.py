@@ -13,7 +13,7 @@ from inertial import design
 from inertial.fits.linear import response_matrix
 from inertial.noise.dwells import whitener
 from inertial.state import State
-from inertial.uncertainty.influences import Model, Sensitivity
+from inertial.uncertainty.influences import MeasurementModel, Sensitivity
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,9 @@ class FitDesign:
         return np.sqrt(np.sum(left**2, axis=axes)) / np.where(whole > 0.0, whole, 1.0)
 
 
-def fit_design(model: Model, state: State, covariance: Array, used: NDArray[np.bool_] | None = None) -> FitDesign:
+def fit_design(
+    model: MeasurementModel, state: State, covariance: Array, used: NDArray[np.bool_] | None = None
+) -> FitDesign:
     """The map of a generalised least-squares fit.
 
     Parameters

@@ -25,7 +25,7 @@ from pipelines.audit.population import (
     odd_ones,
     yields,
 )
-from pipelines.audit.stations_over_time import Chart, StationSeries, charts, slot_series, station_series
+from pipelines.audit.stations_over_time import ControlChart, StationSeries, charts, slot_series, station_series
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,7 +82,7 @@ class Audit:
     stations: tuple[StationSeries, ...]
     slots: tuple[StationSeries, ...]
     slot_means: tuple[dict[str, object], ...]
-    charts: tuple[Chart, ...]
+    charts: tuple[ControlChart, ...]
     yields: tuple[Share, ...]
     abilities: tuple[Ability, ...]
     differences: tuple[Difference, ...]

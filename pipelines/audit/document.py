@@ -16,7 +16,7 @@ from pipelines.audit.parameters import unit_text
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
-    from pipelines.audit.stations_over_time import Chart, StationSeries
+    from pipelines.audit.stations_over_time import ControlChart, StationSeries
 
 MOST_UNITS = 200  # histories in the document; ``tumbleline query`` gives the others by their serial
 SCHEMA = 1
@@ -173,7 +173,7 @@ def weekly(series: StationSeries) -> list[dict[str, Any]]:
     ]
 
 
-def _chart(chart: Chart) -> dict[str, Any]:
+def _chart(chart: ControlChart) -> dict[str, Any]:
     hit = np.flatnonzero(chart.rules.any(axis=0) | chart.outside)
     return {
         "station": chart.station,

@@ -19,12 +19,12 @@ from pipelines.integrity.findings import CHANGED
 if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.archive.store import Place
-    from pipelines.integrity.findings import CheckedPart
+    from pipelines.integrity.findings import VerifiedPart
 
 REMEDY = "remove it, it is made again from the runs"
 
 
-def check_index(archive: Archive, checked: CheckedPart) -> None:
+def check_index(archive: Archive, checked: VerifiedPart) -> None:
     """The findings about the index of an archive.
 
     Parts of another version, which are never used, and runs that changed since are not checked.
@@ -40,7 +40,7 @@ def check_index(archive: Archive, checked: CheckedPart) -> None:
             )
 
 
-def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], checked: CheckedPart) -> None:
+def _check_rows(archive: Archive, part: Place, runs: list[tuple[str, str]], checked: VerifiedPart) -> None:
     expected = rows_of_runs(read_runs(archive.root / "runs", runs))
     chosen = [run for run, _ in runs]
     for name in TABLES:

@@ -12,14 +12,14 @@ from pipelines.audit.finding import WHO
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.pictures import chart_plot, drift_plot, due_plot, series_plot, yield_plot
 from pipelines.report.diagnosis import chance
-from pipelines.report.numbers import THIN, plain
+from pipelines.report.numbers import THIN, significant
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.finding import AuditFinding
-    from pipelines.audit.stations_over_time import Chart, StationSeries
+    from pipelines.audit.stations_over_time import ControlChart, StationSeries
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 
@@ -56,7 +56,7 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         slots=audit.slot_means,
         odd=audit.odd[:MOST_ROWS],
         unit_text=unit_text,
-        number=plain,
+        number=significant,
         signed=_signed,
         chance=chance,
         date=_date,
@@ -102,7 +102,7 @@ def _telling_series(audit: Audit) -> list[StationSeries]:
     return [one for one in audit.stations if one.where == "level_error"][:MOST_SERIES]
 
 
-def _telling_charts(audit: Audit) -> list[Chart]:
+def _telling_charts(audit: Audit) -> list[ControlChart]:
     return sorted(audit.charts, key=lambda chart: (chart.p_value, chart.station, chart.parameter))[:MOST_CHARTS]
 
 
@@ -122,9 +122,9 @@ def _whole(count: int) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{plain(100.0 * share)} %"
+    return f"{significant(100.0 * share)} %"
 
 
 def _signed(value: float) -> str:
-    text = plain(value)
+    text = significant(value)
     return text if text.startswith("−") or not text else f"+{text}"

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.population import Share
-    from pipelines.audit.stations_over_time import Chart, StationSeries
+    from pipelines.audit.stations_over_time import ControlChart, StationSeries
 
 BLUE, RED, GREY, ORANGE, GREEN = "#0072b2", "#c62828", "#b4b4b4", "#d55e00", "#009e73"
 ROW_IN = 2.5
@@ -54,7 +54,7 @@ def series_plot(series: Sequence[StationSeries]) -> str:
         return svg(figure)
 
 
-def chart_plot(charts: Sequence[Chart]) -> str:
+def chart_plot(charts: Sequence[ControlChart]) -> str:
     """Control charts: every value with the limits of 1, 2 and 3 σ, the moving average with its own limits, signals in red."""
     figure, places = _rows(len(charts))
     with mpl.rc_context(STYLE):

@@ -87,7 +87,7 @@ class Difference:
     device: str
     figure: str
     by: str
-    found: Comparison
+    comparison: Comparison
     p: float
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.parameters import unit_text
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from schemas.counts import number_of
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def _odd(audit: Audit) -> Iterator[AuditFinding]:
         what = f"lot of run {odd.run} ({number_of(odd.units, 'unit')})" if odd.kind == "lot" else f"unit {odd.name}"
         text = unit_text(odd.parameter)
         message = (
-            f"{odd.device}: {what} of {date_of(odd.day)} is an outlier in {odd.parameter}: {plain(odd.value, 4)} {text}, "
+            f"{odd.device}: {what} of {date_of(odd.day)} is an outlier in {odd.parameter}: {significant(odd.value, 4)} {text}, "
             f"{odd.z:+.1f} σ from its kind; look for a change in its production"
         )
         evidence = {"run": odd.run, "station": odd.station, "parameter": odd.parameter, "value": odd.value, "z": odd.z}
@@ -61,13 +61,13 @@ def _incapable(audit: Audit) -> Iterator[AuditFinding]:
 
 def _different(audit: Audit) -> Iterator[AuditFinding]:
     for one in audit.differences:
-        if one.by != "lot" and one.p < DIFFERENT_P and one.found.effect > TELLING_EFFECT:
+        if one.by != "lot" and one.p < DIFFERENT_P and one.comparison.effect > TELLING_EFFECT:
             message = (
-                f"{one.device}: {one.figure} differs between {one.by}s: {100 * one.found.effect:.0f} % of its variance, "
-                f"p = {one.p:.1g} over {one.found.groups} {one.by}s; find out which, and why"
+                f"{one.device}: {one.figure} differs between {one.by}s: {100 * one.comparison.effect:.0f} % of its variance, "
+                f"p = {one.p:.1g} over {one.comparison.groups} {one.by}s; find out which, and why"
             )
             who = "station" if one.by in {"station", "slot"} else "product"
-            evidence = {"figure": one.figure, "by": one.by, "share": one.found.effect, "p_value": one.p}
+            evidence = {"figure": one.figure, "by": one.by, "share": one.comparison.effect, "p_value": one.p}
             yield AuditFinding(who, f"differs_by_{one.by}", one.device, message, (), evidence)
 
 

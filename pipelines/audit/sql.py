@@ -42,7 +42,7 @@ WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 @dataclass(frozen=True)
-class Answer:
+class QueryResult:
     """Column names and rows of an answer."""
 
     columns: tuple[str, ...]
@@ -51,7 +51,7 @@ class Answer:
 
 def ask(
     archive: Archive, sql: str, *, workers: int = 1, compact: bool = True, index: AuditIndex | None = None
-) -> Answer:
+) -> QueryResult:
     """The answer to an SQL query.
 
     Views: those of the index (``runs``, ``units``, ``parameters``, ``station``, ``coefficients``, ``figures``), every other
@@ -74,10 +74,10 @@ def ask(
         return _answered(connection, statement)
 
 
-def _answered(connection: duckdb.DuckDBPyConnection, statement: str) -> Answer:
+def _answered(connection: duckdb.DuckDBPyConnection, statement: str) -> QueryResult:
     try:
         cursor = connection.execute(statement)
-        return Answer(tuple(str(column[0]) for column in cursor.description or ()), cursor.fetchall())
+        return QueryResult(tuple(str(column[0]) for column in cursor.description or ()), cursor.fetchall())
     except duckdb.Error as problem:
         raise WrongUse(_explained(problem)) from None
 

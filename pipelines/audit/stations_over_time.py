@@ -111,7 +111,7 @@ def _series(key: tuple[str, str, str], text: str, day: Array, value: Array, run:
 
 
 @dataclass(frozen=True)
-class Chart:
+class ControlChart:
     """A control chart of one parameter of one check standard on one station, in order of time, (n,) each.
 
     rules : (4, n), by Western Electric rule; outside : points with the EWMA outside its limits
@@ -137,12 +137,12 @@ class Chart:
     in_control: bool
 
 
-def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[Chart]:
+def charts(calibrations: Calibrations, rules: Rules, since: float) -> list[ControlChart]:
     """The charts of all check standards; signals count from ``since`` on, and after the points that make the baseline."""
     standard = np.array([rules.is_standard(unit) for unit in calibrations.unit], dtype=bool)
     rows = np.flatnonzero(standard)
     keys = np.array([f"{calibrations.station[k]}\t{calibrations.unit[k]}" for k in rows], dtype=object)
-    out: list[Chart] = []
+    out: list[ControlChart] = []
     for key in np.unique(keys.astype(str)) if rows.size else ():
         own = rows[keys == key]
         own = own[np.lexsort((calibrations.run[own].astype(str), calibrations.day[own]))]
@@ -164,14 +164,14 @@ def _chart(
     values: Array,
     rules: Rules,
     since: float,
-) -> Chart:
+) -> ControlChart:
     chart = baseline(values, rules.baseline_points)
     by_rule, moving = signals(values, chart)
     day = calibrations.day[own]
     counted = (np.arange(values.size) >= rules.baseline_points) & (day >= since)
     number = alarms(by_rule, moving.outside, counted)
     chance = chance_of_alarms(values, rules.baseline_points, int(counted.sum()))
-    return Chart(
+    return ControlChart(
         *key, unit_text(key[2]), day, values, calibrations.run[own], chart, by_rule & counted, moving.average, moving.half_width,
         moving.outside & counted, number, chance.mean, chance.p_value(number), in_control=True,
     )  # fmt: skip

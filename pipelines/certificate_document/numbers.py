@@ -80,7 +80,7 @@ def with_uncertainty(value: float | None, expanded: float) -> tuple[str, str]:
     return ("" if value is None else rounded(value, places)), shown
 
 
-def plain(value: float, digits: int = 3) -> str:
+def significant(value: float, digits: int = 3) -> str:
     """A number with so many significant digits, without an exponent where it has few zeros."""
     if value == 0.0:
         return "0"

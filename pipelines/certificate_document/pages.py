@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.certificate_document.numbers import plain, probability, rounded, with_uncertainty
+from pipelines.certificate_document.numbers import probability, rounded, significant, with_uncertainty
 
 if TYPE_CHECKING:
     from pipelines.certificate_document.content import Adjustment, CertificateContent
@@ -122,8 +122,8 @@ def _as_found(a: Adjustment) -> dict[str, Any]:
         text = a.text if earlier else f"{a.text[:1].upper()}{a.text[1:]}"
         return {"title": "As found, as left", "before": [f"{earlier}{text}."]}
     rows = [
-        ["as found, coefficients of the earlier certificate", plain(a.found_rms_ug), plain(a.found_max_ug)],
-        ["as left, coefficients of this certificate", plain(a.left_rms_ug), plain(a.left_max_ug)],
+        ["as found, coefficients of the earlier certificate", significant(a.found_rms_ug), significant(a.found_max_ug)],
+        ["as left, coefficients of this certificate", significant(a.left_rms_ug), significant(a.left_max_ug)],
     ]
     heads = ["state", "RMS error of |a|, µg", "largest error of |a|, µg"]
     text = f"{a.text[:1].upper()}{a.text[1:]}; {a.dwells} readings."
@@ -152,15 +152,15 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
     rows = []
     for one in c.conformity:
         value, expanded = (
-            (plain(abs(one.value)), "") if one.expanded <= 0.0 else with_uncertainty(abs(one.value), one.expanded)
+            (significant(abs(one.value)), "") if one.expanded <= 0.0 else with_uncertainty(abs(one.value), one.expanded)
         )
         rows.append(
             [
                 one.figure,
                 value,
                 expanded,
-                plain(one.limit),
-                plain(one.accept, 4),
+                significant(one.limit),
+                significant(one.accept, 4),
                 one.unit,
                 one.outcome,
                 probability(one.pfa),
@@ -185,15 +185,15 @@ def _budgets(c: CertificateContent) -> dict[str, Any]:
                 row.name.replace("_", " "),
                 row.type,
                 row.distribution,
-                plain(row.u),
+                significant(row.u),
                 f"{100.0 * row.share:.1f} %",
                 row.source,
             ]
             for row in one.rows
         ]
-        head = f"{one.quantity}: {plain(one.u, 2) if one.k is None else f'u = {plain(one.u)}'} {one.unit}"
+        head = f"{one.quantity}: {significant(one.u, 2) if one.k is None else f'u = {significant(one.u)}'} {one.unit}"
         if one.k is not None and one.expanded is not None:
-            head += f", k = {one.k:.2f}, U = {plain(one.expanded, 2)} {one.unit}"
+            head += f", k = {one.k:.2f}, U = {significant(one.expanded, 2)} {one.unit}"
         heads = ["contribution", "type", "distribution", f"u, {one.unit}", "share of u²", "source"]
         tables.append(_table(head, heads, rows, [2, "auto", "auto", "auto", "auto", 3], [3, 4]))
     return {"title": "Uncertainty budgets", "tables": tables} if tables else {}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
 
 
-class Contribution(TypedDict):
+class StatedContribution(TypedDict):
     """One row of a budget (JCGM 100; EA-4/02): how an input is stated, and what it makes of the quantity.
 
     stated, divisor, input_unit : the figure as stated, and what makes a standard uncertainty of it; u : in the quantity's unit
@@ -60,7 +60,7 @@ class StatedQuantity(TypedDict):
     frame: str
     shown: float | None
     unseen: float | None
-    contributions: list[Contribution]
+    contributions: list[StatedContribution]
 
 
 class StatedDecision(TypedDict):
@@ -170,7 +170,7 @@ def _quantity(row: dict[str, Any], parts: pd.DataFrame) -> StatedQuantity:
     }  # pyright: ignore[reportReturnType] - the keys of the middle line are those of the type
 
 
-def _contribution(row: dict[str, Any]) -> Contribution:
+def _contribution(row: dict[str, Any]) -> StatedContribution:
     return {
         "name": row["contribution"],
         "type": row["type"],

@@ -32,7 +32,7 @@ class Stated(NamedTuple):
         """Whether it is valid on a day."""
         return self.start <= day < self.until
 
-    def words(self) -> str:
+    def sentence(self) -> str:
         """The statement in one line, independent of the present date."""
         if self.state == "revoked":
             return f"certificate {self.certificate} REVOKED ({self.reason})"

@@ -9,7 +9,7 @@ from pipelines.jobs.terms import budget_terms
 from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.fit import fit
-from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.noise import noise
 from pipelines.stages.procedures import procedures
 from pipelines.stages.reduce import dwells_of
@@ -119,7 +119,7 @@ _EVIDENCE = (
 def _grade(job: Job, run: Run) -> Tables:
     readings = run.table("readings").drop_duplicates("unit")
     full_scale = dict(zip(readings["unit"].astype(str), readings["full_scale"].astype(float), strict=True))
-    evidence = Evidence(**{name: run.table(name) for name in _EVIDENCE}, full_scale=full_scale)
+    evidence = GradeEvidence(**{name: run.table(name) for name in _EVIDENCE}, full_scale=full_scale)
     return grade(evidence, job.limits, job.recipe.zero_output, tumbles=job.recipe.tumbles)
 
 

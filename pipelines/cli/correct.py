@@ -21,7 +21,7 @@ from pipelines.cli.options import (
 if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
-    from pipelines.export.recording import Recording
+    from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
 ORDER = 345
@@ -107,7 +107,7 @@ def command(
 
 def _tracking(
     run: Run,
-    recording: Recording,
+    recording: CorrectableRecording,
     force: str,
     gravity: float | None,
     turn_on: float | None,
@@ -151,7 +151,7 @@ def _tracking(
     return Tracking(known, magnitude, turn_on, step)
 
 
-def _write(recording: Recording, done: Corrected, output: Path) -> None:
+def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> None:
     import io
 
     from pipelines.archive import files
@@ -170,7 +170,7 @@ def _write(recording: Recording, done: Corrected, output: Path) -> None:
     files.publish(output, data, "correct", files.ELSEWHERE)
 
 
-def _document(recording: Recording, fit: FitOfUnit, done: Corrected, output: Path | None) -> dict[str, Any]:
+def _document(recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, output: Path | None) -> dict[str, Any]:
     import numpy as np
 
     from schemas.units import AXES, MICRO

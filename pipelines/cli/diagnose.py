@@ -139,7 +139,7 @@ def diagnosed(
     with error_console().status("drawing the report"):
         from pipelines.report.diagnosis import render_diagnosis
 
-        return made.document, render_diagnosis(made.document, made.found, made.diagnosis, source, coefficients)
+        return made.document, render_diagnosis(made.document, made.measured, made.diagnosis, source, coefficients)
 
 
 def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:

@@ -18,7 +18,7 @@ class IncompleteCommand(Exception):
     """A module with an incomplete command: a defect that its author must correct."""
 
 
-class Command(NamedTuple):
+class CommandModule(NamedTuple):
     """A command in the help.
 
     module : name inside this package · part : heading of the help · order : place in the help · summary : one sentence
@@ -30,7 +30,7 @@ class Command(NamedTuple):
     summary: str
 
 
-def find_commands(folder: Path) -> dict[str, Command]:
+def find_commands(folder: Path) -> dict[str, CommandModule]:
     """The commands of a folder by name, in the order of the help.
 
     The name is the name of the module; a module with a reserved name of Python ends in an underscore (``import_``).
@@ -40,7 +40,7 @@ def find_commands(folder: Path) -> dict[str, Command]:
     IncompleteCommand
         A module has the function or application of a command without its constants, or the reverse, or an ORDER twice.
     """
-    commands: dict[str, Command] = {}
+    commands: dict[str, CommandModule] = {}
     for path in sorted(folder.glob("*.py")):
         if path.stem.startswith("__"):
             continue
@@ -54,7 +54,7 @@ def find_commands(folder: Path) -> dict[str, Command]:
     return dict(ordered)
 
 
-def _read(path: Path) -> Command | None:
+def _read(path: Path) -> CommandModule | None:
     """The command of a module; None for a module without a command."""
     text = path.read_text(encoding="utf-8")
     values = {name: string or number for name, string, number in CONSTANT.findall(text)}
@@ -67,4 +67,4 @@ def _read(path: Path) -> Command | None:
             "an integer ORDER" if callable_ else "a function 'command' or 'app = typer.Typer('"
         )
         raise IncompleteCommand(f"{path.name}: a command without {needed}; add it on a line of its own")
-    return Command(path.stem, values["PART"], int(values["ORDER"]), values["SUMMARY"])
+    return CommandModule(path.stem, values["PART"], int(values["ORDER"]), values["SUMMARY"])

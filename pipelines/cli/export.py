@@ -144,7 +144,7 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
     from pipelines.export import revoked_units
 
     given, day = {c.unit for c in chosen}, today()
-    lines = [f"left out: {unit}, {one.words()}" for unit, one in revoked_units(run).items() if unit not in given]
+    lines = [f"left out: {unit}, {one.sentence()}" for unit, one in revoked_units(run).items() if unit not in given]
     lines += [f"{c.unit}: {c.certified}" for c in chosen if c.certificate is not None and not c.certificate.holds(day)]
     bare = [c.unit for c in chosen if c.certificate is None]
     if bare:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from pipelines.inquiry.inquiry import FollowUp, Inquiry
     from pipelines.inquiry.joint_diagnosis import JointDiagnosis
-    from pipelines.inquiry.loop import Approval, Consent, Settings
+    from pipelines.inquiry.loop import Approval, Consent, InquirySettings
     from pipelines.jobs.job import Request
 
 PART = "Measure"
@@ -89,14 +89,14 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.cli.terminal import attended
-    from pipelines.inquiry.loop import Settings
+    from pipelines.inquiry.loop import InquirySettings
     from pipelines.jobs.job import Request
     from pipelines.jobs.model_files import chosen_effects
     from pipelines.jobs.seating import read_seating
 
     seating = read_seating(units)
     request = Request(recipe, station, seating.units, seating.slots, seed, repeat)
-    settings = Settings(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
+    settings = InquirySettings(tuple(chosen_effects(effects, None, "investigate") or ()), budget, unseen)
     at_terminal = attended() and not as_json
     paused = yes is False and not at_terminal and not direct
     document = _run(
@@ -150,7 +150,7 @@ def _question(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
 def _run(
     request: Request,
     archive: Any,
-    settings: Settings,
+    settings: InquirySettings,
     approval: Callable[[Callable[[], AbstractContextManager[None]]], Approval],
     *,
     direct: bool,

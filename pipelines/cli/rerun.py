@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.reproduce import Reproduction
-    from pipelines.rerun.rerun import Outcome
+    from pipelines.rerun.rerun import RerunOutcome
 
 PART = "Old data, new models"
 ORDER = 520
@@ -80,7 +80,7 @@ def command(
     from pipelines.audit.index_growth import add_runs
     from pipelines.rerun.partition import run_again
 
-    outcomes: list[Outcome] = _mapped(run_again, store, runs, (change, dask, count), report=report)
+    outcomes: list[RerunOutcome] = _mapped(run_again, store, runs, (change, dask, count), report=report)
     add_runs(store, [one.new for one in outcomes if one.new])
     document = {"archive": str(store.root), "runs": [asdict(one) for one in outcomes], **_counts(outcomes)}
     if as_json:
@@ -134,7 +134,7 @@ def _mapped(
     return [one for portion in done for one in portion]
 
 
-def _counts(outcomes: list[Outcome]) -> dict[str, int]:
+def _counts(outcomes: list[RerunOutcome]) -> dict[str, int]:
     failed = sum(bool(one.error) for one in outcomes)
     anew = sum(bool(one.new) and one.new != one.run for one in outcomes)
     return {"selected": len(outcomes), "rerun": anew, "unchanged": len(outcomes) - anew - failed, "failed": failed}
@@ -143,7 +143,7 @@ def _counts(outcomes: list[Outcome]) -> dict[str, int]:
 DIFFERENCES = 3  # re-runs that are proposed for a comparison
 
 
-def _print(outcomes: list[Outcome], document: dict[str, Any], archive: str | None) -> None:
+def _print(outcomes: list[RerunOutcome], document: dict[str, Any], archive: str | None) -> None:
     lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
@@ -163,7 +163,7 @@ def _print(outcomes: list[Outcome], document: dict[str, Any], archive: str | Non
     print_next(out, [command_line("diff", one.run, one.new, *archive_words(archive)) for one in anew[:DIFFERENCES]])
 
 
-def _line(one: Outcome) -> list[str]:
+def _line(one: RerunOutcome) -> list[str]:
     whats = dict.fromkeys("code" if change["what"] == "code" else change["what"] for change in one.because)
     worked = [name for name, how in one.stages.items() if how == "computed"]
     return [one.run, one.new if one.new != one.run else "—", ", ".join(whats) or "nothing", ", ".join(worked) or "none"]

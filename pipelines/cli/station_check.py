@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from schemas.recipe import Lot
     from schemas.station import StationConfig
-    from stations.self_test import Bench, CheckResult
-    from stations.serving import Reading
+    from stations.self_test import CheckResult, SelfTestBench
+    from stations.serving import RegisterReading
 
 
 def check(
@@ -56,7 +56,7 @@ def _tested(config: StationConfig, device: str, units: int) -> list[CheckResult]
     """The findings of the self-test; results of a check standard within its limits are added to its history."""
     from stations.opening import open_station
     from stations.safety.folder import state_folder
-    from stations.self_test import Bench, CheckResult, keep, read_history
+    from stations.self_test import CheckResult, SelfTestBench, keep, read_history
 
     path = state_folder() / "checks" / f"{config.name}.jsonl"
     history = read_history(path)
@@ -71,13 +71,13 @@ def _tested(config: StationConfig, device: str, units: int) -> list[CheckResult]
             )
         ]
     with open_station(config, lot, run="station check") as opened:
-        bench = Bench(opened, config.self_test, history)
+        bench = SelfTestBench(opened, config.self_test, history)
         findings = bench.run()
     _keep(path, bench, keep)
     return findings
 
 
-def _keep(path: Path, bench: Bench, keep: Any) -> None:
+def _keep(path: Path, bench: SelfTestBench, keep: Any) -> None:
     controlled = [finding.ok for finding in bench.findings if finding.check in {"offset", "scale"}]
     if bench.standard is not None and controlled and all(controlled):
         keep(path, bench.standard)
@@ -93,7 +93,7 @@ def _seated(config: StationConfig) -> Lot | None:
     return Lot(units=units, device="hardware") if units else None
 
 
-def _print(readings: list[Reading], findings: list[CheckResult], *, registers: bool) -> None:
+def _print(readings: list[RegisterReading], findings: list[CheckResult], *, registers: bool) -> None:
     if registers:
         lines = [[r.device, r.register, str(r.address), "—" if r.fault else r.value, r.unit] for r in readings]
         print_table(["device", "register", "address", "value", "unit"], lines)

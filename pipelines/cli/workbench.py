@@ -76,7 +76,7 @@ def command(
 
     from pipelines.archive import Archive
     from pipelines.workbench.application import create_app
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
     from schemas.station import load_station
 
     if (certificate is None) != (key is None):
@@ -90,7 +90,7 @@ def command(
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
     for one in station or ():
         load_station(one)  # a broken file is refused now, not when the page is opened
-    settings = Settings(
+    settings = WorkbenchSettings(
         archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
         tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
         pause_lots=pause_lots, **({"token": given} if given else {}),

@@ -24,11 +24,11 @@ class Examination:
     """A diagnosis of dwells.
 
     document : for programs, with keys beyond the fixed ones
-    found, diagnosis : the readings, and their diagnosis; None if every unit has a data fault
+    measured, diagnosis : the readings, and their diagnosis; None if every unit has a data fault
     """
 
     document: dict[str, Any]
-    found: Measured
+    measured: Measured
     diagnosis: Diagnosis | None
 
 

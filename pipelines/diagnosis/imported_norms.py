@@ -94,7 +94,7 @@ def _bias(done: FittedNorms) -> Array:
 
 
 def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any]) -> dict[str, Any]:
-    left = done.fit.left[done.found.readings.there] / done.gravity
+    left = done.fit.left[done.measured.readings.there] / done.gravity
     spread = bias_uncertainty(done)
     to_output = done.scale[0] / MICRO
     difference = None if smaller is None else (_bias(done) - _bias(smaller))[0].tolist()
@@ -129,9 +129,9 @@ def _document(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str,
 def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, Any], out_unit: str) -> list[str]:
     """The fit and the basis of its verdict."""
     error, evidence = verdict["error"], verdict["evidence"]
-    count = int(done.found.readings.there[0].sum())
+    count = int(done.measured.readings.there[0].sum())
     free = count - int(done.fit.dof[0])
-    left = done.fit.left[done.found.readings.there] / done.gravity
+    left = done.fit.left[done.measured.readings.there] / done.gravity
     worst = MICRO * float(np.max(np.abs(left)))
     without = "" if smaller is None else f"; with orthogonal axes {MICRO * smaller.rms:.1f}"
     lines = [
@@ -141,7 +141,7 @@ def _lines(done: FittedNorms, smaller: FittedNorms | None, verdict: dict[str, An
     if evidence is not None:
         lines.append(_evidence_line(done, smaller, evidence, out_unit))
     spread = bias_uncertainty(done)
-    units = range(len(done.found.units))
+    units = range(len(done.measured.units))
     lines += [_axis_line(done, spread, (unit, k), out_unit) for unit in units for k in range(3)]
     out = verdict["leave_out"]
     if out is not None:
@@ -186,7 +186,7 @@ def _axis_line(done: FittedNorms, spread: dict[str, Array], place: tuple[int, in
     u, k = place
     level = float(done.scale[u, k]) / MICRO
     record, long = (COVERAGE * float(spread[name][u, k]) * level for name in ("bias_record_u_ug", "bias_long_u_ug"))
-    whose = f"{done.found.units[u]} " if len(done.found.units) > 1 else ""
+    whose = f"{done.measured.units[u]} " if len(done.measured.units) > 1 else ""
     later = f"± {long:.2g} over the next day" if np.isfinite(long) else "over the next day not known"
     return (
         f"{whose}{AXES[k]}: bias {_bias(done)[u, k]:.7g} ± {record:.2g} {unit} over the record ({later}; k = {COVERAGE:g}), "

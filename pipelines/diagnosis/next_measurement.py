@@ -36,7 +36,7 @@ class Proposed:
     twins: tuple[tuple[str, ...], ...] = ()
 
     @property
-    def found(self) -> tuple[Proposal, ...]:
+    def separating(self) -> tuple[Proposal, ...]:
         """The proposals that separate classes."""
         return tuple(p for _, p in self.parting if p is not None)
 

@@ -16,7 +16,7 @@ from schemas.units import MICRO
 if TYPE_CHECKING:
     from inertial.criticism.bad_dwells import BadDwell
     from inertial.criticism.diagnosis import Diagnosis, Named
-    from inertial.criticism.influence import Carried
+    from inertial.criticism.influence import CarriedEvidence
 
 BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""
@@ -195,19 +195,19 @@ def influence_of(diagnosis: Diagnosis, names: Names) -> list[dict[str, Any]]:
     return _dwells(diagnosis.carried, names)
 
 
-def _dwells(carried: Carried, names: Names) -> list[dict[str, Any]]:
+def _dwells(carried: CarriedEvidence, names: Names) -> list[dict[str, Any]]:
     return [
         {"unit": names.units[d.unit], "dwell": names.dwells[d.dwell], "share": round(d.share, 4)}
         for d in carried.dwells
     ]
 
 
-def _carried(carried: Carried, names: Names) -> dict[str, Any]:
+def _carried(carried: CarriedEvidence, names: Names) -> dict[str, Any]:
     """The dwells of largest influence on a class, and the verdict without them."""
     return {"influence": _dwells(carried, names), "without_influence": _without(carried)}
 
 
-def _without(carried: Carried) -> dict[str, Any] | None:
+def _without(carried: CarriedEvidence) -> dict[str, Any] | None:
     if carried.log_p_without is None:
         return None
     return {"dwells": len(carried.dwells), "p_value": probability(carried.log_p_without)}

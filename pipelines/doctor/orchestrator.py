@@ -26,7 +26,7 @@ TIMEOUT_S = 5.0
 LARGEST_BODY = 65536
 
 
-class Answer(NamedTuple):
+class ServerAnswer(NamedTuple):
     """What a server answered; ``ahead_s``: of its clock against the host's, None where it states no time."""
 
     status: int
@@ -60,7 +60,7 @@ def orchestrator_checks() -> list[Check]:
     ]
 
 
-def ask(address: str, key: str = "") -> Answer:
+def ask(address: str, key: str = "") -> ServerAnswer:
     """The answer to a GET, whatever its status.
 
     Raises
@@ -78,7 +78,7 @@ def ask(address: str, key: str = "") -> Answer:
     except urllib.error.HTTPError as problem:
         with problem:
             status, head, body = problem.code, problem.headers, b""
-    return Answer(status, body.decode("utf-8", "replace"), _ahead(head.get("Date"), begun, time.time()))
+    return ServerAnswer(status, body.decode("utf-8", "replace"), _ahead(head.get("Date"), begun, time.time()))
 
 
 def _ahead(stated: str | None, begun: float, ended: float) -> float | None:
@@ -90,14 +90,14 @@ def _ahead(stated: str | None, begun: float, ended: float) -> float | None:
         return None
 
 
-def _reachable(shown: str, answer: Answer) -> Check:
+def _reachable(shown: str, answer: ServerAnswer) -> Check:
     if answer.status == HTTPStatus.OK:
         return Check(PART, "reachable", "good", shown)
     remedy = f"correct {VARIABLE}: it ends in /api"
     return Check(PART, "reachable", "fault", f"{shown} answers {answer.status}", "200 of a Prefect server", remedy)
 
 
-def _database(answer: Answer) -> Check:
+def _database(answer: ServerAnswer) -> Check:
     if answer.status == HTTPStatus.OK:
         return Check(PART, "database", "good", "ready")
     remedy = "look into the server's log: its database does not answer, or its disk is full"

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from inertial.noise.gauss_markov import FlickerTerms
     from pipelines.archive import Run
     from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.recording import Recording
+    from pipelines.export.recording import CorrectableRecording
 
     Array = NDArray[np.float64]
 
@@ -142,7 +142,7 @@ def _budget(run: Run, unit: str, size: int) -> Array | None:
     return matrix
 
 
-def corrected(recording: Recording, fit: FitOfUnit, tracking: Tracking | None) -> Corrected:
+def corrected(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking | None) -> Corrected:
     """The specific force of a recording, its covariance and, where ``tracking`` is given, the bias.
 
     Raises
@@ -171,7 +171,7 @@ def corrected(recording: Recording, fit: FitOfUnit, tracking: Tracking | None) -
     return _tracked(recording, fit, tracking, Corrected(force, covariance, None, None, None, None, outside))
 
 
-def _tracked(recording: Recording, fit: FitOfUnit, tracking: Tracking, plain: Corrected) -> Corrected:
+def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking, plain: Corrected) -> Corrected:
     noise = required_noise(fit.exported.noise, fit.exported.unit, fit.run, "of the bias")
     if not np.all(np.isfinite(noise.value["B"])):
         raise DataRejected(
@@ -222,7 +222,9 @@ def _rate_and_gaps(time: Array) -> tuple[float, NDArray[np.bool_]]:
     return float(usual.sum() / step[usual].sum()), np.concatenate([[False], ~usual])
 
 
-def _references(recording: Recording, tracking: Tracking, force: Array, per: int, rate: float) -> tuple[Array, Array]:
+def _references(
+    recording: CorrectableRecording, tracking: Tracking, force: Array, per: int, rate: float
+) -> tuple[Array, Array]:
     """True force (m, 3) and its magnitude (m,) at the steps, g; NaN where they are not known."""
     known = recording.known.copy()
     if tracking.force is not None:
@@ -244,7 +246,7 @@ def _means(values: Array, per: int) -> Array:
     return values[: steps * per].reshape(steps, per, *values.shape[1:]).mean(axis=1)
 
 
-def table_of(recording: Recording, done: Corrected) -> pd.DataFrame:
+def table_of(recording: CorrectableRecording, done: Corrected) -> pd.DataFrame:
     """One row per sample: time, force in g, standard uncertainties and covariances, and the bias where it is tracked, in µg."""
     columns: dict[str, Array] = {"time_s": recording.time}
     columns |= {f"force_{axis}_g": done.force[:, i] for i, axis in enumerate(AXES)}

@@ -49,7 +49,7 @@ _BIAS = 3 * ORDER
 
 
 @dataclass(frozen=True)
-class Block:
+class CoefficientBlock:
     """The content of one copy of the memory.
 
     scale : output per g of the form Q24; 0 for float32
@@ -86,7 +86,7 @@ def block_of(
     date: int,
     offsets: tuple[int, int, int],
     step: int,
-) -> Block:
+) -> CoefficientBlock:
     """The block of a unit's calibration.
 
     Parameters
@@ -113,12 +113,14 @@ def block_of(
     shared = (form, sequence, unit.unit, certificate, date, unit.temperatures)
     if form == "q24":
         whole = fixed_point(moved)
-        return Block(*shared, whole.scale, offsets, whole.bias.astype(np.float64), whole.inverse.astype(np.float64))
+        return CoefficientBlock(
+            *shared, whole.scale, offsets, whole.bias.astype(np.float64), whole.inverse.astype(np.float64)
+        )
     exact = [v.astype(np.float32).astype(np.float64) for v in (moved.bias, moved.response)]
-    return Block(*shared, 0.0, offsets, *exact)
+    return CoefficientBlock(*shared, 0.0, offsets, *exact)
 
 
-def pack(block: Block) -> bytes:
+def pack(block: CoefficientBlock) -> bytes:
     """The bytes of a block."""
     head = struct.pack(
         HEAD, MAGIC, VERSION, FORMS[block.form], LENGTH, 0, block.sequence, block.unit.encode(), block.certificate,
@@ -131,7 +133,7 @@ def pack(block: Block) -> bytes:
     return body + struct.pack("<I", zlib.crc32(body))
 
 
-def unpack(content: bytes) -> Block | None:
+def unpack(content: bytes) -> CoefficientBlock | None:
     """The block in a memory; None where there is none, or it is not intact: erased, all zero, half written, damaged."""
     data = content[:LENGTH]
     if len(data) < LENGTH or not data.startswith(MAGIC) or zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
@@ -145,7 +147,7 @@ def unpack(content: bytes) -> Block | None:
     kind = "f" if named == "float32" else "i"
     values = np.array(struct.unpack_from(f"<{COEFFICIENTS}{kind}", data, struct.calcsize(HEAD)), dtype=np.float64)
     x, y, z = offsets[:3]
-    return Block(
+    return CoefficientBlock(
         named, sequence, unit.rstrip(b"\0").decode("utf-8", "replace"), certificate, date, (low, high), scale, (x, y, z),
         values[:_BIAS].reshape(ORDER, 3), values[_BIAS:].reshape(ORDER, 3, 3),
     )  # fmt: skip

@@ -58,7 +58,7 @@ class UnitCalibration:
     @property
     def certified(self) -> str:
         """State of the certificate, in one line."""
-        return "not certified" if self.certificate is None else self.certificate.words()
+        return "not certified" if self.certificate is None else self.certificate.sentence()
 
     def correct(self, output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
         """Specific force (n, 3) in g for outputs (n, 3), as firmware computes it."""

@@ -27,7 +27,7 @@ USUAL = (("x", "y", "z"), ("out_x", "out_y", "out_z"))
 
 
 @dataclass(frozen=True)
-class Recording:
+class CorrectableRecording:
     """Samples in order of time.
 
     time : (n,), s; output : (n, 3), output unit
@@ -43,7 +43,9 @@ class Recording:
     name: str
 
 
-def read_recording(path: Path, columns: Sequence[str], *, time: str = "", rate_hz: float | None = None) -> Recording:
+def read_recording(
+    path: Path, columns: Sequence[str], *, time: str = "", rate_hz: float | None = None
+) -> CorrectableRecording:
     """The recording of a file of samples.
 
     Parameters
@@ -78,7 +80,7 @@ def read_recording(path: Path, columns: Sequence[str], *, time: str = "", rate_h
     known = np.full((n, 3), np.nan)
     if set(FORCE_COLUMNS) <= set(there):
         known = np.stack([_numbers(table[name]) for name in FORCE_COLUMNS], axis=1)
-    return Recording(moments, output, _state(table, moments, {*chosen, time or TIME}, where), known, where)
+    return CorrectableRecording(moments, output, _state(table, moments, {*chosen, time or TIME}, where), known, where)
 
 
 def _state(table: pd.DataFrame, time: Array, used: set[str], where: str) -> State:

@@ -18,7 +18,7 @@ from pipelines.flows.archive_address import archive_of
 from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
-from pipelines.inquiry.loop import Consent, Participants, Settings, always, run_inquiry
+from pipelines.inquiry.loop import Consent, InquirySettings, Participants, always, run_inquiry
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -87,11 +87,11 @@ def investigate(  # noqa: PLR0913 - the parameters of a flow are the form on the
     participants = _participants[-1] if _participants else Participants()
     approve = PausedApproval(Paused()) if ask else (participants.approve if _participants else always)
     at = Participants(_stage, approve, participants.progress, participants.stage_done, participants.diagnosed)
-    return run_inquiry(job, store, Settings(tuple(effects or ()), budget_min, unseen), at)
+    return run_inquiry(job, store, InquirySettings(tuple(effects or ()), budget_min, unseen), at)
 
 
 def investigate_locally(
-    request: Request, archive: Archive, settings: Settings, participants: Participants, *, ask: bool
+    request: Request, archive: Archive, settings: InquirySettings, participants: Participants, *, ask: bool
 ) -> dict[str, Any]:
     """Run the flow on the server of PREFECT_API_URL or on a temporary one; return the document of the inquiry."""
     archive.prepare()

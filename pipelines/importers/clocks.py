@@ -42,7 +42,7 @@ _HOUR_S = 3600.0
 
 
 @dataclass(frozen=True)
-class Clock:
+class RecordingClock:
     """Seconds (n,) from any beginning, and how the column was read."""
 
     seconds: NDArray[np.float64]
@@ -194,7 +194,7 @@ def is_stamps(column: pd.Series) -> bool:
     return bool(len(some)) and bool(pd.to_numeric(some, errors="coerce").isna().mean() > 0.5)
 
 
-def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, where: str) -> Clock:
+def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, where: str) -> RecordingClock:
     """Seconds of a column of numbers.
 
     Parameters
@@ -222,7 +222,7 @@ def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, wh
         )
     unit = claimed or found.unit or "s"
     seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # the difference keeps the digits of Unix time in ns
-    return Clock(
+    return RecordingClock(
         seconds,
         unit,
         _doubts(step, unit, found, column) if claimed else (_reading(column, unit, found, step, len(numbers)),),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -137,3 +137,80 @@ class WaveformImport(TypedDict):
     records: int
     figures: list[WaveformFigure]
     text: list[str]
+
+
+class SourcePart(TypedDict):
+    """A file of a recording."""
+
+    path: str
+    sha256: str
+    bytes: int
+    form: str
+
+
+class SourceDocument(SourcePart):
+    """What was imported: a file, or several that were joined."""
+
+    files: NotRequired[Annotated[list[SourcePart], "of a recording in several files"]]
+
+
+class DwellDocument(TypedDict):
+    """A dwell of an import."""
+
+    dwell: int
+    label: str
+    start_s: float
+    end_s: float
+    n: Annotated[int | None, "samples; null: the file has dwells only"]
+    mean: Annotated[list[float], "by axis"]
+    sd: Annotated[list[float] | None, "by axis"]
+    residual_ug: Annotated[float | None, "of the norm of gravity; null: no such fit"]
+    influence: Annotated[float | None, "Cook's distance; above 1 the dwell dominates the fit"]
+
+
+class ImportDocument(TypedDict):
+    """``import FILE… --json``: a recording in the archive, with its fit. Keys after `dwell_list` are those of the fit."""
+
+    run: str
+    source: SourceDocument
+    units: list[str]
+    out_unit: str
+    samples: int
+    dwells: int
+    remarks: list[str]
+    faults: list[SampleFaultDocument]
+    fit: Annotated[Literal["norm", "plane", "faces", "temperature"] | None, "null: no fit"]
+    adequate: Annotated[bool | None, "null: cannot be judged, or no fit"]
+    lines: Annotated[list[str], "the fit in words"]
+    dwell_list: list[DwellDocument]
+    reason: NotRequired[Annotated[str | None, "why it is not adequate, or cannot be judged"]]
+    error: NotRequired[Annotated[dict[str, Any], "residual and noise, µg: `rms_ug`, `floor_ug`, `p_value` and others"]]
+    evidence: NotRequired[Annotated[Any, "of `norm`, as in `diagnose --json`"]]
+    leave_out: NotRequired[Annotated[Any, "of `norm`, as in `diagnose --json`"]]
+    missing: NotRequired[Annotated[list[list[str]], "of `norm`: classes of effects that are missing"]]
+    bias: NotRequired[Annotated[list[float], "by axis, in `out_unit`"]]
+    bias_less_six_parameters: NotRequired[
+        Annotated[list[float] | None, "of `norm`: what the six-parameter fit has less"]
+    ]
+    bias_u_record: NotRequired[Annotated[list[float], "of `norm`: standard uncertainty as the bias of this record"]]
+    bias_u_day: NotRequired[Annotated[list[float], "of `norm`: the same as the bias of any day"]]
+    bias_u: NotRequired[Annotated[list[float], "of `plane`: standard uncertainty"]]
+    response_per_g: NotRequired[Annotated[list[list[float]], "(3, 3), `out_unit` per g"]]
+    response_u: NotRequired[Annotated[list[list[float]], "of `plane`: standard uncertainty"]]
+    scale_per_m_s2: NotRequired[Annotated[list[float], "by axis"]]
+    published: NotRequired[Annotated[dict[str, Any], "of `faces`: the published method"]]
+    least_squares: NotRequired[Annotated[dict[str, Any], "of `faces`: bias, response, standard errors, residuals"]]
+    across: NotRequired[Annotated[str, "of `plane`: the axis across the plane"]]
+    open: NotRequired[Annotated[list[str], "of `plane`: what the plane does not show"]]
+    temperature_offset_per_C: NotRequired[Annotated[list[float] | None, "of `norm`: change of the bias, µg/K"]]
+    reference_C: NotRequired[float | None]
+    coefficients: NotRequired[Annotated[list[list[float]], "of `temperature`: cubic of each axis"]]
+    residual_rms: NotRequired[Annotated[list[float], "of `temperature`, in `out_unit`"]]
+    noise: NotRequired[Annotated[list[float], "of `temperature`, in `out_unit`"]]
+
+
+class ImportsDocument(TypedDict):
+    """``import FILE FILE… --json``: several recordings, each in its own run."""
+
+    imports: list[ImportDocument]
+    adequate: Annotated[bool | None, "false if one fit is not adequate; null if one cannot be judged"]

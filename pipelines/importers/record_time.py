@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers import clocks, values
-from pipelines.importers.clocks import Clock
+from pipelines.importers.clocks import RecordingClock
 from pipelines.importers.mapping import TIME_UNITS, Mapping
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
@@ -38,7 +38,7 @@ def seconds(
     breaks: Sequence[int],
     *,
     dwells: bool = False,
-) -> Clock:
+) -> RecordingClock:
     """Seconds of every row from any beginning.
 
     Parameters
@@ -74,7 +74,7 @@ def seconds(
     return clock
 
 
-def _continued(clock: Clock) -> Clock:
+def _continued(clock: RecordingClock) -> RecordingClock:
     """A clock without steps back: where it restarts, it goes on one usual step after the sample before."""
     steps = np.diff(clock.seconds)
     back = steps < 0.0
@@ -83,33 +83,33 @@ def _continued(clock: Clock) -> Clock:
     usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     time = clock.seconds[0] + np.concatenate([[0.0], np.cumsum(np.where(back, usual, steps))])
     remark = f"the clock restarts {int(back.sum())} times between dwells; it is continued, so the time between them is unknown"
-    return Clock(time, clock.unit, (*clock.remarks, remark))
+    return RecordingClock(time, clock.unit, (*clock.remarks, remark))
 
 
 def _clock(
     columns: Columns[str, pd.Series], mapping: Mapping, stated: Columns[str, str], where: str, *, dwells: bool
-) -> Clock:
+) -> RecordingClock:
     time = columns.get("time")
     if time is not None and values.is_moment(time):
-        return Clock(values.seconds(time, where), "s", ())
+        return RecordingClock(values.seconds(time, where), "s", ())
     if time is not None and clocks.is_stamps(time) and mapping.units.time != "samples":
-        return Clock(clocks.stamps(time, where), "s", ())
+        return RecordingClock(clocks.stamps(time, where), "s", ())
     if time is None or mapping.units.time == "samples":
         if mapping.rate_hz is None:
             raise WrongUse(
                 f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
             )
         count = np.arange(len(columns["x"]), dtype=np.float64) if time is None else finite(time, where)
-        return Clock(count / mapping.rate_hz, "samples", ())
+        return RecordingClock(count / mapping.rate_hz, "samples", ())
     numbers = finite(time, where)
     name = str(time.name)
     if dwells:
         found = clocks.recognised(numbers, name, stated.get(name, ""))
         own = found.unit if not found.reason.startswith("steps") else ""
         unit = mapping.units.time or own or "s"
-        return Clock(numbers * TIME_UNITS[unit], unit, ())
+        return RecordingClock(numbers * TIME_UNITS[unit], unit, ())
     if np.all(numbers == numbers[0]):
-        return Clock(np.zeros(len(numbers)), "s", ())
+        return RecordingClock(np.zeros(len(numbers)), "s", ())
     return clocks.clock(numbers, name, mapping.units.time, stated.get(name, ""), where)
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Source(files.SourceFile):
+class JoinedSource(files.SourceFile):
     """The source of a recording; the files if it has several."""
 
     parts: tuple[files.SourceFile, ...] = ()
@@ -60,7 +60,7 @@ def read(
     else:
         joined, breaks = _after(contents, names, time)
     digest = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
-    about = Source(
+    about = JoinedSource(
         " + ".join(one.path for one in sources), digest, sum(one.size for one in sources), sources[0].form, sources
     )
     return joined, about, breaks

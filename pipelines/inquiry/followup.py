@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from inertial.criticism.menus import Reach
+from inertial.criticism.menus import TableReach
 from inertial.criticism.proposals import Circumstances
 from inertial.planning.sequences import SequenceStep, StationPace
 from pipelines.jobs.job import Job
@@ -61,7 +61,7 @@ def circumstances(base: Job, last: Job, budget: float) -> Circumstances:
     station, recipe, station_state = base.station, base.recipe, state_after(last)
     limits = station.limits
     low, high = min(recipe.temperatures_C), max(recipe.temperatures_C)
-    reach = Reach(
+    reach = TableReach(
         outer=_radians(limits.outer_deg),
         inner=_radians(limits.inner_deg),
         temperature=(low, high) if high - low > VARIED_K else None,

@@ -123,9 +123,9 @@ class Inquiry:
         if diagnosis is None:
             return Ending("blocked", "every unit has a data fault")
         left = self.budget - self.spent
-        affordable = joint.following.found
+        affordable = joint.following.separating
         if not affordable:
-            proposals = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).found
+            proposals = proposed(diagnosis, circumstances(self.base, self.jobs[-1], float("inf"))).separating
             if not proposals:
                 return Ending("nothing_parts", no_follow_up(joint))
             needed = sum(p.minutes for p in proposals)

@@ -54,7 +54,7 @@ def directly(name: str, runner: Runner) -> Done:
 
 
 @dataclass(frozen=True)
-class Settings:
+class InquirySettings:
     """Settings of an inquiry.
 
     effects : ids of the model to diagnose; the recipe's where empty
@@ -85,7 +85,7 @@ class Participants:
     diagnosed: Callable[[JointDiagnosis], None] = lambda _joint: None
 
 
-def run_inquiry(job: Job, archive: Archive, settings: Settings, participants: Participants) -> dict[str, Any]:
+def run_inquiry(job: Job, archive: Archive, settings: InquirySettings, participants: Participants) -> dict[str, Any]:
     """The document of an inquiry, run until it ends.
 
     An inquiry that was interrupted continues: completed stages are not repeated, and a follow-up that was started is completed

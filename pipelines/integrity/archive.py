@@ -16,7 +16,7 @@ from pipelines.integrity.calibrations import check_shard
 from pipelines.integrity.captures import check_capture, check_strangers
 from pipelines.integrity.causes import by_cause
 from pipelines.integrity.chain import check_chain
-from pipelines.integrity.findings import MISSING, SIGNATURE, CheckedPart, IntegrityFinding
+from pipelines.integrity.findings import MISSING, SIGNATURE, IntegrityFinding, VerifiedPart
 from pipelines.integrity.packs import check_packs
 from pipelines.integrity.runs import check_run
 from pipelines.integrity.seals import check_seals
@@ -43,7 +43,7 @@ class Report:
     trust : sentence about the signatures.
     """
 
-    checked: CheckedPart
+    checked: VerifiedPart
     head: str
     trust: str
     runs: int
@@ -87,7 +87,7 @@ def verify(
     keys: Mapping[str, Ed25519PublicKey],
     demanded: bool = False,
     head: str = "",
-    also: Sequence[Callable[[Archive, CheckedPart], None]] = (),
+    also: Sequence[Callable[[Archive, VerifiedPart], None]] = (),
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
     """Verify an archive.
@@ -102,12 +102,12 @@ def verify(
     """
     from schemas import tables
 
-    start, total = time.perf_counter(), CheckedPart(archive.root, keys)
+    start, total = time.perf_counter(), VerifiedPart(archive.root, keys)
     there = _below(archive.root / "captures")  # before the runs: each run is there before its capture
     chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
     captures = _captures(archive, chosen) if runs else there
     shards = [] if runs else _below(archive.root / "calibrations")
-    tasks: list[Callable[[], CheckedPart]] = [
+    tasks: list[Callable[[], VerifiedPart]] = [
         *(lambda run=run: check_run(run, total.blank(), tables.VERSION) for run in chosen),
         *(lambda path=path: check_capture(path, total.blank(), tables.VERSION) for path in captures),
         *(lambda shard=shard: check_shard(shard, total.blank()) for shard in shards),
@@ -143,7 +143,7 @@ def _captures(archive: Archive, runs: Sequence[Run]) -> list[Place]:
     return [archive.root / "captures" / name for name in named if name and (archive.root / "captures" / name).is_dir()]
 
 
-def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: CheckedPart) -> None:
+def _check_owners(runs: Sequence[Run], captures: Sequence[Place], total: VerifiedPart) -> None:
     """Every capture has a run that it was measured for."""
     named: set[str] = set()
     for run in runs:
@@ -165,7 +165,7 @@ def _below(folder: Place) -> list[Place]:
     return sorted((place for place in folder.iterdir() if place.is_dir()), key=lambda place: place.name)
 
 
-def _report_untrusted(total: CheckedPart, *, demanded: bool) -> None:
+def _report_untrusted(total: VerifiedPart, *, demanded: bool) -> None:
     """Report manifests without a trusted signature: a finding where a signature is required, a remark where others are signed."""
     for state, names in total.untrusted.items():
         what = "is not signed" if state == UNSIGNED else "is signed with a key that is not known here"
@@ -180,7 +180,7 @@ def _report_untrusted(total: CheckedPart, *, demanded: bool) -> None:
             total.remarks += [f"{shown} {what.replace('is', 'are', 1) if len(names) > 1 else what}"] if names else []
 
 
-def _trust(total: CheckedPart) -> str:
+def _trust(total: VerifiedPart) -> str:
     """Sentence about the signatures."""
     count, signatures = total.manifests, total.signatures
     if signatures[UNSIGNED] == count:

@@ -13,12 +13,12 @@ from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.integrity.findings import CheckedPart
+    from pipelines.integrity.findings import VerifiedPart
 
 REMEDY = "remove the file, it is made again automatically"
 
 
-def check_list(archive: Archive, checked: CheckedPart) -> None:
+def check_list(archive: Archive, checked: VerifiedPart) -> None:
     """Lines of the list must agree with the runs, where these were not changed since."""
     place = archive.root / "index" / "list.json"
     lines, state = stored_lines(place)
@@ -36,7 +36,7 @@ def check_list(archive: Archive, checked: CheckedPart) -> None:
             checked.wrong(CHANGED, place, f"disagrees with the files of run {name}: {REMEDY}")
 
 
-def check_ledger_index(archive: Archive, checked: CheckedPart) -> None:
+def check_ledger_index(archive: Archive, checked: VerifiedPart) -> None:
     """Events of the index must agree with the files of the ledger, where these were not changed since."""
     stamps = stamps_of(archive.root / FOLDER)
     for digit in DIGITS:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from pipelines.archive import files
 from pipelines.archive.hash_chain import is_number
 from pipelines.certificates.entries import SCHEMA, folder_of
-from pipelines.integrity.findings import CHANGED, EDITED, MISSING, CheckedPart
+from pipelines.integrity.findings import CHANGED, EDITED, MISSING, VerifiedPart
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 
-def check_shard(shard: Place, checked: CheckedPart) -> CheckedPart:
+def check_shard(shard: Place, checked: VerifiedPart) -> VerifiedPart:
     """Check the units of one part of the ledger."""
     known: dict[Place, str] = {}
     for folder in sorted((place for place in shard.iterdir() if place.is_dir()), key=lambda place: place.name):
@@ -41,7 +41,7 @@ def check_shard(shard: Place, checked: CheckedPart) -> CheckedPart:
     return checked
 
 
-def _check_evidence(place: Place, content: dict[str, Any], known: dict[Place, str], checked: CheckedPart) -> None:
+def _check_evidence(place: Place, content: dict[str, Any], known: dict[Place, str], checked: VerifiedPart) -> None:
     """Compare the evidence of a certificate with the files of its run."""
     if content.get("action") == "revoke":
         return

@@ -9,13 +9,13 @@ from pipelines.archive import files
 from pipelines.archive.capture_journal import FOLDER, Events
 from pipelines.archive.hash_chain import is_number
 from pipelines.archive.records import COMPLETE
-from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, CheckedPart
+from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, VerifiedPart
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
 
 
-def check_capture(path: Place, checked: CheckedPart, schema: int) -> CheckedPart:
+def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPart:
     """Check a capture."""
     records: list[tuple[dict[str, Any], str, Place]] = []
     unusable: Place | None = None
@@ -49,7 +49,7 @@ def check_capture(path: Place, checked: CheckedPart, schema: int) -> CheckedPart
     return checked
 
 
-def check_strangers(folder: Place, known: set[str], checked: CheckedPart) -> None:
+def check_strangers(folder: Place, known: set[str], checked: VerifiedPart) -> None:
     """Tables in a folder that the archive did not write."""
     for place in sorted(folder.iterdir(), key=lambda one: one.name) if folder.is_dir() else ():
         if place.suffix == ".parquet" and place.name not in known and place.is_file():
@@ -60,7 +60,7 @@ def check_strangers(folder: Place, known: set[str], checked: CheckedPart) -> Non
             )
 
 
-def _check_order(records: list[tuple[dict[str, Any], str, Place]], checked: CheckedPart) -> None:
+def _check_order(records: list[tuple[dict[str, Any], str, Place]], checked: VerifiedPart) -> None:
     """Every record names the record before it; the first record in an archive of an older version names none."""
     before = ""
     for count, (content, own, folder) in enumerate(records):
@@ -76,7 +76,7 @@ def _check_order(records: list[tuple[dict[str, Any], str, Place]], checked: Chec
 
 
 def _check_end(
-    path: Place, records: list[tuple[dict[str, Any], str, Place]], checked: CheckedPart, schema: int
+    path: Place, records: list[tuple[dict[str, Any], str, Place]], checked: VerifiedPart, schema: int
 ) -> None:
     end = path / COMPLETE
     if not end.is_file():
@@ -97,7 +97,7 @@ def _check_end(
         checked.wrong(EDITED, records[-1][2] / "record.json", "is not the last manifest of the finished capture")
 
 
-def _check_events(path: Place, expected: dict[str, str], checked: CheckedPart) -> None:
+def _check_events(path: Place, expected: dict[str, str], checked: VerifiedPart) -> None:
     """Compare the journal with its hashes in the last file of the capture."""
     actual = Events(path).hashes()
     for name in sorted({*expected, *actual}):
@@ -110,7 +110,7 @@ def _check_events(path: Place, expected: dict[str, str], checked: CheckedPart) -
             checked.wrong(CHANGED, place, "differs from the event in the journal of the finished capture")
 
 
-def _check_state(path: Place, last: tuple[dict[str, Any], str, Place], checked: CheckedPart) -> None:
+def _check_state(path: Place, last: tuple[dict[str, Any], str, Place], checked: VerifiedPart) -> None:
     """Compare the state of the station, from which the capture continues, with the hash in its record."""
     expected = last[0].get("state")
     if expected is None:  # older versions did not store it

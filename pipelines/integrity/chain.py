@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from pipelines.archive import files, hash_chain
-from pipelines.integrity.findings import EDITED, MISSING, CheckedPart
+from pipelines.integrity.findings import EDITED, MISSING, VerifiedPart
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
@@ -31,7 +31,7 @@ class Chain:
     differing: set[str] = field(default_factory=set[str])
 
 
-def check_chain(root: Place, checked: CheckedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
+def check_chain(root: Place, checked: VerifiedPart, *, only: set[str] | None = None, head: str = "") -> Chain:
     """Read and check the chain; findings go into ``checked``.
 
     Parameters
@@ -81,7 +81,7 @@ def _files(named: dict[str, str]) -> dict[str, str]:
     return {k: v for k, v in named.items() if ".." not in PurePosixPath(k).parts and not k.startswith("/")}
 
 
-def _is_sealed(root: Place, name: str, expected: str, checked: CheckedPart) -> bool:
+def _is_sealed(root: Place, name: str, expected: str, checked: VerifiedPart) -> bool:
     """Whether a file is there as it was sealed."""
     place = root / name
     try:

@@ -45,7 +45,7 @@ class IntegrityFinding:
 
 
 @dataclass
-class CheckedPart:
+class VerifiedPart:
     """Findings in a part of the archive, and the amount of data read.
 
     Parameters
@@ -66,11 +66,11 @@ class CheckedPart:
     rows: int = 0
     bytes: int = 0
 
-    def blank(self) -> CheckedPart:
+    def blank(self) -> VerifiedPart:
         """A new part of the same archive with the same keys, without findings."""
-        return CheckedPart(self.root, self.keys)
+        return VerifiedPart(self.root, self.keys)
 
-    def add(self, other: CheckedPart) -> None:
+    def add(self, other: VerifiedPart) -> None:
         """Add the findings and counts of another part."""
         self.findings += other.findings
         self.remarks += other.remarks

@@ -15,12 +15,12 @@ from pipelines.integrity.findings import CHANGED, MISSING, UNREADABLE
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.integrity.findings import CheckedPart
+    from pipelines.integrity.findings import VerifiedPart
 
 REMEDY = "restore it from a copy"
 
 
-def check_packs(archive: Archive, checked: CheckedPart) -> None:
+def check_packs(archive: Archive, checked: VerifiedPart) -> None:
     """The findings about the packs of an archive; those in an object store have none."""
     if not isinstance(archive.root, Path):
         return

@@ -11,7 +11,7 @@ from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import START
 from pipelines.archive.store import ObjectPath
 from pipelines.certificates.libraries import differing_libraries
-from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, CheckedPart
+from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, VerifiedPart
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
@@ -21,7 +21,7 @@ OURS = ("run.json", SEALED, "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")
 
 
-def check_run(run: Run, checked: CheckedPart, schema: int) -> CheckedPart:
+def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
     """Check a run."""
     names = {place.name: place for place in run.path.iterdir()}
     left = any(name.startswith(files.TEMPORARY) for name in names)
@@ -61,7 +61,7 @@ def _check_links(
     content: dict[str, Any],
     manifests: dict[str, dict[str, Any]],
     hashes: dict[str, str],
-    checked: CheckedPart,
+    checked: VerifiedPart,
 ) -> None:
     """Compare a manifest with its own key, and with the manifests that it names."""
     if all(name in content for name in KEYED) and all(
@@ -91,7 +91,7 @@ def _check_links(
             checked.wrong(MISSING, place.parent / f"{name}.json", f"is missing, {place.stem} was made from it")
 
 
-def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, Any]], checked: CheckedPart) -> None:
+def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, Any]], checked: VerifiedPart) -> None:
     """Compare the capture with the one from which the tables of the run were made."""
     if not capture:
         return
@@ -109,7 +109,7 @@ def _check_capture_link(run: Run, capture: str, manifests: dict[str, dict[str, A
             return
 
 
-def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: CheckedPart) -> None:
+def _check_others(run: Run, names: dict[str, Place], manifests: dict[str, Any], checked: VerifiedPart) -> None:
     """Files in the folder of a run that no manifest names."""
     for name, place in sorted(names.items()):
         if name.startswith(files.TEMPORARY):

@@ -15,7 +15,7 @@ from pipelines.archive.keys import digest
 from pipelines.archive.listing import stages_of
 from pipelines.archive.provenance import provenance
 from pipelines.archive.signatures import ENTRY
-from pipelines.integrity.findings import EDITED, MISSING, UNCHAINED, UNREADABLE, CheckedPart
+from pipelines.integrity.findings import EDITED, MISSING, UNCHAINED, UNREADABLE, VerifiedPart
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ OF_ANOTHER = "is the seal of another run"
 REMEDY = "it was copied here, its entry was removed, or its writer was killed: see 'tumbleline archive clean'"
 
 
-def check_seals(root: Place, runs: Sequence[Run], chain: Chain, checked: CheckedPart, *, everything: bool) -> None:
+def check_seals(root: Place, runs: Sequence[Run], chain: Chain, checked: VerifiedPart, *, everything: bool) -> None:
     """Compare finished runs with the chain, and in a check of the whole archive also calibrations and releases."""
     for run in runs:
         _check_run(run, chain, checked)
@@ -42,7 +42,7 @@ def check_seals(root: Place, runs: Sequence[Run], chain: Chain, checked: Checked
             _check_evidence(place, checked)
 
 
-def _check_run(run: Run, chain: Chain, checked: CheckedPart) -> None:
+def _check_run(run: Run, chain: Chain, checked: VerifiedPart) -> None:
     mark = run.path / MARK
     if not mark.is_file():
         _check_unsealed(run, chain, checked)
@@ -74,7 +74,7 @@ def _check_run(run: Run, chain: Chain, checked: CheckedPart) -> None:
         _check_stages(run, content, checked)
 
 
-def _check_stages(run: Run, content: dict[str, Any], checked: CheckedPart) -> None:
+def _check_stages(run: Run, content: dict[str, Any], checked: VerifiedPart) -> None:
     """The stages in a seal, which lists show, must be the stages that made the tables."""
     named = {name.rpartition("/")[2] for name in content["files"] if name.startswith("runs/")}
     there = {place.name for place in run.path.glob("*.json") if place.name != MARK}
@@ -85,7 +85,7 @@ def _check_stages(run: Run, content: dict[str, Any], checked: CheckedPart) -> No
         return
 
 
-def _check_unsealed(run: Run, chain: Chain, checked: CheckedPart) -> None:
+def _check_unsealed(run: Run, chain: Chain, checked: VerifiedPart) -> None:
     """A run without a seal: unfinished, made by a version without a chain, or a finding."""
     own = f"runs/{run.id}/"
     if any(name.startswith(own) for name in chain.sealed):
@@ -101,7 +101,7 @@ def _check_unsealed(run: Run, chain: Chain, checked: CheckedPart) -> None:
         _report(run.path / REPORT, content, checked)
 
 
-def _check_named(places: Iterable[Place], chain: Chain, checked: CheckedPart) -> None:
+def _check_named(places: Iterable[Place], chain: Chain, checked: VerifiedPart) -> None:
     for place in sorted(places, key=str):
         if is_number(place.stem) and checked.name(place).replace("\\", "/") not in chain.sealed:
             try:
@@ -110,7 +110,7 @@ def _check_named(places: Iterable[Place], chain: Chain, checked: CheckedPart) ->
                 continue
 
 
-def _check_evidence(place: Place, checked: CheckedPart) -> None:
+def _check_evidence(place: Place, checked: VerifiedPart) -> None:
     """The evidence of a release has the hash of its content in its name; provenance is not part of it."""
     try:
         content = files.read_json(place)
@@ -122,7 +122,7 @@ def _check_evidence(place: Place, checked: CheckedPart) -> None:
         checked.wrong(EDITED, place, "was edited: its name does not agree with its content")
 
 
-def _report(place: Place, content: dict[str, Any], checked: CheckedPart) -> None:
+def _report(place: Place, content: dict[str, Any], checked: VerifiedPart) -> None:
     if _is_recent(str(content.get("when", ""))):
         checked.remarks.append(
             f"{checked.name(place)} is not in the chain yet: its writer is still active, or was killed a moment ago"

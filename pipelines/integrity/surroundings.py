@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Archive
     from pipelines.archive.store import Place
-    from pipelines.integrity.findings import CheckedPart
+    from pipelines.integrity.findings import VerifiedPart
 
 OURS = re.compile(
     r"archive\.json|(index|orchestrator)/.*|.*\.parquet"
@@ -30,7 +30,7 @@ KEY_MARK, KEY_BYTES = b"PRIVATE KEY-----", 16_384
 SHOWN = 10
 
 
-def check_mark(archive: Archive, checked: CheckedPart) -> None:
+def check_mark(archive: Archive, checked: VerifiedPart) -> None:
     """The file ``archive.json``, which the chain does not name, must have its constant content."""
     place, expected = archive.root / "archive.json", archive.mark
     try:
@@ -45,7 +45,7 @@ def check_mark(archive: Archive, checked: CheckedPart) -> None:
         checked.wrong(CHANGED, place, f"is not the content of every archive, which is {expected.decode().split()}")
 
 
-def check_surroundings(archive: Archive, checked: CheckedPart) -> None:
+def check_surroundings(archive: Archive, checked: VerifiedPart) -> None:
     """Every file and link of a local archive that is not the archive's own."""
     if not isinstance(archive.root, Path):  # an object store has no links, and its listing is slow
         return
@@ -64,7 +64,7 @@ def check_surroundings(archive: Archive, checked: CheckedPart) -> None:
         checked.remarks.append(f"{', '.join(strangers[:SHOWN])}{more}: not written by the archive")
 
 
-def check_links(archive: Archive, folders: Iterable[Place], checked: CheckedPart) -> None:
+def check_links(archive: Archive, folders: Iterable[Place], checked: VerifiedPart) -> None:
     """Links in the given folders of a local archive: for checks of a part of the archive."""
     for folder in folders:
         if isinstance(folder, Path) and isinstance(archive.root, Path):
@@ -81,7 +81,7 @@ def _all(root: Path) -> Iterator[tuple[str, Path]]:
             yield place.relative_to(root).as_posix(), place
 
 
-def _check_link(name: str, place: Path, checked: CheckedPart) -> None:
+def _check_link(name: str, place: Path, checked: VerifiedPart) -> None:
     """A link is no file of the archive: its target can be changed elsewhere. Top folders may be links to another disk."""
     if "/" in name:
         what = f"is a link to {os.readlink(place)}: replace it by the content"  # noqa: PTH115 - as it was written

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tomlkit.items import Array, Table
 
     from pipelines.archive import Run
-    from schemas.model import ModelChange, ModelFile
+    from schemas.model import ModelFile, VersionStep
 
 STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 """The effects of a new model file: the standard thermal model."""
@@ -51,7 +51,7 @@ class Version:
     effects: tuple[str, ...]
     added: tuple[str, ...]
     removed: tuple[str, ...]
-    change: ModelChange | None
+    change: VersionStep | None
 
 
 def read_model(path: Path) -> ModelFile:

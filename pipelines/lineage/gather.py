@@ -10,7 +10,7 @@ from pipelines.archive.listing import SEALED
 from pipelines.archive.records import COMPLETE
 from pipelines.certificates.entries import folder_of
 from pipelines.certificates.ledger import Ledger
-from pipelines.lineage.graph import Activity, Graph, Node
+from pipelines.lineage.graph import Graph, Node, ProvActivity
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive, Run
@@ -45,7 +45,7 @@ class Gatherer:
             if other is not None:
                 self.run(other)
         self.graph.put(
-            Activity(
+            ProvActivity(
                 id=f"start of {run.id}",
                 name="run again" if about.get("rerun_of") else "start",
                 used=(*settings, *(f"runs/{name}" for name in earlier if f"runs/{name}" in self.graph.nodes)),
@@ -109,7 +109,7 @@ class Gatherer:
         step = {key: about[key] for key in ("who", "where", "when") if key in about} | {"capture": capture}
         if (top / COMPLETE).is_file():
             step["complete"] = files.sha256(top / COMPLETE)
-        self.graph.put(Activity(f"capture {capture}", "capture", tuple(settings), tuple(ids), step))
+        self.graph.put(ProvActivity(f"capture {capture}", "capture", tuple(settings), tuple(ids), step))
         return ids
 
     def _tables(self, run: Run, raw: list[str], start: str) -> None:
@@ -138,7 +138,7 @@ class Gatherer:
                 used += raw if name == RAW else [self._input(run, name, str(value), manifests)]
             made = tuple(f"runs/{run.id}/{'report.html' if n == 'report' else f'{n}.parquet'}" for n in names)
             about = {key: content[key] for key in MADE if key in content}
-            self.graph.put(Activity(step, str(content.get("stage")), tuple(used), made, about))
+            self.graph.put(ProvActivity(step, str(content.get("stage")), tuple(used), made, about))
 
     def _input(self, run: Run, name: str, value: str, manifests: dict[str, Any]) -> str:
         if name in manifests:
@@ -153,7 +153,7 @@ class Gatherer:
         name = self.graph.add(Node(place, "certificate", one.certificate, place, about=one.document()))
         rests = tuple(f"runs/{event.run}/{table}.parquet" for table, _ in event.evidence)
         used = tuple(node for node in (*rests, f"runs/{event.run}") if node in self.graph.nodes)
-        self.graph.put(Activity(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
+        self.graph.put(ProvActivity(f"{event.action} {event.certificate}", event.action, used, (name,), _by(event)))
         if one.ended_by is not None and one.ended_by.action == "revoke":
             ended = one.ended_by
             revocation = f"{folder_of(ended.serial)}/{ended.sequence:06d}.json"
@@ -166,7 +166,7 @@ class Gatherer:
                     about={"reason": ended.reason},
                 )
             )
-            self.graph.put(Activity(f"revoke {ended.certificate}", "revoke", (name,), (revocation,), _by(ended)))
+            self.graph.put(ProvActivity(f"revoke {ended.certificate}", "revoke", (name,), (revocation,), _by(ended)))
         return name
 
 

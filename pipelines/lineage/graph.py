@@ -33,7 +33,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Activity:
+class ProvActivity:
     """A step that made nodes from other nodes.
 
     Parameters
@@ -56,28 +56,28 @@ class Graph:
     """Nodes and steps by id."""
 
     nodes: dict[str, Node] = field(default_factory=dict[str, Node])
-    steps: dict[str, Activity] = field(default_factory=dict[str, Activity])
+    steps: dict[str, ProvActivity] = field(default_factory=dict[str, ProvActivity])
 
     def add(self, node: Node) -> str:
         """Add a node unless it exists; return its id."""
         self.nodes.setdefault(node.id, node)
         return node.id
 
-    def put(self, step: Activity) -> None:
+    def put(self, step: ProvActivity) -> None:
         """Add a step."""
         self.steps[step.id] = step
 
-    def made_by(self) -> dict[str, list[Activity]]:
+    def made_by(self) -> dict[str, list[ProvActivity]]:
         """The steps that made a node, by its id; a calibration that another step ended has several."""
-        steps_of: dict[str, list[Activity]] = {}
+        steps_of: dict[str, list[ProvActivity]] = {}
         for step in self.steps.values():
             for node in step.made:
                 steps_of.setdefault(node, []).append(step)
         return steps_of
 
-    def used_by(self) -> dict[str, list[Activity]]:
+    def used_by(self) -> dict[str, list[ProvActivity]]:
         """The steps that used a node, by its id."""
-        steps_of: dict[str, list[Activity]] = {}
+        steps_of: dict[str, list[ProvActivity]] = {}
         for step in self.steps.values():
             for node in step.used:
                 steps_of.setdefault(node, []).append(step)
@@ -103,7 +103,7 @@ class Graph:
         return self._reached(start, self.used_by(), forward=True)[0] - set(start)
 
     def _reached(
-        self, start: list[str], links: dict[str, list[Activity]], *, forward: bool
+        self, start: list[str], links: dict[str, list[ProvActivity]], *, forward: bool
     ) -> tuple[set[str], set[str]]:
         nodes, steps, open_ids = set(start), set[str](), list(start)
         while open_ids:
@@ -116,7 +116,7 @@ class Graph:
         return nodes, steps
 
 
-def _within(step: Activity, kept: set[str]) -> Activity:
+def _within(step: ProvActivity, kept: set[str]) -> ProvActivity:
     used = tuple(node for node in step.used if node in kept)
     made = tuple(node for node in step.made if node in kept)
-    return Activity(step.id, step.name, used, made, step.about)
+    return ProvActivity(step.id, step.name, used, made, step.about)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 if TYPE_CHECKING:
-    from pipelines.lineage.graph import Activity, Graph, Node
+    from pipelines.lineage.graph import Graph, Node, ProvActivity
     from pipelines.lineage.targets import Lineage
 
 BASE = "urn:x-tumbleline:"
@@ -82,7 +82,7 @@ def _properties(node: Node) -> dict[str, Any]:
     return {key: node.about.get(key) for key in keys.get(node.kind, ())}
 
 
-def _activity(step: Activity, graph: Graph, agents: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def _activity(step: ProvActivity, graph: Graph, agents: dict[str, dict[str, Any]]) -> dict[str, Any]:
     activity: dict[str, Any] = {
         "@id": iri("step", step.id),
         "@type": "prov:Activity",
@@ -106,7 +106,7 @@ def _activity(step: Activity, graph: Graph, agents: dict[str, dict[str, Any]]) -
     return activity
 
 
-def _agents(step: Activity, agents: dict[str, dict[str, Any]]) -> list[str]:
+def _agents(step: ProvActivity, agents: dict[str, dict[str, Any]]) -> list[str]:
     """The person and the program of a step."""
     found: list[str] = []
     if step.about.get("who"):
@@ -122,5 +122,5 @@ def _agents(step: Activity, agents: dict[str, dict[str, Any]]) -> list[str]:
     return found
 
 
-def _person(step: Activity) -> str:
+def _person(step: ProvActivity) -> str:
     return f"{step.about['who']}@{step.about.get('where', '')}"

@@ -14,7 +14,7 @@ from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive
-    from pipelines.lineage.graph import Activity, Graph, Node
+    from pipelines.lineage.graph import Graph, Node, ProvActivity
     from pipelines.lineage.targets import Lineage
 
 VERSION = "https://w3id.org/ro/crate/1.1"
@@ -134,7 +134,7 @@ def _other(node: Node) -> dict[str, Any]:
     }
 
 
-def _action(step: Activity, graph: Graph) -> dict[str, Any]:
+def _action(step: ProvActivity, graph: Graph) -> dict[str, Any]:
     about = step.about
     action: dict[str, Any] = {
         "@id": f"#{quote(step.id)}",
@@ -179,7 +179,7 @@ def _agents(graph: Graph) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     return list(people.values()), list(programs.values())
 
 
-def _person(step: Activity) -> str:
+def _person(step: ProvActivity) -> str:
     return f"{step.about['who']}@{step.about.get('where', '')}"
 
 

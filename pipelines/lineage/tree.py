@@ -8,7 +8,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 if TYPE_CHECKING:
-    from pipelines.lineage.graph import Activity, Graph, Node
+    from pipelines.lineage.graph import Graph, Node, ProvActivity
     from pipelines.lineage.targets import Lineage
 
 SHORT = 12
@@ -62,20 +62,20 @@ class _Drawer:
         for step in steps:
             self._step(own, step)
 
-    def _step(self, branch: Tree, step: Activity) -> None:
+    def _step(self, branch: Tree, step: ProvActivity) -> None:
         """A step that was not shown before, with the nodes that it used."""
         if step.id not in self.shown:
             self.shown.add(step.id)
             self._used(branch.add(_step(step, self._versions(step))), step)
 
-    def _versions(self, step: Activity) -> str:
+    def _versions(self, step: ProvActivity) -> str:
         """Versions of program and libraries; empty where they are the same as those shown last."""
         known = {**step.about.get("software", {}), **step.about.get("libraries", {})}
         text = " ".join(f"{name} {number}" for name, number in known.items())
         before, self.versions = self.versions, text or self.versions
         return text if text != before else ""
 
-    def _used(self, branch: Tree, step: Activity) -> None:
+    def _used(self, branch: Tree, step: ProvActivity) -> None:
         raw = [name for name in step.used if name.startswith("captures/")]
         for name in step.used:
             known_run = self.graph.nodes[name].kind == "run" and all(
@@ -119,7 +119,7 @@ def _details(node: Node) -> Text:
     return Text(more().rstrip(), style="dim")
 
 
-def _step(step: Activity, versions: str) -> Text:
+def _step(step: ProvActivity, versions: str) -> Text:
     about = step.about
     text = Text("by ", style="dim").append(step.name, style="italic")
     parts = [str(about["when"])[:19].replace("T", " ")] if about.get("when") else []

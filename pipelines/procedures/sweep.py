@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from inertial.dynamics.sine_fit import fit_tone_and_frequency
-from inertial.dynamics.transfer_diagnosis import Diagnosis, diagnose_transfer
+from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     REFERENCE,
@@ -168,11 +168,11 @@ class Sweep(OnEquipment, FromWaveforms):
             draw_bode(drawing, transfer_points(kept), judged(part, kept), kept["coherence"].to_numpy(dtype=float))
 
 
-_last_judged: dict[str, Diagnosis] = {}
+_last_judged: dict[str, TransferDiagnosis] = {}
 """Diagnoses of the last sweeps: the report draws what the stage has judged in the same process."""
 
 
-def judged(part: SweepPart, rows: pd.DataFrame) -> Diagnosis:
+def judged(part: SweepPart, rows: pd.DataFrame) -> TransferDiagnosis:
     """The diagnosis of the part's model on the points of one unit."""
     points = transfer_points(rows)
     c = points.conditions

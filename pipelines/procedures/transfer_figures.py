@@ -15,7 +15,7 @@ from pipelines.procedures.base import FigureValue
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from inertial.dynamics.transfer_diagnosis import Diagnosis
+    from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
     from inertial.dynamics.transfer_model import Points
 
     Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 WORD = {"delay_s": "delay", "natural_hz": "natural frequency", "damping": "damping ratio"}
 
 
-def figures_of_transfer(part: Any, found: Diagnosis, points: Points, static: Array | None) -> list[FigureValue]:
+def figures_of_transfer(part: Any, found: TransferDiagnosis, points: Points, static: Array | None) -> list[FigureValue]:
     """Figures of one unit.
 
     Parameters
@@ -145,7 +145,7 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
     return FigureValue("sweep_sensitivity_percent", part.axis, value, error)
 
 
-def diagnosis_text(found: Diagnosis) -> list[tuple[str, str]]:
+def diagnosis_text(found: TransferDiagnosis) -> list[tuple[str, str]]:
     """Subject and text of the findings of the diagnosis on one unit."""
     fit = found.fit
     model = " + ".join(("sensitivity", *fit.effects))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
     from numpy.typing import NDArray
 
-    from inertial.dynamics.transfer_diagnosis import Diagnosis
+    from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
     from inertial.dynamics.transfer_model import Points
 
     Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MEASURED, MODEL, EXTENDED = "#0072b2", "#d55e00", "#009e73"
 
 
-def draw_bode(drawing: Drawing, points: Points, found: Diagnosis, coherence: Array) -> None:
+def draw_bode(drawing: Drawing, points: Points, found: TransferDiagnosis, coherence: Array) -> None:
     """Magnitude, phase, residual and coherence over frequency, and the Nyquist plot, in two rows."""
     places = drawing.subplots(2, 3)
     c = points.conditions
@@ -97,7 +97,7 @@ def _plain(value: float, _: int) -> str:
     return f"{value:g}"
 
 
-def _text(found: Diagnosis, name: str, unit: str) -> str:
+def _text(found: TransferDiagnosis, name: str, unit: str) -> str:
     value, error, low, high = found.extended.of(name)
     unit = "" if unit == "1" else f" {unit}"
     if not found.extended.identified(name):

@@ -14,7 +14,7 @@ from schemas.units import MICRO
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pipelines.programming.outcome import Outcome
+    from pipelines.programming.outcome import ProgrammingOutcome
 
     Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class InPose:
     temperature: float
 
 
-def require_moved(one: Outcome, plain: Array, moved: Array, tolerance_ug: float) -> None:
+def require_moved(one: ProgrammingOutcome, plain: Array, moved: Array, tolerance_ug: float) -> None:
     """Refuses a device whose output did not change by the value of its offset registers."""
     if one.block is None:
         return
@@ -46,7 +46,7 @@ def require_moved(one: Outcome, plain: Array, moved: Array, tolerance_ug: float)
         )
 
 
-def require_in_pose(one: Outcome, at: InPose, tolerance_ug: float) -> None:
+def require_in_pose(one: ProgrammingOutcome, at: InPose, tolerance_ug: float) -> None:
     """Refuses coefficients in the device that do not give the force, or do not agree with those of the archive."""
     pose, force, output, temperature = at.pose, at.force, at.output, at.temperature
     held = unpack(one.memory.read(one.copy))
@@ -79,7 +79,7 @@ def require_in_pose(one: Outcome, at: InPose, tolerance_ug: float) -> None:
         )
 
 
-def write_offsets_again(one: Outcome) -> None:
+def write_offsets_again(one: ProgrammingOutcome) -> None:
     """Writes the offset registers again, which lose their value without power, as a host does at every start."""
     if one.block is None:
         return

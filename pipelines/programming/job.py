@@ -15,7 +15,7 @@ from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.programmed import TOP, add
 from pipelines.chain.certify import certify
 from pipelines.export import unit_calibrations
-from pipelines.programming.outcome import Choice, Outcome
+from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from pipelines.programming.process import Programmer
 from schemas.errors import WrongUse
 from schemas.recipe import Lot, Recipe
@@ -66,7 +66,7 @@ def program_run(
     config: StationConfig,
     choice: Choice,
     report: Callable[[str], None],
-) -> tuple[list[Outcome], dict[str, str]]:
+) -> tuple[list[ProgrammingOutcome], dict[str, str]]:
     """The outcome of each unit, and the renewed certificates by serial.
 
     The certificate of a unit ends before the first write to its device. A unit that was certified with these coefficients is
@@ -99,7 +99,7 @@ def program_run(
     return outcomes, given
 
 
-def _renewed(ledger: Ledger, run: Run, one: Outcome, day: str, until: str) -> str:
+def _renewed(ledger: Ledger, run: Run, one: ProgrammingOutcome, day: str, until: str) -> str:
     """The certificate of a unit whose memory is verified; empty where it would not have the number that the device contains."""
     reason = f"written into the device, copy {one.copy.upper()}, sequence {one.document()['sequence']}"
     event = certify(ledger, run, [one.serial], day, until, reason=reason, keys=public_keys()).events[0]
@@ -170,7 +170,7 @@ def _station(run: Run, config: StationConfig) -> Generator[tuple[Any, Callable[[
         yield station, saved
 
 
-def document(run: Run, outcomes: Sequence[Outcome], given: Mapping[str, str]) -> dict[str, Any]:
+def document(run: Run, outcomes: Sequence[ProgrammingOutcome], given: Mapping[str, str]) -> dict[str, Any]:
     """The result for JSON."""
     return {
         "run": run.id,

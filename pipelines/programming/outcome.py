@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pipelines.export.device_block import Block, Form
+    from pipelines.export.device_block import CoefficientBlock, Form
     from pipelines.export.polynomials import UnitCalibration
     from stations.devices.memory import Copy, UnitMemory
 
@@ -28,7 +28,7 @@ class Choice:
 
 
 @dataclass
-class Outcome:
+class ProgrammingOutcome:
     """Outcome of a unit: ``proved``, or ``failed`` at a step for a reason.
 
     certificate : number of the certificate that the block contains; 0 without one
@@ -43,7 +43,7 @@ class Outcome:
     step: str = ""
     reason: str = ""
     copy: Copy = "a"
-    block: Block | None = None
+    block: CoefficientBlock | None = None
     content: bytes = b""
     step_counts: int = 0
     poses: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])

@@ -15,7 +15,7 @@ from inertial.frames import force_from_angles
 from pipelines.certificates.programmed import add
 from pipelines.export.device_block import block_of, pack, unpack
 from pipelines.programming.checks import InPose, require_in_pose, require_moved, write_offsets_again
-from pipelines.programming.outcome import Choice, Outcome
+from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from schemas.errors import OperatorNeeded, StationError, StationRefused, TumblelineError, WrongUse
 from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.devices.memory import COPIES
@@ -60,7 +60,7 @@ class Programmer:
     report: Callable[[str], None]
     saved: Callable[[], None]
 
-    def program(self, units: Sequence[tuple[int, UnitCalibration]]) -> list[Outcome]:
+    def program(self, units: Sequence[tuple[int, UnitCalibration]]) -> list[ProgrammingOutcome]:
         """Writes units (slot, calibration); the outcome of each.
 
         Raises
@@ -68,7 +68,7 @@ class Programmer:
         StationError, LeaseLost, EmergencyStop
             The station fails for all units; every unit whose programming has begun is recorded as failed.
         """
-        outcomes = [Outcome(unit.unit, slot, unit, self._memory(slot)) for slot, unit in units]
+        outcomes = [ProgrammingOutcome(unit.unit, slot, unit, self._memory(slot)) for slot, unit in units]
         self._check(outcomes)
         step = "archive the memory"
         try:
@@ -92,7 +92,7 @@ class Programmer:
         self.saved()
         return outcomes
 
-    def _all_failed(self, outcomes: Sequence[Outcome], step: str, problem: BaseException) -> None:
+    def _all_failed(self, outcomes: Sequence[ProgrammingOutcome], step: str, problem: BaseException) -> None:
         """Records every unit whose programming has begun as failed; one that cannot be recorded does not hide the others.
 
         A beginning without an end counts as failed as well, so a missing record leaves no unit certified.
@@ -120,7 +120,7 @@ class Programmer:
                 "station: the chamber's door is open, closed is needed; close it and repeat the command"
             )
 
-    def _check(self, outcomes: Sequence[Outcome]) -> None:
+    def _check(self, outcomes: Sequence[ProgrammingOutcome]) -> None:
         """Refuses, before anything is written, units and stations that cannot be verified."""
         reader = self.station.reader
         reader.require_switch()
@@ -144,7 +144,9 @@ class Programmer:
                     f"program: unit {one.serial} has no offset registers, they are needed; leave --offset-registers out"
                 )
 
-    def _each(self, outcomes: Sequence[Outcome], step: str, act: Callable[[Outcome], None]) -> None:
+    def _each(
+        self, outcomes: Sequence[ProgrammingOutcome], step: str, act: Callable[[ProgrammingOutcome], None]
+    ) -> None:
         """A step for every unit that has not failed; a unit that fails does not stop the others."""
         for one in outcomes:
             if not one.open:
@@ -160,11 +162,11 @@ class Programmer:
                     self._failed(one, step, str(problem))
             self.saved()
 
-    def _failed(self, one: Outcome, step: str, reason: str) -> None:
+    def _failed(self, one: ProgrammingOutcome, step: str, reason: str) -> None:
         one.outcome, one.step, one.reason = "failed", step, reason
         add(self.root, one.serial, "failed", {"run": self.run, "step": step, "reason": reason, **one.document()})
 
-    def _archive(self, one: Outcome) -> None:
+    def _archive(self, one: ProgrammingOutcome) -> None:
         """Archives the content of the memory, chooses the copy to write, and records the beginning in the journal."""
         memory, status = one.memory, one.memory.wait()
         there = {copy: memory.read(copy) for copy in COPIES}
@@ -194,7 +196,7 @@ class Programmer:
             "content": one.content.hex(),
         })  # fmt: skip
 
-    def _offsets(self, one: Outcome) -> tuple[int, int, int]:
+    def _offsets(self, one: ProgrammingOutcome) -> tuple[int, int, int]:
         """Steps that bring the output at 25 °C nearest to zero: the registers add, so they get the bias with its sign changed."""
         if not one.step_counts:
             return 0, 0, 0
@@ -203,12 +205,12 @@ class Programmer:
         )
         return x, y, z
 
-    def _write(self, one: Outcome) -> None:
+    def _write(self, one: ProgrammingOutcome) -> None:
         one.memory.program(one.copy, one.content)
         if one.block is not None and one.step_counts:
             one.memory.set_offsets(one.block.offsets)
 
-    def _read_back(self, one: Outcome) -> None:
+    def _read_back(self, one: ProgrammingOutcome) -> None:
         """Refuses a copy that differs from the written bytes."""
         found = one.memory.read(one.copy)[: len(one.content)]
         if found != one.content:
@@ -229,7 +231,7 @@ class Programmer:
             reader.switch("on")
         clock.sleep(BOOT_S)
 
-    def _after_power(self, one: Outcome) -> None:
+    def _after_power(self, one: ProgrammingOutcome) -> None:
         """Refuses a device whose new copy changed, or whose other copy has the larger sequence number."""
         self._read_back(one)
         valid = [(block.sequence, copy) for copy in COPIES if (block := unpack(one.memory.read(copy))) is not None]
@@ -247,7 +249,7 @@ class Programmer:
             )
         return poses[:POSES]
 
-    def _verify(self, outcomes: Sequence[Outcome]) -> None:
+    def _verify(self, outcomes: Sequence[ProgrammingOutcome]) -> None:
         """Two poses: the coefficients in the device, applied to its output, give the force of the pose."""
         for number, pose in enumerate(self._poses()):
             if not any(one.open for one in outcomes):
@@ -279,7 +281,7 @@ class Programmer:
                 ),
             )
 
-    def _means(self, outcomes: Sequence[Outcome]) -> dict[int, Array]:
+    def _means(self, outcomes: Sequence[ProgrammingOutcome]) -> dict[int, Array]:
         """Mean outputs (3,) by slot, over a dwell of the recipe."""
         reader, clock, recipe = self.station.reader, self.station.clock, self.recipe
         clock.sleep(recipe.settle_s)

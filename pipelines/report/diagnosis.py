@@ -9,7 +9,7 @@ import numpy as np
 from inertial import effects
 from inertial.criticism.handling import named as handled
 from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals
 from pipelines.report.templates import template
 from schemas.units import MICRO
@@ -52,7 +52,7 @@ def render_diagnosis(
         ],
         pictures=None if diagnosis is None else _pictures(diagnosis, sound),
         ladder=[] if diagnosis is None else _ladder(diagnosis),
-        number=plain,
+        number=significant,
         chance=chance,
         equal=equal,
     )
@@ -64,7 +64,7 @@ def chance(p: float | None) -> str:
         return ""
     if p <= 1e-299:
         return "< 1e−299"
-    return plain(p, 2) if p > 1e-3 else f"{p:.0e}".replace("-", "−")
+    return significant(p, 2) if p > 1e-3 else f"{p:.0e}".replace("-", "−")
 
 
 def equal(p: float) -> str:
@@ -98,8 +98,8 @@ def _member(name: str) -> dict[str, str]:
 def _value(value: float | tuple[float, ...] | list[float] | None) -> str:
     """A number, or one per axis."""
     if isinstance(value, list | tuple):
-        return " / ".join(plain(float(v)) for v in value)
-    return "" if value is None else plain(value)
+        return " / ".join(significant(float(v)) for v in value)
+    return "" if value is None else significant(value)
 
 
 def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
@@ -136,10 +136,10 @@ def _ladder(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "id": r.term.effect.id,
             "symbol": r.term.effect.symbol,
             "coefficients": r.rank,
-            "drop": plain(r.drop / variance),
+            "drop": significant(r.drop / variance),
             "width": f"{100.0 * max(r.drop, 0.0) / most:.1f}",
-            "behind": plain(r.cost - best),
-            "exponent": plain(-r.log_p / 2.302585) if r.log_p > -1e6 else "> 300",
+            "behind": significant(r.cost - best),
+            "exponent": significant(-r.log_p / 2.302585) if r.log_p > -1e6 else "> 300",
         }
         for r in rivals
     ]

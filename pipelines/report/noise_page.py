@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.plots import COLOURS, STYLE
 from pipelines.report.templates import fill
 from schemas.errors import WrongUse
@@ -111,7 +111,7 @@ def noise_page(document: dict[str, Any]) -> str:
         document={"terms": [], "spectra": [], "notes": [], **document},
         unit=document["unit"] or "unit",
         picture=svg[svg.index("<svg") :],
-        number=plain,
+        number=significant,
     )
 
 

@@ -12,7 +12,7 @@ MINUS = "−"
 THIN = "\u202f"  # narrow no-break space between groups of three digits
 
 
-def plain(value: float, digits: int = 3) -> str:
+def significant(value: float, digits: int = 3) -> str:
     """A number with so many significant digits, in fixed notation where that is short."""
     if not math.isfinite(value):
         return ""
@@ -22,7 +22,7 @@ def plain(value: float, digits: int = 3) -> str:
     return _fixed(value, places) if places <= 8 else _signed(f"{value:.{digits - 1}e}")
 
 
-def scientific(value: float, number: Callable[[float], str] = plain) -> str:
+def scientific(value: float, number: Callable[[float], str] = significant) -> str:
     """A number for people, from a million on as a power of ten; ``number`` formats smaller values."""
     if abs(value) < 1e6:
         return number(value)
@@ -33,7 +33,7 @@ def scientific(value: float, number: Callable[[float], str] = plain) -> str:
 def with_uncertainty(value: float, expanded: float) -> tuple[str, str]:
     """Value and expanded uncertainty, the uncertainty to two digits and the value to the same place (GUM 7.2.6)."""
     if not math.isfinite(expanded) or expanded <= 0.0:
-        return plain(value, 4), ""
+        return significant(value, 4), ""
     places = 1 - math.floor(math.log10(expanded))
     if places > 8:
         return _signed(f"{value:.3e}"), _signed(f"{expanded:.1e}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipelines.report.budget_plots import shares_plot
-from pipelines.report.numbers import plain, scientific
+from pipelines.report.numbers import scientific, significant
 from pipelines.report.plan_plots import alias_plot, sight_plot, sphere_plot, temperature_plot
 from pipelines.report.templates import template
 
@@ -24,7 +24,7 @@ def render_plan(document: dict[str, Any], context: PlanContext) -> str:
     return template("plan.html").render(
         document=document,
         recipe=context.recipe,
-        number=plain,
+        number=significant,
         scientific=scientific,
         coefficients=_coefficients(document["coefficients"]),
         seen=[row for row in document["effects"] if row["seen"]],
@@ -70,7 +70,7 @@ def _coefficients(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
             (row["effect"], place, shared), {"effect": row["effect"], "unit": row["unit"], "cells": {}, "names": []}
         )
         line["names"].append(row["name"])
-        line["cells"]["x" if shared else row["axis"]] = plain(row["uncertainty_ug"])
+        line["cells"]["x" if shared else row["axis"]] = significant(row["uncertainty_ug"])
     for line in lines.values():
         line["names"] = ", ".join(dict.fromkeys(line["names"]))
     return list(lines.values())

@@ -17,7 +17,7 @@ from pipelines.rerun.steps import archived_job
 from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.fit import KINDS, fit
-from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.verify import verify
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import lot_arrays
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.partition import Batch
-    from pipelines.rerun.selection import Entry
+    from pipelines.rerun.selection import SelectedRun
 
 Sums = dict[str, tuple[float, int]]
 """Sum of squared errors, µg², and their number, by unit."""
@@ -57,7 +57,7 @@ class Side:
 class LotComparison:
     """A lot under the old and the new model; without sides where it could not be judged."""
 
-    entry: Entry
+    entry: SelectedRun
     old: Side | None = None
     new: Side | None = None
     error: str = ""
@@ -113,7 +113,7 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     stated = budget(
         BudgetTables(dwells, history, *(new[name] for name in names), noise=old["noise"]), budget_terms(job)
     )
-    evidence = Evidence(
+    evidence = GradeEvidence(
         old["verdicts"],
         *(new[name] for name in ("coefficients", "covariance", "residuals", "verification", "verification_poses")),
         noise=old["noise"],

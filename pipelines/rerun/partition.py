@@ -9,7 +9,7 @@ from inertial.errors import InertialError
 from pipelines.archive import Archive
 from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.reproduce import Reproduction, check
-from pipelines.rerun.rerun import Outcome, again
+from pipelines.rerun.rerun import RerunOutcome, again
 from schemas.errors import TumblelineError
 
 if TYPE_CHECKING:
@@ -38,17 +38,17 @@ def parts(
     return [Batch(archive.address, batch, change, report) for batch in batches]
 
 
-def run_again(part: Batch) -> list[Outcome]:
+def run_again(part: Batch) -> list[RerunOutcome]:
     """The outcome of every run of a batch; a run that fails has an error, the others continue."""
     archive = Archive(part.archive)
     return [_one(archive, run_id, part) for run_id in part.runs]
 
 
-def _one(archive: Archive, run_id: str, part: Batch) -> Outcome:
+def _one(archive: Archive, run_id: str, part: Batch) -> RerunOutcome:
     try:
         return again(archive, run_id, part.change, report=part.report)
     except (TumblelineError, InertialError) as problem:
-        return Outcome(run_id, error=str(problem))
+        return RerunOutcome(run_id, error=str(problem))
 
 
 def checked(part: Batch) -> list[Reproduction]:

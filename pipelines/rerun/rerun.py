@@ -29,7 +29,7 @@ samples it reads are not in the archive; worked out."""
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RerunOutcome:
     """What became of one run: its re-run, what had changed, and how every stage came about."""
 
     run: str
@@ -42,7 +42,7 @@ class Outcome:
 
 def again(
     archive: Archive, run_id: str, change: ModelChange, *, report: bool = False, left_out: Dwells = ()
-) -> Outcome:
+) -> RerunOutcome:
     """Run an archived run again. A new run is published when all of it is there: one that fails or is stopped leaves nothing.
 
     Raises
@@ -81,7 +81,7 @@ def again(
                 stages["report"] = THERE if make_report(new) else COMPUTED
             if new.id != old.id or COMPUTED in stages.values():
                 new.seal()
-    return Outcome(old.id, new.id, because, stages, time.perf_counter() - start)
+    return RerunOutcome(old.id, new.id, because, stages, time.perf_counter() - start)
 
 
 def _done(old: Run, new: BufferedRun, plan: Plan, *, raw: bool) -> dict[str, str]:

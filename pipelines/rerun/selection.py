@@ -19,7 +19,7 @@ ALL, LATEST = "all", "latest"
 
 
 @dataclass(frozen=True)
-class Entry:
+class SelectedRun:
     """One run of an archive, from its ``run.json``.
 
     measured : time of the measurement; for a re-run that of the first run of the data
@@ -35,18 +35,18 @@ class Entry:
     derived: bool
 
 
-def entries(archive: Archive) -> list[Entry]:
+def entries(archive: Archive) -> list[SelectedRun]:
     """Every run, in the order of measurement."""
     found = [_entry(path.parent.name, files.read_json(path)) for path in (archive.root / "runs").glob("*/run.json")]
     return sorted(found, key=lambda entry: (entry.measured, entry.id))
 
 
-def entry_of(run_id: str, about: dict[str, Any]) -> Entry:
+def entry_of(run_id: str, about: dict[str, Any]) -> SelectedRun:
     """One run, from its ``run.json``."""
     return _entry(run_id, about)
 
 
-def selected(archive: Archive, words: Sequence[str]) -> list[Entry]:
+def selected(archive: Archive, words: Sequence[str]) -> list[SelectedRun]:
     """The selected runs, each once, in the order of measurement.
 
     All conditions with a colon must hold; names and beginnings of names add runs. Conditions do not select re-runs, because
@@ -106,7 +106,7 @@ def moment(text: str, where: str, *, end: bool = False) -> datetime:
     return found if found.tzinfo else found.replace(tzinfo=UTC)
 
 
-def _named(known: list[Entry], names: list[str], archive: Archive) -> list[Entry]:
+def _named(known: list[SelectedRun], names: list[str], archive: Archive) -> list[SelectedRun]:
     ids = [entry.id for entry in known]
     chosen: set[str] = set()
     for name in names:
@@ -117,7 +117,7 @@ def _named(known: list[Entry], names: list[str], archive: Archive) -> list[Entry
     return [entry for entry in known if entry.id in chosen]
 
 
-def _holds(entry: Entry, key: str, value: Any) -> bool:
+def _holds(entry: SelectedRun, key: str, value: Any) -> bool:
     if key == "since":
         return entry.measured >= value
     if key == "until":
@@ -127,7 +127,7 @@ def _holds(entry: Entry, key: str, value: Any) -> bool:
     return str(getattr(entry, key)).lower() == str(value).lower()
 
 
-def _there_is(chosen: list[Entry], filters: list[tuple[str, Any]]) -> str:
+def _there_is(chosen: list[SelectedRun], filters: list[tuple[str, Any]]) -> str:
     """The values of the runs for the keys of a filter that no run matches."""
     texts: list[str] = []
     for key, _ in filters:
@@ -139,10 +139,10 @@ def _there_is(chosen: list[Entry], filters: list[tuple[str, Any]]) -> str:
     return " ".join(dict.fromkeys(texts))
 
 
-def _entry(run_id: str, about: dict[str, Any]) -> Entry:
+def _entry(run_id: str, about: dict[str, Any]) -> SelectedRun:
     lot = about.get("lot", {})
     when = datetime.fromisoformat(about.get("measured") or about["when"])
-    return Entry(
+    return SelectedRun(
         id=run_id,
         recipe=about.get("recipe", {}).get("name", "import" if "source" in about else about.get("name", "")),
         device=lot.get("device", ""),

@@ -21,7 +21,7 @@ from pipelines.jobs.terms import archived_terms
 from pipelines.rerun.import_steps import StageCall, budget_step, history_of, no_noise, plane_step, verify_norms_step
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
-from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
+from pipelines.stages.grade import GradeEvidence, grade, refuse_limits_without_figures
 from pipelines.stages.norm_fit import fit_of_norms
 from pipelines.stages.verify import verify
 from pipelines.tables.leave_out import Dwells, leave_out
@@ -299,7 +299,7 @@ def _grade_step(limits: Limits, zero: float, *, budgeted: bool) -> StageCall:
         tables: dict[str, Any] = {name: run.table(name) for name in names}
         units = list(dict.fromkeys(tables["coefficients"]["unit"].astype(str)))
         sound = {"unit": units, "slot": range(len(units)), "refused": False, "fault": "", "reason": ""}
-        return grade(Evidence(verdicts=pd.DataFrame(sound), **tables, noise=no_noise()), limits, zero)
+        return grade(GradeEvidence(verdicts=pd.DataFrame(sound), **tables, noise=no_noise()), limits, zero)
 
     parameters = {"limits": limits.model_dump(mode="json"), **({"zero_output": zero} if zero else {})}
     return StageCall("grade", names, stage.outputs, parameters, code_hash(stage.modules), call)

@@ -10,12 +10,12 @@ import pandas as pd
 
 from inertial.fits.wander import wander_kernels
 from inertial.frames import angles_from_force
-from inertial.uncertainty.influences import Model, sensitivity
+from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.propagation import fit_design, propagated
 from pipelines.stages.budget_rows import covariance_rows, empty, rows_of_quantities
 from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
-from pipelines.stages.contributions import Conditions, influences, sources
-from pipelines.stages.quantities import Split, quantities_of
+from pipelines.stages.contributions import DwellConditions, influences, sources
+from pipelines.stages.quantities import VarianceParts, quantities_of
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
 from schemas.units import MICRO
@@ -49,7 +49,7 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     }
 
 
-def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> Conditions:
+def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> DwellConditions:
     """The dwells of a lot on which the influences act."""
     first = dwells[dwells["unit"] == lot.units[0]].set_index("dwell").reindex(lot.dwells)
     soak = first["soak"].to_numpy(dtype=np.int64) if "soak" in first else np.zeros(lot.dwells.size, dtype=np.int64)
@@ -57,30 +57,30 @@ def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: Bud
     mean = np.broadcast_to(read, (len(lot.units), lot.dwells.size)).mean(axis=0)
     target = np.array([mean[soak == one].mean() for one in soak])
     scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1)).reshape(-1, 3).mean(axis=0)
-    return Conditions(lot.state, soak, target, terms.soak_min_s, terms.room_C, scale)
+    return DwellConditions(lot.state, soak, target, terms.soak_min_s, terms.room_C, scale)
 
 
 def propagate(
-    lot: LotArrays, calibration: Calibration, wander: pd.DataFrame, terms: BudgetTerms, at: Conditions
-) -> Split:
+    lot: LotArrays, calibration: Calibration, wander: pd.DataFrame, terms: BudgetTerms, at: DwellConditions
+) -> VarianceParts:
     """The influences through the fit of a lot."""
     if terms.stated is None:
         raise ValueError("no uncertainty is stated")
     used = lot.of_kind("dwell")
-    model = Model(calibration.effects, calibration.coefficients, calibration.nonlinear)
+    model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     physical = with_device_temperature(model, calibration.response, terms.stability)
     own, scattered = influences(terms.stated, at, terms.stability)
     whole = sensitivity(physical, lot.state, own, scattered)
     design = fit_design(model, lot.state, dwell_noise(lot, wander, used), used)
     fitted = replace(whole, changes=whole.changes[..., used, :, :])
-    return Split(
+    return VarianceParts(
         fit=propagated(design, fitted, calibration.response),
         verification=whole.changes[..., ~used, :, :],
         visible=design.visible_share(fitted.changes),
     )
 
 
-def with_device_temperature(model: Model, response: Array, stability: Stability | None) -> Model:
+def with_device_temperature(model: MeasurementModel, response: Array, stability: Stability | None) -> MeasurementModel:
     """The model with the stated temperature coefficients of the device, for those that the model lacks."""
     if stability is None:
         return model
@@ -93,7 +93,7 @@ def with_device_temperature(model: Model, response: Array, stability: Stability 
             own = value / MICRO * np.abs(np.diagonal(response, axis1=-2, axis2=-1))[..., None]
             coefficients = np.concatenate([coefficients, own], axis=-1)
             effects.append(effect)
-    return Model(effects, coefficients, model.nonlinear)
+    return MeasurementModel(effects, coefficients, model.nonlinear)
 
 
 def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: NDArray[np.bool_]) -> Array:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.stages.budget_terms import BudgetTerms
-    from pipelines.stages.contributions import Source
-    from pipelines.stages.quantities import Quantity, Split
+    from pipelines.stages.contributions import UncertaintySource
+    from pipelines.stages.quantities import BudgetQuantity, VarianceParts
 
     Array = NDArray[np.float64]
 
@@ -88,7 +88,11 @@ class _Contributions:
 
 
 def rows_of_quantities(
-    units: Sequence[str], quantities: Sequence[Quantity], found: Split, terms: BudgetTerms, known: Mapping[str, Source]
+    units: Sequence[str],
+    quantities: Sequence[BudgetQuantity],
+    found: VarianceParts,
+    terms: BudgetTerms,
+    known: Mapping[str, UncertaintySource],
 ) -> dict[str, pd.DataFrame]:
     """Tables ``budget`` and ``uncertainties``, unit by unit; every quantity is computed for all units at once."""
     names = np.array(found.fit.source.contributions, dtype=object)
@@ -102,7 +106,8 @@ def rows_of_quantities(
 
 
 def _contributions(
-    one: Quantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]], found: Split, known: Mapping[str, Source],
+    one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]], found: VarianceParts,
+    known: Mapping[str, UncertaintySource],
     terms: BudgetTerms,
 ) -> _Contributions:  # fmt: skip
     own = _parts(one, groups, places)
@@ -125,7 +130,7 @@ def _contributions(
     return _Contributions(list(own), u, about, stated, dof, sensitivity)
 
 
-def _parts(one: Quantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
+def _parts(one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
     """Standard uncertainty of every contribution, (units,) each."""
     if one.extra:
         return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}
@@ -147,7 +152,7 @@ def _beyond(name: str, terms: BudgetTerms) -> dict[str, Any]:
             "source": source if name != "budget" else "[uncertainty]"}  # fmt: skip
 
 
-def _referred(source: Source, shares: Array) -> dict[str, Any]:
+def _referred(source: UncertaintySource, shares: Array) -> dict[str, Any]:
     """The source of a contribution that station or recipe state."""
     entry, stated = source.entry, source.stated
     return {
@@ -175,11 +180,13 @@ def _summed(values: Array) -> Array:
     return total
 
 
-def _budget_rows(units: Sequence[str], quantities: Sequence[Quantity], parts: Sequence[_Contributions]) -> pd.DataFrame:
+def _budget_rows(
+    units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions]
+) -> pd.DataFrame:
     many = len(units)
     counts = [len(own.names) for own in parts]
 
-    def each(of: Callable[[Quantity], str]) -> list[str]:
+    def each(of: Callable[[BudgetQuantity], str]) -> list[str]:
         """A text of the quantities in every row of theirs."""
         return [text for one, count in zip(quantities, counts, strict=True) for text in [of(one)] * count] * many
 
@@ -210,7 +217,7 @@ def _budget_rows(units: Sequence[str], quantities: Sequence[Quantity], parts: Se
 
 
 def _sum_rows(
-    units: Sequence[str], quantities: Sequence[Quantity], parts: Sequence[_Contributions], terms: BudgetTerms
+    units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions], terms: BudgetTerms
 ) -> pd.DataFrame:
     """Every quantity with its combined and expanded uncertainty."""
     columns: dict[str, list[Array]] = {name: [] for name in SUM_NUMBERS.split()}

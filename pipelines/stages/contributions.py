@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.uncertainty.influences import Errors, Influence, Scattered, harmonic, theta
+from inertial.uncertainty.influences import Errors, InputQuantity, Scattered, harmonic, theta
 from schemas.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Conditions:
+class DwellConditions:
     """The dwells that the influences act on.
 
     state : all dwells of the lot; soak : (n,), number of the soak of each dwell; target_C : (n,), its temperature
@@ -40,7 +40,7 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Source:
+class UncertaintySource:
     """The source of a contribution: its entry, and the standard uncertainty stated there."""
 
     entry: Entry
@@ -56,17 +56,18 @@ def merged(station: Uncertainty | None, recipe: Uncertainty | None) -> Uncertain
     return Uncertainty.model_validate({**station.model_dump(), **recipe.model_dump(), "grade_source": weakest})
 
 
-def sources(stated: Uncertainty) -> dict[str, Source]:
+def sources(stated: Uncertainty) -> dict[str, UncertaintySource]:
     """The contributions that a statement has, by name."""
-    found: dict[str, Source] = {}
+    found: dict[str, UncertaintySource] = {}
     for name, entry in stated.entries.items():
         if name == "gravity" and stated.gravity is not None:
-            found[name] = Source(entry, stated.gravity.relative())
+            found[name] = UncertaintySource(entry, stated.gravity.relative())
         elif name == "settling":
-            found[name] = Source(entry, entry.standard())
+            found[name] = UncertaintySource(entry, entry.standard())
         else:
             found |= {
-                label: Source(entry, entry.standard(part)) for part, label in _PARTS.get(name, {"": name}).items()
+                label: UncertaintySource(entry, entry.standard(part))
+                for part, label in _PARTS.get(name, {"": name}).items()
             }
     return found
 
@@ -80,23 +81,23 @@ _PARTS: dict[str, dict[str, str]] = {
 
 
 def influences(
-    stated: Uncertainty, at: Conditions, stability: Stability | None = None
-) -> tuple[list[Influence], list[Scattered]]:
+    stated: Uncertainty, at: DwellConditions, stability: Stability | None = None
+) -> tuple[list[InputQuantity], list[Scattered]]:
     """The influences of a statement on some dwells; those whose effect cancels for the user are omitted.
 
     Parameters
     ----------
     stability : of the device: whose temperature the user corrects with, and whether its output follows the supply
     """
-    found: list[Influence] = []
+    found: list[InputQuantity] = []
     for name, errors, u in _all(stated, at, stability):
         if u > 0.0:
             entry = sources(stated)[name].entry
-            found.append(Influence(name, errors, u, entry.scope, entry.dof or float("inf")))
+            found.append(InputQuantity(name, errors, u, entry.scope, entry.dof or float("inf")))
     return found, list(_scattered(stated, at))
 
 
-def _all(stated: Uncertainty, at: Conditions, stability: Stability | None) -> Iterator[tuple[str, Errors, float]]:
+def _all(stated: Uncertainty, at: DwellConditions, stability: Stability | None) -> Iterator[tuple[str, Errors, float]]:
     if stated.gravity is not None:
         yield "gravity", Errors(gravity=1.0), stated.gravity.relative().u
     for name, errors in (
@@ -114,7 +115,7 @@ def _all(stated: Uncertainty, at: Conditions, stability: Stability | None) -> It
     yield from _electrical(stated, at, stability)
 
 
-def _harmonics(stated: Uncertainty, at: Conditions) -> Iterator[tuple[str, Errors, float]]:
+def _harmonics(stated: Uncertainty, at: DwellConditions) -> Iterator[tuple[str, Errors, float]]:
     entry, state = stated.harmonics, at.state
     if entry is None or state.outer is None or state.inner is None:
         return
@@ -128,7 +129,7 @@ def _harmonics(stated: Uncertainty, at: Conditions) -> Iterator[tuple[str, Error
 
 
 def _temperature(
-    stated: Uncertainty, at: Conditions, stability: Stability | None
+    stated: Uncertainty, at: DwellConditions, stability: Stability | None
 ) -> Iterator[tuple[str, Errors, float]]:
     """Errors of the temperature; none where fit and user read the same thermometer of the device."""
     entry = stated.thermometer
@@ -146,7 +147,7 @@ def _temperature(
         yield "settling", Errors(temperature=remainder(at, max(stated.settling.tau_s))), 1.0 / np.sqrt(3.0)
 
 
-def remainder(at: Conditions, tau_s: float) -> Array:
+def remainder(at: DwellConditions, tau_s: float) -> Array:
     """The remainder of the step to the soak of each dwell at its first dwell, (n,), K: reading minus element."""
     out = np.zeros(at.soak.size)
     before = at.room_C
@@ -159,7 +160,7 @@ def remainder(at: Conditions, tau_s: float) -> Array:
 
 
 def _electrical(
-    stated: Uncertainty, at: Conditions, stability: Stability | None
+    stated: Uncertainty, at: DwellConditions, stability: Stability | None
 ) -> Iterator[tuple[str, Errors, float]]:
     follows = stability is not None and stability.ratiometric
     if stated.supply is not None and follows and not stated.supply.ratio_measured:
@@ -182,7 +183,7 @@ def _electrical(
             yield "vibration", Errors(offset=_unit_vector(axis, scale)), u
 
 
-def _scattered(stated: Uncertainty, at: Conditions) -> Iterator[Scattered]:
+def _scattered(stated: Uncertainty, at: DwellConditions) -> Iterator[Scattered]:
     """Repeatability of the poses; left out where the fit's own scatter shows it already."""
     del at
     if stated.pose is not None and not stated.pose.seen_in_residuals and stated.pose.standard().u > 0.0:

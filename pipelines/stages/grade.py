@@ -34,7 +34,7 @@ BEST_OF_NOISE = "consumer"
 
 
 @dataclass(frozen=True)
-class Evidence:
+class GradeEvidence:
     """The tables that a decision is based on.
 
     uncertainties, budget_covariance : of the uncertainty budget; None, or without rows, where nothing is stated
@@ -76,7 +76,9 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
             )
 
 
-def grade(evidence: Evidence, limits: Limits, zero_g: float = 0.0, *, tumbles: bool = True) -> dict[str, pd.DataFrame]:
+def grade(
+    evidence: GradeEvidence, limits: Limits, zero_g: float = 0.0, *, tumbles: bool = True
+) -> dict[str, pd.DataFrame]:
     """Tables ``figures`` (one row per unit and figure), ``grades`` (one row per unit) and ``lot_risks`` (one per limited figure).
 
     With an uncertainty budget the grade is based on the error expected over the period of validity, if that is known; without one
@@ -180,7 +182,7 @@ def _badness(figure: Figure, guard: float, *, least: bool) -> float:
     return found if np.isfinite(found) else float("inf")
 
 
-def _coefficients(evidence: Evidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:
+def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:
     """The coefficients of the lot and the place of each unit in them; None where no unit was calibrated."""
     if evidence.coefficients.empty:
         return None, {}

@@ -12,7 +12,7 @@ from inertial.noise.allan import AllanCurve, overlapping
 from inertial.noise.terms import FLICKER_FLOOR, NoiseTerms, fit_terms, model_deviation
 from pipelines.stages.bias_stability import TERM, bias_stability
 from pipelines.stages.coarse_digits import Coarse, remark, without_digits
-from pipelines.stages.static_record import Series, Warmed, warmed
+from pipelines.stages.static_record import StaticSeries, Warmed, warmed
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import empty_table
 from pipelines.tables.samples import by_record
@@ -60,7 +60,7 @@ def noise(
     calibration = read_calibration(coefficients, covariance)
     records = set(static["record"])
     size = -(-int(static.loc[static["unit"].isin(calibration.units), "n"].max()) // MOST_SAMPLES)
-    series = Series(calibration.units, size)
+    series = StaticSeries(calibration.units, size)
     for record, tables in by_record(samples):
         for table in tables:
             if record in records:
@@ -101,7 +101,7 @@ class _Channel:
 
 
 def _channels(
-    series: Series,
+    series: StaticSeries,
     calibration: Calibration,
     unit: str,
     static: pd.DataFrame,

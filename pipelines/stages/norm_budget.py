@@ -15,7 +15,7 @@ from pipelines.stages.budget import conditions, with_device_temperature
 from pipelines.stages.budget_rows import covariance_rows, empty, rows_of_quantities
 from pipelines.stages.contributions import influences, sources
 from pipelines.stages.norm_dwells import NormDwells, norm_dwells
-from pipelines.stages.quantities import Quantity, Split, quantities_of
+from pipelines.stages.quantities import BudgetQuantity, VarianceParts, quantities_of
 
 if TYPE_CHECKING:
     from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
@@ -54,7 +54,7 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
     own, scattered = influences(stated, at, terms.stability)
     whole = sensitivity(physical, lot.state, own, scattered)
     fitted = propagated_by_norm(one.design, whole, one.calibration.response)
-    found = Split(
+    found = VarianceParts(
         fit=replace(fitted, source=replace(whole, changes=whole.changes[:, one.design.used])),
         verification=whole.changes[:, ~one.design.used],
         visible=one.design.visible_share(whole.changes[0]),
@@ -74,7 +74,7 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
     }
 
 
-def _is_rotation(quantity: Quantity) -> bool:
+def _is_rotation(quantity: BudgetQuantity) -> bool:
     """Whether it is a coefficient of K below the diagonal: a rotation of the whole unit, zero by definition."""
     return quantity.name == "misalignment" and quantity.axis in {"yx", "zx", "zy"}
 

@@ -11,7 +11,7 @@ from inertial.correction import correct
 from inertial.fits.linear import response_matrix
 from inertial.fits.wander import walk_kernel
 from inertial.noise.flicker import flicker_kernel
-from inertial.uncertainty.influences import Model
+from inertial.uncertainty.influences import MeasurementModel
 from inertial.uncertainty.norm_design import NormDesign, norm_design
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import KINDS, LotArrays, measured
@@ -43,9 +43,9 @@ class NormDwells:
     noise: Array
 
     @property
-    def model(self) -> Model:
+    def model(self) -> MeasurementModel:
         """The calibrated model."""
-        return Model(self.calibration.effects, self.calibration.coefficients, self.calibration.nonlinear)
+        return MeasurementModel(self.calibration.effects, self.calibration.coefficients, self.calibration.nonlinear)
 
 
 def norm_dwells(
@@ -94,7 +94,7 @@ def _one(
     time = readings.time[0]
     kernel = flicker**2 * flicker_kernel(time) + walk**2 * walk_kernel(time)
     noise = np.diag((white * profile) ** 2) + kernel * (direction @ direction.T)
-    model = Model(calibration.effects, calibration.coefficients, calibration.nonlinear)
+    model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     lot = LotArrays(
         units=calibration.units,
         dwells=found.dwells,

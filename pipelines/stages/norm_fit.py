@@ -48,7 +48,7 @@ class FittedNorms:
     white, flicker, walk : (units,), standard deviations of one dwell's noise, g; walk at the end of the record
     """
 
-    found: Measured
+    measured: Measured
     model: Model
     fit: NormFit
     scale: Array
@@ -60,7 +60,7 @@ class FittedNorms:
     @property
     def rms(self) -> float:
         """Residual of the norm over all dwells, g of local gravity."""
-        there = self.found.readings.there
+        there = self.measured.readings.there
         return float(np.sqrt(np.mean((self.fit.left[there] / self.gravity) ** 2)))
 
 
@@ -103,7 +103,7 @@ def norms_fitted(
         raise DataRejected(str(problem_found)) from None
     noise, covariance = model.noise, problem.covariance
     return FittedNorms(
-        found=found,
+        measured=found,
         model=model,
         fit=fit,
         scale=np.abs(np.diagonal(fit.fit.response(), axis1=-2, axis2=-1)),
@@ -158,8 +158,10 @@ def norm_tables(done: FittedNorms, dwells: pd.DataFrame) -> dict[str, pd.DataFra
     out_unit = str(dwells["out_unit"].iloc[0])
     fit = done.fit
     return {
-        "coefficients": coefficient_rows(done.found.units, fit.fit, fit.fit.covariance, out_unit, fit.nonlinear_error),
-        "covariance": covariance_rows(done.found.units, fit.fit.covariance),
+        "coefficients": coefficient_rows(
+            done.measured.units, fit.fit, fit.fit.covariance, out_unit, fit.nonlinear_error
+        ),
+        "covariance": covariance_rows(done.measured.units, fit.fit.covariance),
         "residuals": _residual_rows(done, dwells),
         "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
         "wander": _wander_rows(done),
@@ -171,14 +173,14 @@ def _typical(output: Array) -> Array:
 
 
 def _residual_rows(done: FittedNorms, dwells: pd.DataFrame) -> pd.DataFrame:
-    u, n = np.nonzero(done.found.readings.there)
-    state, numbers = done.found.state, done.found.dwells[n]
+    u, n = np.nonzero(done.measured.readings.there)
+    state, numbers = done.measured.state, done.measured.dwells[n]
     error = done.model.problem.error * done.model.noise.scale[:, None]
     expected = np.hypot(error, np.hypot(done.flicker, done.walk)[:, None])
     poses = dwells.drop_duplicates("dwell").set_index("dwell")["pose"].astype(str) if "pose" in dwells.columns else None
     return pd.DataFrame(
         {
-            "unit": picked(done.found.units, u),
+            "unit": picked(done.measured.units, u),
             "dwell": numbers,
             "axis": NORM,
             "pose": [f"dwell {k}" for k in numbers] if poses is None else poses.reindex(numbers).tolist(),
@@ -192,12 +194,12 @@ def _residual_rows(done: FittedNorms, dwells: pd.DataFrame) -> pd.DataFrame:
 
 
 def _wander_rows(done: FittedNorms) -> pd.DataFrame:
-    units = len(done.found.units)
+    units = len(done.measured.units)
     u, a = (index.ravel() for index in np.meshgrid(np.arange(units), np.arange(3), indexing="ij"))
     parts = {"white_ug": done.white, "flicker_ug": done.flicker, "walk_ug": done.walk}
     return pd.DataFrame(
         {
-            "unit": picked(done.found.units, u),
+            "unit": picked(done.measured.units, u),
             "axis": picked(AXES, a),
             "method": "wander",
             **{name: MICRO * values[u] for name, values in parts.items()},

@@ -39,7 +39,7 @@ UNSEEN = 0.1
 
 
 @dataclass(frozen=True)
-class Split:
+class VarianceParts:
     """Influences through a fit, with the part that a verification on the same station shows.
 
     verification : (..., m, 3, q), J·u at the dwells for verification; visible : (q,), visible share of every influence
@@ -51,7 +51,7 @@ class Split:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class BudgetQuantity:
     """A quantity of every unit of a lot with the error that each influence makes of it.
 
     value, noise : (units,), in ``unit``; noise is the standard uncertainty of type A
@@ -75,8 +75,8 @@ class Quantity:
 
 
 def quantities_of(
-    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, found: Split
-) -> Iterator[Quantity]:
+    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, found: VarianceParts
+) -> Iterator[BudgetQuantity]:
     """Every quantity of a budget."""
     units = len(lot.units)
     dof = np.full(units, float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
@@ -90,7 +90,7 @@ def quantities_of(
         yield from _period(errors, lot, tables, terms, dof)
 
 
-def _coefficients(calibration: Calibration, found: Split, scale: Array, dof: Array) -> Iterator[Quantity]:
+def _coefficients(calibration: Calibration, found: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
     spread = np.sqrt(np.diagonal(calibration.covariance, axis1=-2, axis2=-1))
     for effect, unit in EFFECTS.items():
         for axis, letter in enumerate(AXES):
@@ -101,14 +101,14 @@ def _coefficients(calibration: Calibration, found: Split, scale: Array, dof: Arr
                 value = factor * calibration.coefficients[:, axis, column]
                 parts = factor[:, None] * found.fit.coefficients[:, axis, column, :]
                 nominal = MICRO if effect == "scale" else 0.0
-                yield Quantity(effect, along, unit, value - nominal, factor * spread[:, axis, column], parts, dof)
+                yield BudgetQuantity(effect, along, unit, value - nominal, factor * spread[:, axis, column], parts, dof)
 
 
 def _across(axis: int, place: int) -> str:
     return AXES[(axis + 1 + place) % 3]
 
 
-def _angles(calibration: Calibration, found: Split, scale: Array, dof: Array) -> Iterator[Quantity]:
+def _angles(calibration: Calibration, found: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
     """Deviation from 90° of the angle between two axes, (m_ij + m_ji): independent of the seat."""
     if "misalignment" not in calibration.effects:
         return
@@ -122,12 +122,12 @@ def _angles(calibration: Calibration, found: Split, scale: Array, dof: Array) ->
         value = fi * calibration.coefficients[:, i, a] + fj * calibration.coefficients[:, j, b]
         parts = fi[:, None] * found.fit.coefficients[:, i, a] + fj[:, None] * found.fit.coefficients[:, j, b]
         u = np.sqrt((fi**2) * noise[:, i, a, a] + (fj**2) * noise[:, j, b, b])
-        yield Quantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, dof)
+        yield BudgetQuantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, dof)
 
 
 def _outputs(
-    lot: LotArrays, calibration: Calibration, terms: BudgetTerms, found: Split, dof: Array
-) -> Iterator[Quantity]:
+    lot: LotArrays, calibration: Calibration, terms: BudgetTerms, found: VarianceParts, dof: Array
+) -> Iterator[BudgetQuantity]:
     """Corrected output, worst force and temperature of the certified range."""
     state = certified_range(lot, terms)
     columns = design.local_columns(design.split(calibration.effects)[0], state, calibration.nonlinear)
@@ -148,13 +148,13 @@ def output_noise(calibration: Calibration, columns: Array) -> Array:
     return MICRO**2 * np.einsum("uij,umj,ukj->umik", inverse, own, inverse)
 
 
-def _worst(name: str, axis: str, errors: Array, variance: Array, value: Array, dof: Array) -> Quantity:
+def _worst(name: str, axis: str, errors: Array, variance: Array, value: Array, dof: Array) -> BudgetQuantity:
     """The quantity at the condition where its variance is largest, by unit; errors (units, m, q), variance (units, m)."""
     errors = np.broadcast_to(errors, (value.size, *errors.shape[-2:]))
     whole = np.sum(errors**2, axis=-1) + variance
     where = np.argmax(whole, axis=-1)
     rows = np.arange(value.size)
-    return Quantity(name, axis, "µg", value, np.sqrt(variance[rows, where]), errors[rows, where], dof)
+    return BudgetQuantity(name, axis, "µg", value, np.sqrt(variance[rows, where]), errors[rows, where], dof)
 
 
 def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
@@ -190,8 +190,8 @@ def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
 
 
 def _verification(
-    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, found: Split, dof: Array
-) -> Iterator[Quantity]:
+    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, found: VarianceParts, dof: Array
+) -> Iterator[BudgetQuantity]:
     """RMS error of each axis for the user, and the magnitude at its worst pose."""
     unseen = lot.of_kind("verification")
     columns = design.local_columns(design.split(calibration.effects)[0], lot.state, calibration.nonlinear)
@@ -206,7 +206,7 @@ def _verification(
         own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
         noise = rows[f"rms_uncertainty_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)[:, 0]
         parts = np.sqrt(np.mean(true[..., axis, :] ** 2, axis=-2))
-        yield Quantity(
+        yield BudgetQuantity(
             "bias_error",
             letter,
             "µg",
@@ -244,8 +244,8 @@ def _all(values: Array, lot: LotArrays) -> Array:
 
 
 def _period(
-    errors: list[Quantity], lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, dof: Array
-) -> Iterator[Quantity]:
+    errors: list[BudgetQuantity], lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, dof: Array
+) -> Iterator[BudgetQuantity]:
     """RMS error over the period of validity of each axis; none if nothing is stated for the time after the run."""
     used = lot.of_kind("dwell")
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[:, used]
@@ -265,7 +265,7 @@ def _period(
         # of a square: that of the run by its own uncertainty, of what is fixed for a unit by its distribution
         square = 4.0 * (own.value * own.noise) ** 2 + 2.0 * fixed**4 / _dimensions(own.parts) + 2.0 * ageing**4
         noise = np.sqrt(square) / (2.0 * np.maximum(value, np.finfo(float).tiny))
-        yield Quantity(
+        yield BudgetQuantity(
             "bias_error_period",
             letter,
             "µg",

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial import design
-from inertial.uncertainty.influences import Model, sensitivity
+from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
 from inertial.uncertainty.propagation import fit_design, propagated, rms_over
 from pipelines.stages.budget import with_device_temperature
-from pipelines.stages.contributions import Conditions, influences
+from pipelines.stages.contributions import DwellConditions, influences
 from pipelines.stages.period import ageing_u
 from schemas.limits import GRADES
 from schemas.units import AXES, MICRO
@@ -80,7 +80,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
         return []
     nominal = _nominal(effects, planned.fit)
     model = with_device_temperature(nominal, np.eye(3), terms.stability)
-    at = Conditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
+    at = DwellConditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
     source = sensitivity(model, planned.fit, *influences(terms.stated, at, terms.stability))
     fit = fit_design(nominal, planned.fit, planned.covariance)
     found = propagated(fit, source, np.eye(3))
@@ -97,12 +97,12 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     return out
 
 
-def _nominal(effects: Sequence[str], state: State) -> Model:
+def _nominal(effects: Sequence[str], state: State) -> MeasurementModel:
     sensor, station = design.split(effects)
     values = design.starting_values([*sensor, *station], state)
     names = [design.local_names(sensor, axis, values) for axis in range(3)]
     coefficients = np.array([[1.0 if effect == "scale" else 0.0 for effect, _ in own] for own in names])
-    return Model(tuple(effects), coefficients, values)
+    return MeasurementModel(tuple(effects), coefficients, values)
 
 
 def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, names: Array) -> Reach:
@@ -112,7 +112,9 @@ def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, nam
     return Reach(quantity, axis, unit, float(np.sqrt(sum(v**2 for v in parts.values()))), parts)
 
 
-def _errors(planned: PlannedDwells, terms: BudgetTerms, model: Model, found: Propagated, names: Array) -> list[Reach]:
+def _errors(
+    planned: PlannedDwells, terms: BudgetTerms, model: MeasurementModel, found: Propagated, names: Array
+) -> list[Reach]:
     """RMS error for the user, by the references alone, and over the period."""
     state = planned.verification
     if state is None:

@@ -69,7 +69,7 @@ class Digits:
         return 1.0 - max(self.counts.values(), default=0) / max(self.n, 1)
 
 
-class Series:
+class StaticSeries:
     """Outputs of the static record, collected table by table; of a long record the means of ``size`` samples each.
 
     The Allan deviation of means is that of the samples themselves, from an averaging time of ``size`` samples on.

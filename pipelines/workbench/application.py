@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
     from starlette.types import ASGIApp
 
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
 ROUTES = "pipelines.workbench.routes"
 
 
-def create_app(settings: Settings) -> ASGIApp:
+def create_app(settings: WorkbenchSettings) -> ASGIApp:
     """The application, with access control."""
     settings.refuse_unsafe()
     bench = Workbench(settings, Jobs(settings.folder / "jobs.json", settings.workers))

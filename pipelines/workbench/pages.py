@@ -18,7 +18,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from pipelines.archive import Archive
 from pipelines.report.charts import csv_text, plotly_figure, png_bytes
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pipelines.report.charts import Chart
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
     from pipelines.workbench.state import PageState
 
 State = TypeVar("State", bound="PageState")
@@ -46,7 +46,7 @@ class Workbench:
     boot : id of this process of the server · navigation : heading and address of the pages, in order
     """
 
-    settings: Settings
+    settings: WorkbenchSettings
     jobs: Jobs
     boot: str = field(default_factory=lambda: secrets.token_hex(8))
     navigation: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
@@ -92,7 +92,7 @@ def page(
     text = _environment().get_template(template).render(
         state=state, problems=problems or [], bench=bench, command=state.command(bench.settings.archive),
         may_change=bool(getattr(request.state, "may_change", False)), static=static_version(), path=request.url.path,
-        number=plain, micro=MICRO, finite=math.isfinite, **values,
+        number=significant, micro=MICRO, finite=math.isfinite, **values,
     )  # fmt: skip
     return HTMLResponse(text, status)
 

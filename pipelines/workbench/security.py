@@ -18,7 +18,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
 READING = frozenset({"GET", "HEAD"})
 CHANGING = frozenset({"POST", "PUT", "DELETE"})
@@ -41,7 +41,7 @@ HEADERS = {
 class Guard:
     """Passes permitted requests; every response has the headers above."""
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    def __init__(self, app: ASGIApp, settings: WorkbenchSettings) -> None:
         self._app, self._settings = app, settings
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -63,7 +63,7 @@ class Guard:
         await self._app(scope, receive, _with_headers(send))
 
 
-def _refused(scope: Scope, settings: Settings) -> str | None:
+def _refused(scope: Scope, settings: WorkbenchSettings) -> str | None:
     """The reason for a refusal; None if the request is permitted."""
     headers = Headers(scope=scope)
     name = _host(headers)
@@ -85,7 +85,7 @@ def _host(headers: Headers) -> str:
     return before + bracket if bracket else text.partition(":")[0]
 
 
-def _refused_to_read(scope: Scope, headers: Headers, settings: Settings) -> str | None:
+def _refused_to_read(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> str | None:
     if headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-mode") not in {None, "navigate"}:
         return "workbench: requests from other sites are refused"
     if not settings.local and not _token_given(scope, settings) and not _asks_to_enter(scope):
@@ -93,7 +93,7 @@ def _refused_to_read(scope: Scope, headers: Headers, settings: Settings) -> str 
     return None
 
 
-def _refused_to_change(scope: Scope, headers: Headers, settings: Settings) -> str | None:
+def _refused_to_change(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> str | None:
     origin = headers.get("origin")
     if origin is None and not _bearer(headers):
         return "workbench: a change without an origin is refused; send the token as 'Authorization: Bearer …'"
@@ -104,7 +104,7 @@ def _refused_to_change(scope: Scope, headers: Headers, settings: Settings) -> st
     return None
 
 
-def _origins(headers: Headers, settings: Settings) -> set[str]:
+def _origins(headers: Headers, settings: WorkbenchSettings) -> set[str]:
     """Origins of this service for a host name."""
     host = headers.get("host", "").lower()
     schemes = ("https",) if settings.tls else ("https", "http") if settings.proxied else ("http",)
@@ -116,7 +116,7 @@ def _bearer(headers: Headers) -> str:
     return value.strip() if kind.lower() == "bearer" else ""
 
 
-def _token_given(scope: Scope, settings: Settings) -> bool:
+def _token_given(scope: Scope, settings: WorkbenchSettings) -> bool:
     headers = Headers(scope=scope)
     cookie: Any = None
     with suppress(CookieError):
@@ -129,7 +129,7 @@ def _asks_to_enter(scope: Scope) -> bool:
     return any(name == "token" for name, _ in parse_qsl(scope["query_string"].decode("latin-1")))
 
 
-def _entering(scope: Scope, settings: Settings) -> RedirectResponse | PlainTextResponse | None:
+def _entering(scope: Scope, settings: WorkbenchSettings) -> RedirectResponse | PlainTextResponse | None:
     """The token of the address exchanged for a cookie, so that it does not remain in the address."""
     if scope["method"] not in READING or not _asks_to_enter(scope):
         return None

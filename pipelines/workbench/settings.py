@@ -16,7 +16,7 @@ PORT = 8321
 
 
 @dataclass(frozen=True)
-class Settings:
+class WorkbenchSettings:
     """A workbench of an archive.
 
     archive : its address · folder : of files of dwells, models, uploads and the state of jobs and lots

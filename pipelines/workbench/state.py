@@ -71,14 +71,14 @@ class PageState(BaseModel):
         query = self.query(**changes)
         return f"{self.PATH}/figure/{name}.{ending}" + (f"?{query}" if query else "")
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The command that gives the same numbers, without the archive."""
         return []
 
     def command(self, archive: str) -> str:
         """The command line that gives the same numbers."""
-        words = self.words()
-        return shlex.join(["tumbleline", *words, "--archive", archive]) if words else ""
+        arguments = self.arguments()
+        return shlex.join(["tumbleline", *arguments, "--archive", archive]) if arguments else ""
 
 
 class UnitsPage(PageState):
@@ -94,7 +94,7 @@ class UnitsPage(PageState):
     order: Literal["measured", "unit", "outcome", "station"] = "measured"
     page: Annotated[int, Field(ge=1, le=100_000)] = 1
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """A question in SQL."""
         from pipelines.workbench.questions import units_question
 
@@ -107,7 +107,7 @@ class RunPage(PageState):
     PATH: ClassVar[str] = "/run"
     run: Text = "latest"
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The run's summary."""
         return ["show", self.run]
 
@@ -125,7 +125,7 @@ class UnitPage(PageState):
     dwell: Text = ""
     parameter: Text = "bias x"
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The table of residuals."""
         return ["show", self.run, "residuals"]
 
@@ -155,7 +155,7 @@ class MissingPage(PageState):
         """The effects of the model that is judged; empty for that of the source."""
         return (*self.effects, *self.added)
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The diagnosis."""
         if not self.source:
             return []
@@ -167,12 +167,12 @@ class MissingPage(PageState):
 
     def ladder_command(self, archive: str) -> str:
         """The command line for the errors of the model in its present state."""
-        words = self.words()
-        if not words:
+        arguments = self.arguments()
+        if not arguments:
             return ""
-        words[0] = "compare"
-        words += ["--fresh", self.fresh] if self.fresh else []
-        return shlex.join(["tumbleline", *words, "--archive", archive])
+        arguments[0] = "compare"
+        arguments += ["--fresh", self.fresh] if self.fresh else []
+        return shlex.join(["tumbleline", *arguments, "--archive", archive])
 
 
 class UploadPage(PageState):
@@ -192,7 +192,7 @@ class UploadPage(PageState):
     fit: Literal["", "norm", "faces", "temperature"] = "norm"
     run: Text = ""
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The import."""
         if not self.file:
             return []
@@ -219,7 +219,7 @@ class ModelsPage(PageState):
     model: Text = ""
     evaluate: Literal["", "yes"] = ""
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The what-if, or the list of releases."""
         return ["whatif", f"{self.model}.toml"] if self.model else ["release", "--list"]
 
@@ -236,7 +236,7 @@ class PlanPage(PageState):
     pose: Texts = ()
     edit: Text = ""
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The plan."""
         words = ["plan", self.recipe, *(["--effects", ",".join(self.effects)] if self.effects else [])]
         return words + [word for text in self.pose for word in ("--pose", text)]
@@ -248,7 +248,7 @@ class StationPage(PageState):
     PATH: ClassVar[str] = "/station"
     run: Text = "latest"
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The station's log."""
         return ["station", "log", self.run]
 
@@ -263,7 +263,7 @@ class AuditPage(PageState):
     station: Text = ""
     finding: Text = ""
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """The audit."""
         words = ["audit"]
         for name in ("since", "until", "device", "station"):

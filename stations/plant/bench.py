@@ -19,7 +19,7 @@ from stations.plant.device import stream
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from stations.plant.device import Devices, Truth
+    from stations.plant.device import PlantDevices, Truth
     from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
@@ -109,7 +109,7 @@ class Bench:
 
     preset: Preset
     truths: Sequence[Truth]
-    devices: Devices
+    devices: PlantDevices
     gravity: float
     station_seed: int
     lot_seed: int

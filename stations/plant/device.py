@@ -88,7 +88,7 @@ def draw_truth(
     )
 
 
-class Devices:
+class PlantDevices:
     """The units of a lot, computed together."""
 
     def __init__(self, preset: Preset, truths: Sequence[Truth], turn_on: Sequence[np.random.Generator] = ()) -> None:

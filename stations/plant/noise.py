@@ -39,7 +39,7 @@ def flicker_variance(instability: float) -> float:
     return instability**2 / math.pi * math.log(RATIO)
 
 
-class Noise:
+class UnitNoise:
     """The noise of a lot, in g, with the state that continues from one sampling to the next."""
 
     def __init__(self, preset: Preset, streams: Sequence[np.random.Generator]) -> None:

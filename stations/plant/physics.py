@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from stations.codec import Counts
-    from stations.plant.device import Devices
+    from stations.plant.device import PlantDevices
     from stations.plant.dynamics import Dynamics
     from stations.plant.fixture import Fixture
     from stations.plant.hidden import HiddenEffect
-    from stations.plant.noise import Noise
+    from stations.plant.noise import UnitNoise
     from stations.plant.table import Axis
 
 Array = NDArray[np.float64]
@@ -37,9 +37,9 @@ class Physics:
         axes: tuple[Axis, Axis],
         fixture: Fixture,
         rotations: Array,
-        devices: Devices,
+        devices: PlantDevices,
         dynamics: Dynamics,
-        noise: Noise,
+        noise: UnitNoise,
         hidden: Sequence[HiddenEffect],
         gravity: float,
     ) -> None:

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 CHUNK = 1024
 
 
-class Source(Protocol):
+class SampleSource(Protocol):
     """Source of the samples."""
 
     def begin(self, start: float, rate: float) -> None:
@@ -31,7 +31,7 @@ class Source(Protocol):
 class Sampler:
     """Ring buffers of ``registers`` words, filled as the time of the plant advances."""
 
-    def __init__(self, source: Source, units: int, packing: Packing, registers: int) -> None:
+    def __init__(self, source: SampleSource, units: int, packing: Packing, registers: int) -> None:
         self._source = source
         self.packing: Packing = packing
         self._words = WORDS_PER_SAMPLE[packing]

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from schemas.errors import WrongUse
 from schemas.station import MOST_SLOTS, Simulation, StationConfig
 from stations.plant.bench import Bench
-from stations.plant.device import Devices, Truth, draw_truth, rotation, stream
+from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
 from stations.plant.flash import Flash
 from stations.plant.hidden import hidden_effect
 from stations.plant.keyed import keyed_normal
 from stations.plant.moisture import Moisture
-from stations.plant.noise import Noise
+from stations.plant.noise import UnitNoise
 from stations.plant.physics import Physics
 from stations.plant.preset import Preset, load_preset
 from stations.plant.reference_errors import StationErrors
@@ -84,9 +84,9 @@ class World:
             (self.outer, self.inner),
             self.fixture,
             np.stack([t.slot_rotation for t in self._truths]),
-            Devices(self.preset, self._truths, turn_on),
+            PlantDevices(self.preset, self._truths, turn_on),
             Dynamics(self.preset),
-            Noise(self.preset, noise),
+            UnitNoise(self.preset, noise),
             effects,
             sim.local_gravity_m_s2 / STANDARD_G,
         )

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from docs.documents_page import PAGE, documents, head_of, page
 from inertial.dynamics.second_order import transfer
 from inertial.dynamics.settling import step_response
+from pipelines import cli
 from pipelines.chain import certify as certifying
 from pipelines.cli import COMMANDS, app
 
@@ -21,6 +22,22 @@ BY_HEAD = {head_of(kind): kind for kind in documents()}
 MODEL = (
     "bias,scale,misalignment,bias_temperature,scale_temperature,bias_temperature_quadratic,scale_temperature_quadratic"
 )
+IMPORTED = [
+    "--map",
+    "x=x,y=y,z=z",
+    "--units",
+    "output=g",
+    "--rate",
+    "100",
+    "--unit",
+    "S1",
+    "--face",
+    "+z",
+    "--blocks",
+    "5",
+]
+IMPORTED += ["--local-g", "9.81"]
+CORRECTED = ["--rate", "100", "--force", "0,0,1", "--turn-on", "100"]
 CASES = {
     "plan --json": ["plan"],
     "station status --json": ["station", "status"],
@@ -53,8 +70,24 @@ CASES = {
     "doctor --json": ["doctor"],
     "monitor --json": ["monitor"],
     "keys [SUBJECT] --json": ["keys", "recipe"],
+    "report RUN --json": ["report", "latest"],
+    "extend --json": ["extend", "{folder}/model.toml", "second_order"],
+    "release MODEL --json": ["release", "{folder}/model.toml", "--from", "2026-01-01", "--force", "--reason", "a test"],
+    "release --list --json": ["release", "--list"],
+    "revoke UNIT --json": ["revoke", "A1", "--reason", "a test"],
+    "lineage UNIT|RUN|FILE --json": ["lineage", "A1"],
+    "import FILE… --json": ["import", "{folder}/rest.csv", *IMPORTED],
+    "import FILE FILE… --json": ["import", "{folder}/rest.csv", "{folder}/rest.csv", *IMPORTED],
+    "correct --json": ["correct", "{folder}/corrected.csv", "--calibration", "latest:A1", *CORRECTED],
+    "station watch --json": ["station", "watch", "latest"],
+    "station profiles --json": ["station", "profiles"],
+    "archive clean --json": ["archive", "clean", "--dry-run"],
+    "archive key --json": ["archive", "key", "--output", "{folder}/key.pem"],
+    "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }
-WITHOUT_ARCHIVE = {"plan", "station", "inspect", "keys"}
+WITHOUT_ARCHIVE = {"plan", "station", "inspect", "keys", "extend"}
+OF_STATION_IN_ARCHIVE = (["log"], ["watch", "latest"])
+WITHOUT_OPTION = (["archive", "key"],)
 
 
 @pytest.fixture(scope="module")
@@ -63,10 +96,12 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("kept")
     with tarfile.open(KEPT) as archive:
         archive.extractall(folder / "archive", filter="data")
-    certify = ["certify", "latest", "--archive", str(folder / "archive")]
+    certify = ["certify", "latest", "--json", "--archive", str(folder / "archive")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(certifying, "refuse_unstated", lambda run: None)  # certified by the version that made the archive
-        assert CliRunner().invoke(app, certify).exit_code == 0
+        certified = CliRunner().invoke(app, certify)
+        assert certified.exit_code == 0
+        (folder / "certify.json").write_text(certified.stdout, encoding="utf-8")
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
     rows = [f"{k / 10},{k % 3},{k % 2},16{k % 10}" for k in range(200)]
@@ -76,6 +111,8 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     time = np.arange(1000) / 50e3 - 0.003
     step = np.column_stack([0.3 * step_response(time, 900.0, 0.6) + 1e-4 * rng.normal(size=1000), 2.0 * (time > 0.0)])
     np.savetxt(folder / "step.csv", step, delimiter=",", header="out [V],drive [V]", comments="")
+    rows = np.column_stack([1e-6 * rng.normal(size=(200, 3)) + [0.0, 0.0, 1.0], np.full(200, 25.0)])
+    np.savetxt(folder / "corrected.csv", rows, delimiter=",", header="x,y,z,unit_C", comments="")
     f = np.geomspace(5.0, 4000.0, 30)
     h = -transfer(f, 2500.0, 0.7)
     rows = [f"{a:.6g},{abs(b):.6g},{np.degrees(np.angle(b)):.6g},0.2,0.2" for a, b in zip(f, h, strict=True)]
@@ -94,11 +131,17 @@ def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_pa
     shutil.copytree(kept, tmp_path / "own")
     words = [word.format(folder=tmp_path / "own") for word in CASES[head]]
     place = (
-        [] if words[0] in WITHOUT_ARCHIVE and words[1:] != ["log"] else ["--archive", str(tmp_path / "own" / "archive")]
+        []
+        if (words[0] in WITHOUT_ARCHIVE and words[1:] not in OF_STATION_IN_ARCHIVE) or words[:2] in WITHOUT_OPTION
+        else ["--archive", str(tmp_path / "own" / "archive")]
     )
     result = CliRunner().invoke(app, [*words, "--json", *place])
     assert result.exit_code in (0, 1), result.output
     validate(BY_HEAD[head], result.stdout)
+
+
+def test_certify_prints_the_document_of_its_type(kept: Path) -> None:
+    validate(BY_HEAD["certify --json"], (kept / "certify.json").read_text(encoding="utf-8"))
 
 
 def test_every_typed_document_is_printed_by_a_test() -> None:
@@ -106,10 +149,20 @@ def test_every_typed_document_is_printed_by_a_test() -> None:
     untested = {"run --json (several fillings)", "show RUN --json (no grades)", "investigate --json", "operator --json"}
     untested |= {"certificate --json"}  # tests/unit/test_certificate_document.py
     untested |= {"verify FILE… --json"}  # tests/unit/test_certificate_check.py
-    untested |= {"certify --json"}  # tests/unit/test_certificate_check.py
-    untested |= {"correct --json", "program --json"}  # tests/e2e/test_correct.py, tests/faults/test_programming.py
+    untested |= {"certify --json"}  # above, and tests/unit/test_certificate_check.py
+    untested |= {"program --json"}  # tests/faults/test_programming.py
     untested |= {"fit --json (an import)"}  # tests/e2e/test_imported_recording.py
+    untested |= {"demo --auto --json", "demo --by-hand --json"}  # tests/e2e/test_diagnosis_commands.py
+    untested |= {"station serve --json", "archive restore --json"}  # tests/e2e/test_station.py, test_backup.py
     assert set(BY_HEAD) - set(CASES) == untested
+
+
+def test_every_command_that_prints_json_has_a_document() -> None:
+    """Those whose modules have the option ``--json`` themselves."""
+    modules = Path(cli.__file__).parent.glob("*.py")
+    printing = {path.stem.rstrip("_") for path in modules if "JsonOption" in path.read_text(encoding="utf-8")}
+    of_a_format = {"export"}  # its --json is the format json: tests/contract/test_export_formats.py
+    assert (printing & set(COMMANDS)) - of_a_format == {head.split()[0] for head in BY_HEAD} & printing
 
 
 def test_every_document_names_a_command() -> None:

@@ -12,7 +12,7 @@ from docs.figures_page import PAGE, page
 from pipelines.archive import Archive
 from pipelines.archive.keys import sources
 from pipelines.stages.figures import FIGURES, UNITS, FigureKind, IncompleteFigure, find_figures
-from pipelines.stages.grade import Evidence, grade, refuse_limits_without_figures
+from pipelines.stages.grade import GradeEvidence, grade, refuse_limits_without_figures
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits, limits_of, parse_limits
 
@@ -38,7 +38,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory):
 def table(kept):
     """Figures of a kept archive, graded by limits on every figure."""
     there = kept.tables()
-    evidence = Evidence(**{name: kept.table(name) for name in Evidence.__dataclass_fields__ if name in there})
+    evidence = GradeEvidence(**{name: kept.table(name) for name in GradeEvidence.__dataclass_fields__ if name in there})
     return grade(evidence, limits_of(ALL, UNITS))["figures"]
 
 

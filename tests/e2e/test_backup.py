@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from capture_double import CaptureDouble, small_job
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, backup
@@ -16,6 +17,7 @@ from pipelines.archive.backup import copy_archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
+from pipelines.cli.documents.archive import ArchiveRestoreDocument
 from pipelines.flows.database import copy_database, restore_database
 from pipelines.integrity.archive import verify
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -53,6 +55,8 @@ def test_a_copy_restored_is_the_archive_byte_for_byte(made: Path, tmp_path: Path
     result = CliRunner().invoke(app, ["archive", "restore", str(copy), "--archive", str(back)])
     assert result.exit_code == 0, result.output
     assert "nothing is wrong" in result.output
+    again = CliRunner().invoke(app, ["archive", "restore", str(copy), "--archive", str(tmp_path / "more"), "--json"])
+    assert TypeAdapter(ArchiveRestoreDocument).validate_json(again.stdout, extra="forbid")["whole"]
     assert content(back) == content(root)
     assert verify(Archive(back), keys={}).head == verify(Archive(root), keys={}).head
 

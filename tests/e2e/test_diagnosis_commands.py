@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from pydantic import TypeAdapter
 
 from inertial import effects
 from pipelines.cli import main
+from pipelines.cli.documents.models import DemoDocument
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
 
@@ -305,7 +307,7 @@ def test_the_demonstration_finds_what_it_hid(command, tmp_path):
     status, out, _ = command(
         "demo", "--effect", "cubic_transfer", "--seed", "7", "--json", "--folder", tmp_path / "game"
     )
-    document = json.loads(out)
+    document = TypeAdapter(DemoDocument).validate_json(out, extra="forbid")
     assert status == 0
     assert document["hidden"]["effect"] == "third_order"
     assert document["found"] is True

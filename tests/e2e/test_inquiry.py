@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.cli.documents import OperatorDocument
+from pipelines.cli.documents.station import OperatorDocument
 from pipelines.inquiry.documents import InquiryDocument
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
 from pipelines.inquiry.joint_diagnosis import JointDiagnosis
-from pipelines.inquiry.loop import Consent, Participants, Settings, run_inquiry
+from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_inquiry
 from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse
 
@@ -28,13 +28,13 @@ CUBIC = {"hardening": 150e-6}
 
 
 def played(
-    folder: Path, participants: Participants | None = None, settings: Settings | None = None, **job: object
+    folder: Path, participants: Participants | None = None, settings: InquirySettings | None = None, **job: object
 ) -> dict:
     wanted = job or CUBIC
     return run_inquiry(
         inquiries.job_of(folder, **wanted),
         Archive(folder / "archive"),
-        settings or Settings(),
+        settings or InquirySettings(),
         participants or Participants(),
     )
 
@@ -153,7 +153,7 @@ def test_without_consent_nothing_more_is_measured(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
-    document = played(tmp_path, settings=Settings(budget=0.1))
+    document = played(tmp_path, settings=InquirySettings(budget=0.1))
     assert document["ended"] == "budget"
     assert "give --budget" in document["text"]
     assert len(document["runs"]) == 1
@@ -162,7 +162,7 @@ def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_what_faces_cannot_see_is_measured_where_it_is_asked_for(tmp_path: Path) -> None:
     hidden = {"kind": "pendulous_mass", "plan": "orthogonal24", "compliance": 80e-6}
-    document = played(tmp_path, settings=Settings(unseen=True, budget=5.0), **hidden)
+    document = played(tmp_path, settings=InquirySettings(unseen=True, budget=5.0), **hidden)
     # the table stands some microradians off in a part of its poses, and no pose is named for that
     (group,) = document["classes"]
     assert group["effects"] == ["cross_coupling"]

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from pydantic import TypeAdapter
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
 from inertial.frames import force_from_angles
 from pipelines.capture.capture import capture
+from pipelines.cli.documents.station import StationServeDocument
 from pipelines.schedule.steps import steps
 from schemas.station import load_station
 from schemas.table_check import check
@@ -163,7 +165,7 @@ def served(*options: str):
                 lines.append(line)
                 if line == "}\n":
                     break
-            yield int(json.loads("".join(lines))["port"])
+            yield int(TypeAdapter(StationServeDocument).validate_json("".join(lines), extra="forbid")["port"])
         finally:
             process.terminate()
             process.wait(20.0)

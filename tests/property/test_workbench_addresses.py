@@ -52,8 +52,8 @@ def test_parse_after_address_is_the_identity(kind: type[PageState], data: st.Dat
 @given(data=st.data())
 def test_every_state_has_a_command_line_that_a_shell_reads_back(kind: type[PageState], data: st.DataObject) -> None:
     state = data.draw(states(kind))
-    if state.words():
-        assert shlex.split(state.command("an archive"))[1:-2] == state.words()
+    if state.arguments():
+        assert shlex.split(state.command("an archive"))[1:-2] == state.arguments()
 
 
 @CALM

@@ -180,7 +180,7 @@ def told_different(every, columns):
     rows = np.tile(np.arange(n), len(columns))
     able, found = abilities(every, Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts))
     held = np.mean([one.ppk.low <= LIMIT / 3.0 <= one.ppk.high for one in able])
-    return any(one.by != "lot" and one.p < 1e-3 and one.found.effect > 0.02 for one in found), held
+    return any(one.by != "lot" and one.p < 1e-3 and one.comparison.effect > 0.02 for one in found), held
 
 
 def test_units_that_come_back_to_their_station_are_no_evidence_against_it(rng):

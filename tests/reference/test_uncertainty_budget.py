@@ -14,7 +14,15 @@ from inertial import design, poses
 from inertial.frames import force_from_angles
 from inertial.state import State
 from inertial.uncertainty.degrees import coverage_factor, from_reliability, rounded, welch_satterthwaite
-from inertial.uncertainty.influences import Errors, Influence, Model, Scattered, harmonic, sensitivity, theta
+from inertial.uncertainty.influences import (
+    Errors,
+    InputQuantity,
+    MeasurementModel,
+    Scattered,
+    harmonic,
+    sensitivity,
+    theta,
+)
 from inertial.uncertainty.period import (
     YEAR_S,
     Windows,
@@ -55,39 +63,41 @@ def state_of(angles: np.ndarray, temperatures: tuple[float, ...]) -> State:
     )
 
 
-def model_of(effects: tuple[str, ...]) -> Model:
+def model_of(effects: tuple[str, ...]) -> MeasurementModel:
     values = {"scale": 1.0, "bias_temperature": 50e-6, "scale_temperature": 200e-6}
     names = [design.local_names(design.split(effects)[0], axis) for axis in range(3)]
-    return Model(effects, np.array([[values.get(effect, 0.0) for effect, _ in own] for own in names]), {})
+    return MeasurementModel(effects, np.array([[values.get(effect, 0.0) for effect, _ in own] for own in names]), {})
 
 
 def unit(axis: int) -> tuple[float, float, float]:
     return tuple(float(k == axis) for k in range(3))  # type: ignore[return-value]
 
 
-def station(state: State, s: dict[str, float]) -> tuple[list[Influence], list[Scattered]]:
+def station(state: State, s: dict[str, float]) -> tuple[list[InputQuantity], list[Scattered]]:
     """The influences of a station of these standard uncertainties."""
     found = [
-        Influence("gravity", Errors(gravity=1.0), s["gravity"]),
-        Influence("level", Errors(level=(1.0, 0.0)), s["level_1"]),
-        Influence("level", Errors(level=(0.0, 1.0)), s["level_2"]),
-        Influence("orthogonality", Errors(orthogonality=1.0), s["orthogonality"]),
-        Influence("outer_offset", Errors(outer=1.0), s["outer"]),
-        Influence("inner_offset", Errors(inner=1.0), s["inner"]),
-        Influence("thermometer_offset", Errors(temperature=1.0), s["offset"]),
-        Influence("thermometer_slope", Errors(temperature=theta(state)), s["slope"]),
-        Influence("gradient", Errors(temperature=1.0), s["gradient"]),
-        Influence("supply", Errors(gain=1.0), s["supply"]),
-        Influence("gain", Errors(gain=1.0), s["gain"]),
+        InputQuantity("gravity", Errors(gravity=1.0), s["gravity"]),
+        InputQuantity("level", Errors(level=(1.0, 0.0)), s["level_1"]),
+        InputQuantity("level", Errors(level=(0.0, 1.0)), s["level_2"]),
+        InputQuantity("orthogonality", Errors(orthogonality=1.0), s["orthogonality"]),
+        InputQuantity("outer_offset", Errors(outer=1.0), s["outer"]),
+        InputQuantity("inner_offset", Errors(inner=1.0), s["inner"]),
+        InputQuantity("thermometer_offset", Errors(temperature=1.0), s["offset"]),
+        InputQuantity("thermometer_slope", Errors(temperature=theta(state)), s["slope"]),
+        InputQuantity("gradient", Errors(temperature=1.0), s["gradient"]),
+        InputQuantity("supply", Errors(gain=1.0), s["supply"]),
+        InputQuantity("gain", Errors(gain=1.0), s["gain"]),
     ]
     for order in (1, 2):
         for phase in ("sin", "cos"):
-            found.append(Influence("harmonics", Errors(outer=harmonic(state.outer, order, phase)), s["harmonics"]))
-            found.append(Influence("harmonics", Errors(inner=harmonic(state.inner, order, phase)), s["harmonics"]))
-    found += [Influence("seat", Errors(seat=unit(k)), s["seat"], "mount") for k in range(3)]
-    found += [Influence("reader", Errors(offset=unit(k)), s["reader"], "slot") for k in range(3)]
+            found.append(InputQuantity("harmonics", Errors(outer=harmonic(state.outer, order, phase)), s["harmonics"]))
+            found.append(InputQuantity("harmonics", Errors(inner=harmonic(state.inner, order, phase)), s["harmonics"]))
+    found += [InputQuantity("seat", Errors(seat=unit(k)), s["seat"], "mount") for k in range(3)]
+    found += [InputQuantity("reader", Errors(offset=unit(k)), s["reader"], "slot") for k in range(3)]
     for one in np.unique(state.temperature):
-        found.append(Influence("soak", Errors(temperature=(state.temperature == one).astype(float)), s["soak"], "soak"))
+        found.append(
+            InputQuantity("soak", Errors(temperature=(state.temperature == one).astype(float)), s["soak"], "soak")
+        )
     return found, [Scattered("pose", s["pose"], s["pose"])]
 
 
@@ -177,7 +187,7 @@ def test_what_rules_the_bias_of_z() -> None:
 
 def moved(plan: str, errors) -> np.ndarray:
     """Coefficients (3, p) per unit of an influence, response 1 and no temperature coefficients but the plan's."""
-    return through(plan, lambda state: [Influence("one", errors(state), 1.0)])[3].coefficients[..., 0]
+    return through(plan, lambda state: [InputQuantity("one", errors(state), 1.0)])[3].coefficients[..., 0]
 
 
 @pytest.mark.parametrize(
@@ -239,9 +249,9 @@ SHOWN = [  # influence, size, error of the worst axis shown and true, of the nor
 def test_what_the_stations_own_verification_shows_of_an_error(
     name, errors, size, shown, true, norm_shown, norm_true
 ) -> None:
-    _, effects, _, found = through("fib", lambda state: [Influence(name, errors(state), size)])
+    _, effects, _, found = through("fib", lambda state: [InputQuantity(name, errors(state), size)])
     at = state_of(np.array(VERIFICATION), PLANS["fib"][1])
-    own = sensitivity(model_of(effects), at, [Influence(name, errors(at), size)])
+    own = sensitivity(model_of(effects), at, [InputQuantity(name, errors(at), size)])
     columns_ = design.local_columns(design.split(effects)[0], at, {})
     for errors_, of_axis, of_norm in (
         (found.output_errors(columns_), true, norm_true),
@@ -256,7 +266,7 @@ def test_what_the_stations_own_verification_shows_of_an_error(
 
 def test_a_rotation_of_the_whole_unit_is_no_error_in_its_own_frame() -> None:
     _, effects, _, found = through(
-        "fib", lambda state: [Influence("seat", Errors(seat=unit(k)), 1e-3) for k in range(3)]
+        "fib", lambda state: [InputQuantity("seat", Errors(seat=unit(k)), 1e-3) for k in range(3)]
     )
     at = state_of(np.array(VERIFICATION), (25.0,))
     columns_ = design.local_columns(design.split(effects)[0], at, {})
@@ -477,5 +487,5 @@ def test_published_sites_lie_within_60_ppm_of_the_formula() -> None:
 
 
 def test_the_model_that_lacks_temperature_is_moved_by_the_devices_own_coefficient() -> None:
-    _, _, _, found = through("six", lambda state: [Influence("thermometer", Errors(temperature=1.0), 1.0)])
+    _, _, _, found = through("six", lambda state: [InputQuantity("thermometer", Errors(temperature=1.0), 1.0)])
     assert 1e6 * np.abs(found.coefficients[0, 0, 0]) == pytest.approx(50.0, rel=1e-6)

@@ -25,7 +25,7 @@ from pipelines.certificate_document.schema_files import DocumentInvalid, validat
 from pipelines.certificates import Ledger
 from pipelines.chain.certify import certify
 from pipelines.cli import app
-from pipelines.cli.documents import CertificateDocument
+from pipelines.cli.documents.certificates import CertificateDocument
 from schemas.errors import RecipeInvalid, WrongUse
 
 etree = pytest.importorskip("lxml.etree")

@@ -5,7 +5,7 @@ import pytest
 
 from inertial.noise.allan import overlapping
 from inertial.noise.dwells import DwellNoise, dwell_covariance, whitener
-from stations.plant.noise import Noise
+from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset
 
 SERIES = 250
@@ -13,7 +13,7 @@ SERIES = 250
 
 def drawn_means(preset, starts, duration, rate=10.0):
     """Means (dwells, series) of the plant's noise in µg, which knows nothing of the covariance under test."""
-    noise = Noise(preset, [np.random.default_rng([7, k]) for k in range(SERIES)])
+    noise = UnitNoise(preset, [np.random.default_rng([7, k]) for k in range(SERIES)])
     before, means = 0.0, []
     for start in starts:
         noise.jump(start - before)
@@ -43,7 +43,7 @@ def test_differences_of_dwells_scatter_as_the_covariance_says(name):
 
 def test_the_error_of_a_dwell_is_the_allan_deviation_at_its_length():
     preset = load_preset("SF1500").model_copy(update={"rate_random_walk_ug": 0.0})
-    record = Noise(preset, [np.random.default_rng(3)]).sample(60_000, 20.0)[:, 0, :].T
+    record = UnitNoise(preset, [np.random.default_rng(3)]).sample(60_000, 20.0)[:, 0, :].T
     curve = overlapping(1e6 * record, 20.0)
     at = int(np.argmin(np.abs(curve.tau - 10.0)))
     said = 1e6 * noise_of(preset).error(float(curve.tau[at]))

@@ -10,7 +10,7 @@ from inertial.fits.wander import fit_lot_with_wander
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.planning.expected import expected_errors
 from inertial.state import State
-from stations.plant.noise import Noise
+from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset
 
 THERMAL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
@@ -27,7 +27,7 @@ def course(soaks=(25.0, 60.0, -10.0, 25.0), per_soak=18):
 
 def drawn(preset, state):
     """Dwell means of units whose output is the force and the plant's noise, (units, n, 3) in g, and their white error."""
-    noise = Noise(preset, [np.random.default_rng([11, k]) for k in range(UNITS)])
+    noise = UnitNoise(preset, [np.random.default_rng([11, k]) for k in range(UNITS)])
     before, means = 0.0, []
     for start in state.time - DWELL_S / 2.0:
         noise.jump(start - before)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from pipelines.stages.figures import UNITS, Figure, LotCoefficients, UnitTables, figures_of
-from pipelines.stages.grade import Evidence, grade
+from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.tables.frames import ByUnit
 from schemas.limits import parse_limits
 
@@ -53,7 +53,7 @@ def noise_rows(*, silent: bool) -> pd.DataFrame:
     )
 
 
-def evidence(*, silent: bool) -> Evidence:
+def evidence(*, silent: bool) -> GradeEvidence:
     """Tables of one unit without coefficients of the figures' effects."""
     verdicts = pd.DataFrame({"unit": ["A"], "slot": [1], "refused": [False], "fault": [""], "reason": [""]})
     coefficients = pd.DataFrame(
@@ -66,7 +66,7 @@ def evidence(*, silent: bool) -> Evidence:
     )
     residuals = pd.DataFrame({"unit": "A", "residual_ug": [3.0, -4.0]})
     empty = pd.DataFrame({"unit": pd.Series(dtype=str)})
-    return Evidence(verdicts, coefficients, covariance, residuals, empty, empty, noise_rows(silent=silent))
+    return GradeEvidence(verdicts, coefficients, covariance, residuals, empty, empty, noise_rows(silent=silent))
 
 
 def test_figures_without_a_limit_carry_the_k_of_the_limits() -> None:

@@ -1,16 +1,22 @@
 """Writes go to devices that the station's file names, to registers that their profiles let be written, and nowhere else."""
 
 import ast
+import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from other_devices import station_with
+from pydantic import ValidationError
 from small_station import lot_of, plant_of
 
 from schemas.errors import RecipeInvalid, StationRefused
+from schemas.profile import Command
 from schemas.station import StationConfig, load_station
+from stations.clock import WallClock
+from stations.devices.memory import UnitMemory
 from stations.links.gate import GatedLines, GatedLink
 from stations.links.making import Links
 from stations.opening import serve_devices
@@ -155,3 +161,28 @@ def test_a_simulated_station_has_no_serial_line():
         pytest.raises(RecipeInvalid, match="a simulated station's devices answer on tcp"),
     ):
         links.registers("outer")
+
+
+@pytest.mark.parametrize("value", ["inf", "nan", "1_0", " 20.0", "0x14", "20.0;STOP"])
+def test_a_value_that_is_no_plain_number_is_refused(value: str) -> None:
+    gated = GatedLines(Nowhere(), "here", load_profile("espec_p300"))
+    with pytest.raises(StationRefused, match="no such command"):
+        gated.tell(f"TEMP, S{value}", "chamber")
+
+
+def test_a_command_without_one_place_for_its_value_is_refused_in_the_profile() -> None:
+    for tell in ("*RST", "SET {} {}", "SET {"):
+        with pytest.raises(ValidationError, match="tell"):
+            Command(name="reset", ask="RST?", tell=tell)
+    assert not Command(name="state", ask="STAT?").writable
+
+
+@pytest.mark.parametrize("register", ["memory_state", "erases_a", "endurance"])
+def test_a_memory_whose_status_is_no_number_is_refused_by_the_name_of_the_register(register: str) -> None:
+    values = dict.fromkeys(("memory_state", "erases_a", "erases_b", "endurance"), 1.0) | {register: math.nan}
+    state = SimpleNamespace(enumeration={"ready": 1})
+    registers = SimpleNamespace(
+        name="slot 3", read_group=lambda group: values, profile=SimpleNamespace(register=lambda name: state)
+    )
+    with pytest.raises(StationRefused, match=f"slot 3: register {register} has nan"):
+        UnitMemory(registers, WallClock()).status()

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from inertial.criticism import problem as problems
-from inertial.criticism.examination import Run, candidates_of
+from inertial.criticism.examination import ExaminedRun, candidates_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
 from pipelines.diagnosis.condense import condense
@@ -17,7 +17,7 @@ MODEL = ("bias", "scale", "misalignment")
 def gains() -> dict[str, np.ndarray]:
     rng = np.random.default_rng(20_261_204)
     dwells = lots.world(rng, units=2, plan="six", temperatures=(10.0, 30.0), checks=(), flicker=30.0, day_s=0).dwells
-    run = Run(lot_of(measured(condense(dwells), None), square=False), MODEL)
+    run = ExaminedRun(lot_of(measured(condense(dwells), None), square=False), MODEL)
     base = run.model()
     fields = Candidates(base.problem, candidates_of(base, MODEL), alternatives())
     found = fields.gains(base.space, set(), handling=True)

@@ -15,13 +15,13 @@ from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.tables.leave_out import leave_out, named_dwells
 from pipelines.workbench.services import requests
 from pipelines.workbench.services.work import done_in_process
-from pipelines.workbench.settings import Settings
+from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import MissingPage, PlanPage
 from schemas.errors import DataRejected, RecipeInvalid, WrongUse
 
 
 @pytest.fixture
-def settings(tmp_path: Path, rng: np.random.Generator) -> Settings:
+def settings(tmp_path: Path, rng: np.random.Generator) -> WorkbenchSettings:
     """A folder with the dwells of two units, one dwell of which is far off."""
     folder = tmp_path / "bench"
     folder.mkdir()
@@ -34,10 +34,10 @@ def settings(tmp_path: Path, rng: np.random.Generator) -> Settings:
     axes = [f"{part}_{axis}" for part in ("out", "force") for axis in "xyz"]
     frame = pd.DataFrame(rows, columns=["unit", "dwell", "time_s", *axes, "n", "sd_x", "sd_y", "sd_z"])
     frame.to_csv(folder / "dwells.csv", index=False)
-    return Settings(archive=str(tmp_path / "archive"), folder=folder, token="t")
+    return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=folder, token="t")
 
 
-def test_dwells_are_left_out_by_unit_and_number(settings: Settings) -> None:
+def test_dwells_are_left_out_by_unit_and_number(settings: WorkbenchSettings) -> None:
     frame = pd.read_csv(settings.folder / "dwells.csv")
     rest = leave_out(frame, named_dwells("A2:5, A1:0"))
     assert len(rest) == len(frame) - 2
@@ -59,14 +59,14 @@ def test_a_formula_of_a_line_is_an_effect_and_what_is_none_is_refused() -> None:
                 use_written_formulas([wrong], "diagnose")
 
 
-def test_a_page_says_what_its_command_says(settings: Settings) -> None:
+def test_a_page_says_what_its_command_says(settings: WorkbenchSettings) -> None:
     source = str(settings.folder / "dwells.csv")
     page = requests.settled(
         settings, MissingPage(source=source, without=("A2:5",), formula=("late = hours",), added=("late",))
     )
     state, found = done_in_process("diagnose", requests.diagnosis(settings, page)[1], lambda *_: None)
     assert state == "done"
-    words = page.words()
+    words = page.arguments()
     with effects.additions_forgotten():
         told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
     assert told["error"] == pytest.approx(found.document["error"])
@@ -78,11 +78,11 @@ def test_a_page_says_what_its_command_says(settings: Settings) -> None:
     assert found.before.shape == found.table.residual.shape
 
 
-def test_a_plan_on_its_page_is_that_of_its_command(settings: Settings) -> None:
+def test_a_plan_on_its_page_is_that_of_its_command(settings: WorkbenchSettings) -> None:
     page = PlanPage()
     state, found = done_in_process("plan", requests.plan(settings, page)[1], lambda *_: None)
     assert state == "done"
-    told = json.loads(CliRunner().invoke(app, [*page.words(), "--json"]).stdout)
+    told = json.loads(CliRunner().invoke(app, [*page.arguments(), "--json"]).stdout)
     assert told["minutes"] == pytest.approx(found["document"]["minutes"])
     assert [(row["effect"], row["seen"]) for row in told["effects"]] == [
         (row["effect"], row["seen"]) for row in found["document"]["effects"]

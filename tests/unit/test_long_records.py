@@ -128,7 +128,7 @@ def test_a_long_series_is_averaged_and_keeps_its_allan_deviation(rng: np.random.
     n, size = 40000, 8
     values = rng.normal(size=(n, 3)) + np.cumsum(0.001 * rng.normal(size=(n, 3)), axis=0)
     tables = [pd.DataFrame({"unit": "U", "x": v[:, 0], "y": v[:, 1], "z": v[:, 2]}) for v in np.array_split(values, 13)]
-    series = noise_stage.Series(["U"], size)
+    series = noise_stage.StaticSeries(["U"], size)
     for table in tables:
         series.add(table)
     assert series.values().shape == (1, 3, n // size)
@@ -137,7 +137,7 @@ def test_a_long_series_is_averaged_and_keeps_its_allan_deviation(rng: np.random.
     ratio = means.deviation[:, : shared.sum()] / whole.deviation[:, shared]
     assert means.tau[0] == pytest.approx(size / 100.0)
     assert ratio[:, :6] == pytest.approx(1.0, abs=0.05)  # the same record with less overlap
-    kept = noise_stage.Series(["U"], 1)
+    kept = noise_stage.StaticSeries(["U"], 1)
     for table in tables:
         kept.add(table)
     assert np.array_equal(kept.values()[0], values.T)

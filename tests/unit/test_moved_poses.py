@@ -11,20 +11,20 @@ from pipelines.jobs.moved_poses import moves_of, with_moved_poses
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.charts.mollweide import direction_at, project
 from pipelines.workbench.services import recipes
-from pipelines.workbench.settings import Settings
+from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PlanPage
 from schemas.errors import RecipeInvalid, WrongUse
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
+def settings(tmp_path: Path) -> WorkbenchSettings:
     folder = tmp_path / "bench"
     folder.mkdir()
-    return Settings(archive=str(tmp_path / "archive"), folder=folder, token="t")
+    return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=folder, token="t")
 
 
 @pytest.fixture
-def page(settings: Settings) -> PlanPage:
+def page(settings: WorkbenchSettings) -> PlanPage:
     return PlanPage(recipe=recipe_file(settings.folder))
 
 
@@ -70,7 +70,7 @@ def test_moves_that_a_recipe_cannot_have_are_refused() -> None:
         with_moved_poses(recipe, flat, "plan")
 
 
-def test_a_drag_turns_the_table_the_nearer_way(settings: Settings, page: PlanPage) -> None:
+def test_a_drag_turns_the_table_the_nearer_way(settings: WorkbenchSettings, page: PlanPage) -> None:
     for outer, inner in ((45.0, 100.0), (-45.0, 100.0)):
         near = recipes.turned_to(settings, page, "p3", outer + 4.0, inner + 4.0)
         x, y = project(force(outer, inner)[None])
@@ -80,7 +80,9 @@ def test_a_drag_turns_the_table_the_nearer_way(settings: Settings, page: PlanPag
         recipes.dragged_to(settings, page, "p3", 3.0, 0.0)
 
 
-def test_the_written_recipe_reads_as_the_moved_one_and_replaces_nothing(settings: Settings, page: PlanPage) -> None:
+def test_the_written_recipe_reads_as_the_moved_one_and_replaces_nothing(
+    settings: WorkbenchSettings, page: PlanPage
+) -> None:
     moved = recipes.turned_to(settings, page, "p3", 33.5, 71.25)
     place = recipes.save(settings, moved, "mine")
     read = load_recipe(str(place))

@@ -10,7 +10,7 @@ from inquiries import job_of
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import diagnose
-from inertial.criticism.menus import Reach, courses
+from inertial.criticism.menus import TableReach, courses
 from inertial.criticism.problem import Lot
 from inertial.criticism.proposals import Proposal
 from inertial.frames import force_from_angles
@@ -150,7 +150,7 @@ def test_power_is_switched_only_where_the_station_can_and_the_devices_say_since_
     run = run_of()
     best = [SequenceStep(*UP, 25.0), SequenceStep(*DOWN, 25.0)]
     kinds = [
-        {c.kind for c in courses(state, Reach(power=power), best, 25.0)}
+        {c.kind for c in courses(state, TableReach(power=power), best, 25.0)}
         for state, power in ((run, True), (run, False), (replace(run, since_power=None), True))
     ]
     assert [("power" in k) for k in kinds] == [True, False, False]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pipelines.archive import Run
 from pipelines.report import make_report, render
-from pipelines.report.numbers import plain, with_uncertainty
+from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.plots import lot_plot
 
 
@@ -82,7 +82,7 @@ def test_rounds_to_the_uncertainty(value: float, expanded: float, shown: tuple[s
 
 @given(st.floats(min_value=1e-6, max_value=1e9))
 def test_rounded_numbers_stay_close(value: float) -> None:
-    shown = float(plain(value).replace("\u202f", "").replace("−", "-"))
+    shown = float(significant(value).replace("\u202f", "").replace("−", "-"))
     assert abs(shown - value) <= 0.0051 * value
 
 

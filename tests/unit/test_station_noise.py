@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import freqs, welch
 
 from stations.plant.dynamics import Dynamics, transfer
-from stations.plant.noise import Noise, flicker_time_constants, flicker_variance
+from stations.plant.noise import UnitNoise, flicker_time_constants, flicker_variance
 from stations.plant.preset import load_preset, preset_names
 
 RATE = 100.0
@@ -29,7 +29,7 @@ def allan(x: np.ndarray, m: int) -> np.ndarray:
 @pytest.mark.parametrize("name", preset_names())
 def test_white_density_comes_back_as_the_preset_says(name):
     density = load_preset(name).noise_density_ug
-    x = Noise(preset_with(name, noise_density_ug=density), streams(4)).sample(40_000, RATE)
+    x = UnitNoise(preset_with(name, noise_density_ug=density), streams(4)).sample(40_000, RATE)
     assert x.shape == (40_000, 4, 3)
     frequency, power = welch(x.reshape(len(x), -1), RATE, nperseg=1024, axis=0)
     band = (frequency > 1.0) & (frequency < 45.0)
@@ -45,13 +45,13 @@ def test_flicker_density_falls_as_one_over_f():
 
 
 def test_allan_deviation_of_flicker_is_flat_at_0_664_of_the_instability():
-    x = Noise(preset_with(bias_instability_ug=100.0), streams(16)).sample(60_000, 10.0).reshape(60_000, -1)
+    x = UnitNoise(preset_with(bias_instability_ug=100.0), streams(16)).sample(60_000, 10.0).reshape(60_000, -1)
     for m in (50, 100, 200):
         assert np.sqrt(np.mean(allan(x, m) ** 2)) == pytest.approx(66.4e-6, rel=0.06)
 
 
 def test_random_walk_grows_with_the_root_of_time():
-    noise = Noise(preset_with(rate_random_walk_ug=4.0), streams(200))
+    noise = UnitNoise(preset_with(rate_random_walk_ug=4.0), streams(200))
     noise.jump(50.0)
     x = noise.sample(500, RATE)
     assert x[-1].std() == pytest.approx(4e-6 * np.sqrt(55.0), rel=0.1)
@@ -59,7 +59,7 @@ def test_random_walk_grows_with_the_root_of_time():
 
 def test_noise_does_not_depend_on_how_it_is_asked_for():
     preset = load_preset("ADXL355")
-    whole, parts = Noise(preset, streams(2)), Noise(preset, streams(2))
+    whole, parts = UnitNoise(preset, streams(2)), UnitNoise(preset, streams(2))
     expected = whole.sample(1000, RATE)
     found = np.concatenate([parts.sample(n, RATE) for n in (1, 499, 7, 493)])
     assert np.array_equal(expected, found)
@@ -67,8 +67,8 @@ def test_noise_does_not_depend_on_how_it_is_asked_for():
 
 def test_noise_of_a_unit_does_not_depend_on_its_neighbours():
     preset = load_preset("SF1500")
-    alone = Noise(preset, streams(1)).sample(50, RATE)
-    assert np.array_equal(alone[:, 0], Noise(preset, streams(3)).sample(50, RATE)[:, 0])
+    alone = UnitNoise(preset, streams(1)).sample(50, RATE)
+    assert np.array_equal(alone[:, 0], UnitNoise(preset, streams(3)).sample(50, RATE)[:, 0])
 
 
 @pytest.mark.parametrize("name", preset_names())

@@ -214,11 +214,11 @@ def test_verdicts_on_models_that_are_equally_good_are_seldom_better(archive: Arc
     from dataclasses import replace
 
     from pipelines.rerun.lot_comparison import LotComparison, Side
-    from pipelines.rerun.selection import Entry
+    from pipelines.rerun.selection import SelectedRun
 
     rng = np.random.default_rng(2611)
     entry = judged(Batch(archive.address, (archive.runs()[0].id,), change_from_options("", None)))[0].entry
-    assert isinstance(entry, Entry)
+    assert isinstance(entry, SelectedRun)
     side = Side({}, {}, {}, {}, {}, None)
     verdicts: Counter[str] = Counter()
     for _ in range(1000):

@@ -15,7 +15,7 @@ from capture_double import small_run
 from pipelines.workbench import routes
 from pipelines.workbench.application import create_app
 from pipelines.workbench.routes.static_files import PLOTLY, PLOTLY_SHA256
-from pipelines.workbench.settings import Settings
+from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import WrongUse
 
 TOKEN = "a-token-of-a-test"
@@ -31,12 +31,12 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def settings(archive: Path, tmp_path: Path) -> Settings:
-    return Settings(archive=str(archive), folder=tmp_path / "bench", token=TOKEN)
+def settings(archive: Path, tmp_path: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(archive), folder=tmp_path / "bench", token=TOKEN)
 
 
 @pytest.fixture
-def client(settings: Settings) -> AsgiClient:
+def client(settings: WorkbenchSettings) -> AsgiClient:
     return AsgiClient(create_app(settings), ORIGIN)
 
 
@@ -90,7 +90,7 @@ def test_the_token_of_the_address_becomes_a_cookie_that_no_script_reads(client: 
 
 
 def test_from_another_machine_nothing_is_read_without_the_token(archive: Path, tmp_path: Path) -> None:
-    far = Settings(
+    far = WorkbenchSettings(
         archive=str(archive), folder=tmp_path, host="0.0.0.0", names=("bench.example",), token=TOKEN, proxied=True
     )
     client = AsgiClient(create_app(far), "https://bench.example")
@@ -98,7 +98,7 @@ def test_from_another_machine_nothing_is_read_without_the_token(archive: Path, t
     assert client.get(f"/units?token={TOKEN}").status_code == 303
     assert client.get("/units").status_code == 200
     with pytest.raises(WrongUse, match="encryption"):
-        create_app(Settings(archive=str(archive), folder=tmp_path, host="0.0.0.0"))
+        create_app(WorkbenchSettings(archive=str(archive), folder=tmp_path, host="0.0.0.0"))
 
 
 def test_pages_carry_a_policy_that_runs_no_script_but_our_files(client: AsgiClient) -> None:
@@ -173,7 +173,7 @@ def test_the_drawing_library_is_the_one_that_was_checked(client: AsgiClient) -> 
 
 
 def test_an_empty_archive_has_every_page(tmp_path: Path) -> None:
-    settings = Settings(archive=str(tmp_path / "none"), folder=tmp_path / "bench", token=TOKEN)
+    settings = WorkbenchSettings(archive=str(tmp_path / "none"), folder=tmp_path / "bench", token=TOKEN)
     client = AsgiClient(create_app(settings), ORIGIN)
     for address in ("/units", "/missing", "/upload", "/operator", "/plan", "/station", "/audit"):
         assert client.get(address).status_code == 200, address

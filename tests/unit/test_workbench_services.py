@@ -19,16 +19,16 @@ from pipelines.workbench.services import jobs as job_table
 from pipelines.workbench.services import lots, models, sources, stations, uploads
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.work import done_in_process
-from pipelines.workbench.settings import Settings
+from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import TumblelineError, WrongUse
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
+def settings(tmp_path: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
 
 
-def ended(table: Jobs, name: str) -> job_table.Job:
+def ended(table: Jobs, name: str) -> job_table.BackgroundJob:
     end = time.monotonic() + 60.0
     while (job := table.get(name)).state not in job_table.ENDED:
         assert time.monotonic() < end
@@ -83,7 +83,7 @@ def test_a_defect_in_work_is_said_and_does_not_end_the_process(capsys: pytest.Ca
     assert "Traceback" in capsys.readouterr().err
 
 
-def lot_of(settings: Settings, **state: object) -> str:
+def lot_of(settings: WorkbenchSettings, **state: object) -> str:
     place = settings.folder / "lots" / "abc"
     place.mkdir(parents=True)
     (place / "request.json").write_text(
@@ -95,7 +95,7 @@ def lot_of(settings: Settings, **state: object) -> str:
     return "abc"
 
 
-def test_a_question_is_answered_once_and_by_its_number(settings: Settings) -> None:
+def test_a_question_is_answered_once_and_by_its_number(settings: WorkbenchSettings) -> None:
     name = lot_of(settings)
     with pytest.raises(lots.Stale):
         lots.answer(settings, name, 1, "go")
@@ -107,7 +107,7 @@ def test_a_question_is_answered_once_and_by_its_number(settings: Settings) -> No
         lots.answer(settings, "../abc", 2, "go")
 
 
-def test_a_lot_whose_process_is_gone_is_interrupted(settings: Settings) -> None:
+def test_a_lot_whose_process_is_gone_is_interrupted(settings: WorkbenchSettings) -> None:
     gone = os.fork()
     if gone == 0:
         os._exit(0)
@@ -121,14 +121,14 @@ def test_a_lot_whose_process_is_gone_is_interrupted(settings: Settings) -> None:
 
 
 @pytest.mark.parametrize("units", [["A1", "A1"], ["<script>"], ["A" * 65]])
-def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: Settings, units: list[str]) -> None:
+def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: WorkbenchSettings, units: list[str]) -> None:
     with pytest.raises(TumblelineError):
         lots.start(settings, "production", units, list(range(len(units))), [], 0)
     assert not (settings.folder / "lots").exists()
 
 
 @pytest.fixture
-def two(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Settings:
+def two(settings: WorkbenchSettings, monkeypatch: pytest.MonkeyPatch) -> WorkbenchSettings:
     """Two stations; the processes that would measure are not started."""
     monkeypatch.setattr(lots.subprocess, "Popen", lambda *_, **__: None)
     text = (files("stations") / "simulated.toml").read_text(encoding="utf-8")
@@ -139,7 +139,7 @@ def two(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Settings:
     return replace(settings, stations=tuple(places))
 
 
-def test_each_station_measures_one_lot_at_a_time(two: Settings) -> None:
+def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None:
     left, right = stations.stations(two)
     assert (left.name, right.name, left.simulated) == ("left", "right", True)
     recipe = recipe_file(two.folder)
@@ -155,7 +155,7 @@ def test_each_station_measures_one_lot_at_a_time(two: Settings) -> None:
         stations.named(stations.stations(two), "middle")
 
 
-def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: Settings) -> None:
+def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: WorkbenchSettings) -> None:
     left = stations.stations(two)[0]
     recipe = recipe_file(two.folder)
     lot = lots.start(two, recipe, ["A1"], [0], [], 0, left.file)
@@ -175,7 +175,7 @@ def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: Settin
         lots.pause(two, lot.id)
 
 
-def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: Settings) -> None:
+def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: WorkbenchSettings) -> None:
     script = (
         "import json, pathlib, signal, sys, time\n"
         "place = pathlib.Path(sys.argv[1]) / 'state.json'\n"
@@ -196,7 +196,7 @@ def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: Settings
     assert name == "abc"
 
 
-def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Settings) -> None:
+def test_a_model_is_saved_version_by_version_with_its_formulas(settings: WorkbenchSettings) -> None:
     start, formulas = ["bias", "scale"], ["humid = humidity_pct - 45"]
     place, version = models.save(settings, "line-1", start, ["third_order", "humid"], formulas, "seen twice", "run-7")
     assert version == 3
@@ -214,7 +214,7 @@ def test_a_model_is_saved_version_by_version_with_its_formulas(settings: Setting
             models.save(settings, name, start, ["third_order"], [], why, "")
 
 
-def test_only_files_of_the_folder_are_sources(settings: Settings, tmp_path: Path) -> None:
+def test_only_files_of_the_folder_are_sources(settings: WorkbenchSettings, tmp_path: Path) -> None:
     settings.folder.mkdir()
     frame = pd.DataFrame({"unit": ["U"], "dwell": [0]})
     for name in ("dwells.csv", "fresh.csv", "dwells-history.csv"):
@@ -228,7 +228,7 @@ def test_only_files_of_the_folder_are_sources(settings: Settings, tmp_path: Path
             sources.resolve(settings, name, "source")
 
 
-def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: Settings) -> None:
+def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: WorkbenchSettings) -> None:
     first = uploads.keep(settings, "../../etc/a<b>.csv", b"1")
     assert Path(first).parent == settings.folder / "uploads"
     assert uploads.keep(settings, "../../etc/a<b>.csv", b"1") == first

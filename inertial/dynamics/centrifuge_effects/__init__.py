@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from inertial.dynamics.centrifuge_effects.base import CentrifugeEffect, Spins
-from inertial.dynamics.missing_effects import effects_of
+from inertial.dynamics.effect_modules import effects_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

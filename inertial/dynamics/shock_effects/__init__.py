@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from inertial.dynamics.missing_effects import effects_of
+from inertial.dynamics.effect_modules import effects_of
 from inertial.dynamics.shock_effects.base import ShockEffect
 
 if TYPE_CHECKING:

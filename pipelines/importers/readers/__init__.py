@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pipelines.importers.content import Content
 
 
-class Reader(Protocol):
+class FileReader(Protocol):
     """A module that reads one format."""
 
     NAME: str
@@ -37,15 +37,15 @@ class Reader(Protocol):
         ...
 
 
-def _found() -> dict[str, Reader]:
-    modules = [cast("Reader", import_module(f"{__name__}.{found.name}")) for found in iter_modules(__path__)]
+def _found() -> dict[str, FileReader]:
+    modules = [cast("FileReader", import_module(f"{__name__}.{found.name}")) for found in iter_modules(__path__)]
     return {module.NAME: module for module in sorted(modules, key=lambda one: one.ORDER)}
 
 
-READERS: dict[str, Reader] = _found()
+READERS: dict[str, FileReader] = _found()
 """By name, in the order in which they are tried."""
 
 
-def reader_of(data: bytes) -> Reader:
+def reader_of(data: bytes) -> FileReader:
     """The reader that recognises a file by its first bytes; delimited text if no other does."""
     return next(reader for reader in READERS.values() if reader.recognised(data))

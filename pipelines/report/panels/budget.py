@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.report.budget_plots import shares_plot
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.budget_rows import LABELS
 from pipelines.stages.figures import FIGURES
@@ -97,9 +97,9 @@ def _seen(sums: pd.DataFrame) -> list[dict[str, str]]:
         {
             "unit": str(row["unit"]),
             "axis": str(row["axis"]),
-            "shown": plain(row["shown"]),
-            "met": plain(row["u_b"]),
-            "unseen": plain(row["unseen"]),
+            "shown": significant(row["shown"]),
+            "met": significant(row["u_b"]),
+            "unseen": significant(row["unseen"]),
         }
         for row in rows_of(rows)
     ]
@@ -111,7 +111,7 @@ def _risks(table: pd.DataFrame | None) -> list[dict[str, str]]:
     return [
         {
             "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
-            **{name: plain(row[name]) for name in ("limit", "accept", "mean", "process", "u")},
+            **{name: significant(row[name]) for name in ("limit", "accept", "mean", "process", "u")},
             **{name: _percent(row[name]) for name in ("pfa", "pfr")},
             "largest": _percent(row["largest_pfa"]),
             "unit_text": "" if row["unit_text"] == "1" else row["unit_text"],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -54,5 +54,5 @@ def _line(unit: UnitContext) -> dict[str, Any]:
         "outcome": unit.outcome,
         "grade": unit.grade,
         "reasons": unit.reasons,
-        "values": {figure["figure"]: plain(figure["value"]) for figure in figures},
+        "values": {figure["figure"]: significant(figure["value"]) for figure in figures},
     }

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -41,7 +41,7 @@ def render(unit: UnitContext) -> str | None:
     lines = [
         {
             "name": name,
-            "cells": {axis: plain(coverage * by_axis[axis][column]) or "not stated" for axis in "xyz"},
+            "cells": {axis: significant(coverage * by_axis[axis][column]) or "not stated" for axis in "xyz"},
         }
         for column, name in MEASURANDS.items()
     ]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.uncertainty.degrees import rounded
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -56,8 +56,8 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
         "name": NAMES.get(row["quantity"], row["quantity"]),
         "axis": row["axis"],
         "value": "" if row["quantity"] in WITHOUT_VALUE else value,
-        "a": plain(row["u_a"]),
-        "b": plain(row["u_b"]),
+        "a": significant(row["u_a"]),
+        "b": significant(row["u_b"]),
         "dof": "∞" if not np.isfinite(row["dof"]) or row["dof"] > 1e4 else f"{int(row['dof'])}",
         "k": f"{row['k']:.2f}",
         "expanded": expanded,

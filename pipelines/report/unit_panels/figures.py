@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipelines.report.numbers import plain, with_uncertainty
+from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.templates import fill
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
@@ -44,8 +44,8 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
         "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
         "value": value,
         "uncertainty": expanded,
-        "limit": plain(row["limit"]) if limited else "",
-        "margin": plain(row["limit"] - abs(row["value"])) if limited else "",
+        "limit": significant(row["limit"]) if limited else "",
+        "margin": significant(row["limit"] - abs(row["value"])) if limited else "",
         "unit": "" if row["unit_text"] == "1" else row["unit_text"],
         "outcome": row["outcome"] if limited else "",
         "risk": _risk(row) if limited else "",
@@ -58,8 +58,8 @@ def _at_least(row: dict[str, Any], value: str, expanded: str, least: float) -> d
         "title": FIGURES[row["figure"]].label if row["figure"] in FIGURES else row["figure"],
         "value": value,
         "uncertainty": expanded,
-        "limit": f"≥ {plain(least)}",
-        "margin": plain(row["value"] - least),
+        "limit": f"≥ {significant(least)}",
+        "margin": significant(row["value"] - least),
         "unit": "" if row["unit_text"] == "1" else row["unit_text"],
         "outcome": row["outcome"],
         "risk": _risk(row),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -60,5 +60,5 @@ def _cell(row: dict[str, Any]) -> str:
     if not row["identified"] and not np.isfinite(row["high"]):
         return "–"
     if not row["identified"]:
-        return f"≤ {plain(row['high'])}"
-    return f"{plain(row['value'])} ({plain(row['low'])} … {plain(row['high'])})"
+        return f"≤ {significant(row['high'])}"
+    return f"{significant(row['value'])} ({significant(row['low'])} … {significant(row['high'])})"

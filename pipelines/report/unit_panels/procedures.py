@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import Evaluated
-from pipelines.report.numbers import plain
+from pipelines.report.numbers import significant
 from pipelines.report.plots import STYLE, WIDTH_IN, svg
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
@@ -85,10 +85,10 @@ def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> d
         "meaning": meanings.get(row["figure"], row["figure"]),
         "axis": row["axis"],
         "value": f"{row['value']:.5g}" if known else "not determined",
-        "spread": plain(unit.report.coverage * row["uncertainty"]) if known else "",
+        "spread": significant(unit.report.coverage * row["uncertainty"]) if known else "",
         "interval": interval,
         "unit": row["unit_text"],
-        "limit": plain(limit) if np.isfinite(limit) else f"≥ {plain(least)}" if limited else "",
+        "limit": significant(limit) if np.isfinite(limit) else f"≥ {significant(least)}" if limited else "",
         "outcome": (outcome[0] if outcome else "fail") if limited else "",
         "note": row["note"],
     }

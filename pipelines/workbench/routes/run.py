@@ -44,7 +44,9 @@ def run(request: Request) -> Response:
         for row in rows_of(chosen):
             cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
     try:
-        certificates = {unit: one.words() for unit, one in stated(found, [str(row["unit"]) for row in grades]).items()}
+        certificates = {
+            unit: one.sentence() for unit, one in stated(found, [str(row["unit"]) for row in grades]).items()
+        }
     except TumblelineError as problem:
         certificates, problems = {}, [*problems, str(problem)]
     events = rows_of(run_table(bench, found.id, "events")) if "events" in tables else []

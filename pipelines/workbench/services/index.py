@@ -15,7 +15,7 @@ from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.sql import ask
 
 if TYPE_CHECKING:
-    from pipelines.audit.sql import Answer
+    from pipelines.audit.sql import QueryResult
 
 FRESH_S = 5.0
 """Age, s, up to which an index is used unchanged; a finished stage of a known run is shown after this time at the latest."""
@@ -38,7 +38,7 @@ class RecentIndex:
         self._when, self._folder = 0.0, 0
         self._renewing = threading.Event()
 
-    def ask(self, sql: str) -> Answer:
+    def ask(self, sql: str) -> QueryResult:
         """The answer to a query over the archive."""
         return ask(self._archive, sql, index=self.index())
 

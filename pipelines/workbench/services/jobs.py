@@ -32,7 +32,7 @@ GRACE_S = 2.0
 
 
 @dataclass
-class Job:
+class BackgroundJob:
     """A job and its progress."""
 
     id: str
@@ -93,7 +93,7 @@ class Jobs:
     def __init__(self, place: Path, workers: int) -> None:
         self._place, self._workers = place, max(1, workers)
         self._lock = threading.RLock()
-        self._jobs: OrderedDict[str, Job] = OrderedDict()
+        self._jobs: OrderedDict[str, BackgroundJob] = OrderedDict()
         self._results: OrderedDict[str, Any] = OrderedDict()
         self._requests: dict[str, tuple[str, Mapping[str, Any]]] = {}
         self._queue: queue.Queue[str | None] = queue.Queue()
@@ -102,14 +102,14 @@ class Jobs:
         self.version = 0
         self._remember()
 
-    def submit(self, kind: str, title: str, request: Mapping[str, Any]) -> Job:
+    def submit(self, kind: str, title: str, request: Mapping[str, Any]) -> BackgroundJob:
         """The job for a request: the existing one, or a new one at the end of the queue."""
         name = key_of(kind, request)
         with self._lock:
             known = self._jobs.get(name)
             if known is not None and (known.state in {"waiting", "running"} or name in self._results):
                 return known
-            job = Job(name, kind, title)
+            job = BackgroundJob(name, kind, title)
             self._jobs[name] = job
             self._jobs.move_to_end(name)
             while len(self._jobs) > KEPT_JOBS:
@@ -128,22 +128,22 @@ class Jobs:
                 self._results.move_to_end(name)
             return self._results.get(name)
 
-    def known(self, kind: str, request: Mapping[str, Any]) -> Job | None:
+    def known(self, kind: str, request: Mapping[str, Any]) -> BackgroundJob | None:
         """The job of a request, if there is one."""
         with self._lock:
             return self._jobs.get(key_of(kind, request))
 
-    def get(self, name: str) -> Job | None:
+    def get(self, name: str) -> BackgroundJob | None:
         """The job of this id."""
         with self._lock:
             return self._jobs.get(name)
 
-    def all(self, since: int = -1) -> list[Job]:
+    def all(self, since: int = -1) -> list[BackgroundJob]:
         """The jobs that changed after a version, oldest first."""
         with self._lock:
             return [job for job in self._jobs.values() if job.version > since]
 
-    def stop(self, name: str) -> Job | None:
+    def stop(self, name: str) -> BackgroundJob | None:
         """Take a job out of the queue, or end the process that does it."""
         with self._lock:
             job = self._jobs.get(name)
@@ -193,7 +193,7 @@ class Jobs:
         if process is not None:
             process.end()
 
-    def _follow(self, job: Job, process: _Process) -> None:
+    def _follow(self, job: BackgroundJob, process: _Process) -> None:
         """Send a job to a process, and record its messages until it is done."""
         kind, request = self._requests.pop(job.id)
         try:
@@ -210,7 +210,7 @@ class Jobs:
         except (EOFError, OSError):
             self._end(job, "failed", "the process of this job ended; look at the log of the server, and try again")
 
-    def _end(self, job: Job, message: str, content: Any) -> None:
+    def _end(self, job: BackgroundJob, message: str, content: Any) -> None:
         with self._lock:
             if job.state in ENDED:
                 return
@@ -224,7 +224,7 @@ class Jobs:
                 job.state, job.problem, job.note = "failed", str(content), ""
             self._changed(job)
 
-    def _changed(self, job: Job) -> None:
+    def _changed(self, job: BackgroundJob) -> None:
         self.version += 1
         job.version = self.version
         if job.state != "running" or job.done == 0:
@@ -245,7 +245,7 @@ class Jobs:
             for one in files.read_json(self._place)["jobs"]:
                 if one["state"] in {"waiting", "running"}:
                     note = "the server ended before it was done; start it again"
-                    job = Job(str(one["id"]), str(one["kind"]), str(one["title"]), "interrupted", note=note)
+                    job = BackgroundJob(str(one["id"]), str(one["kind"]), str(one["title"]), "interrupted", note=note)
                     self._jobs[job.id] = job
 
 

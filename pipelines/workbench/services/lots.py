@@ -23,7 +23,7 @@ from schemas.errors import TumblelineError, WrongUse
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
 FOLDER = "lots"
 ENDED = frozenset({"done", "stopped", "failed", "interrupted"})
@@ -75,7 +75,7 @@ class LotState:
 
 
 def start(
-    settings: Settings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int,
+    settings: WorkbenchSettings, recipe: str, units: Sequence[str], slots: Sequence[int], faults: Sequence[str], repeat: int,
     station: Path | None = None,
 ) -> LotState:  # fmt: skip
     """A new lot on a station, or the continuation of the same stopped lot.
@@ -130,7 +130,7 @@ def start(
     return state_of(place)
 
 
-def again(settings: Settings, name: str) -> LotState:
+def again(settings: WorkbenchSettings, name: str) -> LotState:
     """The continuation of a stopped lot."""
     request = files.read_json(place_of(settings, name) / "request.json")
     station = Path(request["station"]) if request["station"] else None
@@ -145,7 +145,7 @@ def again(settings: Settings, name: str) -> LotState:
     )
 
 
-def answer(settings: Settings, name: str, number: int, reply: str) -> LotState:
+def answer(settings: WorkbenchSettings, name: str, number: int, reply: str) -> LotState:
     """The answer to question ``number`` of a lot.
 
     Raises
@@ -166,14 +166,14 @@ def answer(settings: Settings, name: str, number: int, reply: str) -> LotState:
     return now
 
 
-def stop(settings: Settings, name: str) -> LotState:
+def stop(settings: WorkbenchSettings, name: str) -> LotState:
     """Stop a lot's process after the safe state; it continues when it is started again."""
     place = place_of(settings, name)
     (place / PAUSED).unlink(missing_ok=True)
     return _ended(place)
 
 
-def pause(settings: Settings, name: str) -> LotState:
+def pause(settings: WorkbenchSettings, name: str) -> LotState:
     """Stop a lot's process after the safe state; the lot keeps its station until it is continued or stopped."""
     place = place_of(settings, name)
     if state_of(place).ended:
@@ -182,7 +182,7 @@ def pause(settings: Settings, name: str) -> LotState:
     return _ended(place)
 
 
-def pause_all(settings: Settings) -> list[str]:
+def pause_all(settings: WorkbenchSettings) -> list[str]:
     """Pause every lot that is measured, and wait until its process has made the station safe; the lots that did not in time."""
     working = [one for one in lots(settings) if not one.idle]
     for one in working:
@@ -203,7 +203,7 @@ def _ended(place: Path) -> LotState:
     return state_of(place)
 
 
-def lots(settings: Settings) -> list[LotState]:
+def lots(settings: WorkbenchSettings) -> list[LotState]:
     """The newest lots, the newest first."""
     top = settings.folder / FOLDER
     if not top.is_dir():
@@ -212,7 +212,7 @@ def lots(settings: Settings) -> list[LotState]:
     return sorted(found, key=lambda one: -one.since)[:NEWEST]
 
 
-def place_of(settings: Settings, name: str) -> Path:
+def place_of(settings: WorkbenchSettings, name: str) -> Path:
     """The folder of a lot."""
     place = settings.folder / FOLDER / name
     if not (name.isalnum() and (place / "state.json").is_file()):
@@ -246,7 +246,7 @@ def write_state(place: Path, content: dict[str, Any]) -> None:
     files.publish(place / "state.json", files.json_bytes(content), "lot", files.ELSEWHERE)
 
 
-def stamp(settings: Settings) -> str:
+def stamp(settings: WorkbenchSettings) -> str:
     """A value that changes when any lot changes."""
     top = settings.folder / FOLDER
     if not top.is_dir():

@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from pipelines.jobs.releases import Release
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
 FOLDER = "models"
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,60}")
 _ALONE = threading.Lock()
 
 
-def models(settings: Settings) -> list[str]:
+def models(settings: WorkbenchSettings) -> list[str]:
     """Names of the existing model files."""
     folder = settings.folder / FOLDER
     return sorted(place.stem for place in folder.glob("*.toml")) if folder.is_dir() else []
 
 
-def place_of(settings: Settings, name: str) -> Path:
+def place_of(settings: WorkbenchSettings, name: str) -> Path:
     """The file of a model.
 
     Raises
@@ -45,7 +45,7 @@ def place_of(settings: Settings, name: str) -> Path:
     return settings.folder / FOLDER / f"{name}.toml"
 
 
-def release(settings: Settings, name: str, since: str, device: str, station: str, reason: str) -> Release:
+def release(settings: WorkbenchSettings, name: str, since: str, device: str, station: str, reason: str) -> Release:
     """A model released to the line from a day on; only one whose what-if says "better".
 
     Raises
@@ -65,7 +65,7 @@ def release(settings: Settings, name: str, since: str, device: str, station: str
 
 
 def save(
-    settings: Settings,
+    settings: WorkbenchSettings,
     name: str,
     start: Sequence[str],
     added: Sequence[str],

@@ -22,7 +22,7 @@ from schemas.foreign import shown
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
     from pipelines.workbench.state import PlanPage
     from schemas.recipe import Recipe
 
@@ -31,7 +31,7 @@ STEP_DEG = 0.5
 """Grid of the angles of a pose that is dragged: a hand aims no better on a map of 400 pixels."""
 
 
-def dragged_to(settings: Settings, page: PlanPage, name: str, x: float, y: float) -> PlanPage:
+def dragged_to(settings: WorkbenchSettings, page: PlanPage, name: str, x: float, y: float) -> PlanPage:
     """The page with a pose at a place of the map; of the two ways to turn there, the one nearer to the pose's present angles.
 
     Raises
@@ -52,7 +52,7 @@ def dragged_to(settings: Settings, page: PlanPage, name: str, x: float, y: float
     return turned_to(settings, page, name, *(STEP_DEG * round(angle / STEP_DEG) for angle in ways[0]))
 
 
-def turned_to(settings: Settings, page: PlanPage, name: str, outer: float, inner: float) -> PlanPage:
+def turned_to(settings: WorkbenchSettings, page: PlanPage, name: str, outer: float, inner: float) -> PlanPage:
     """The page with a pose at these angles, degrees; checked as a recipe is.
 
     Raises
@@ -66,7 +66,7 @@ def turned_to(settings: Settings, page: PlanPage, name: str, outer: float, inner
     return new
 
 
-def save(settings: Settings, page: PlanPage, name: str) -> Path:
+def save(settings: WorkbenchSettings, page: PlanPage, name: str) -> Path:
     """The file of the recipe with its moved poses; an existing file is not replaced.
 
     Raises
@@ -92,7 +92,7 @@ def save(settings: Settings, page: PlanPage, name: str) -> Path:
     return place
 
 
-def _recipe(settings: Settings, page: PlanPage) -> Recipe:
+def _recipe(settings: WorkbenchSettings, page: PlanPage) -> Recipe:
     """The recipe of a page; formulas of its model are known during the call only."""
     with effects.additions_forgotten():
         return recipe_of(requests.plan(settings, page)[1])[1]

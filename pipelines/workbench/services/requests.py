@@ -13,12 +13,12 @@ from schemas.errors import WrongUse, did_you_mean
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
 Request = tuple[str, dict[str, Any]]
 
 
-def of_address(settings: Settings, kind: str, path: str, query: Iterable[tuple[str, str]]) -> Request:
+def of_address(settings: WorkbenchSettings, kind: str, path: str, query: Iterable[tuple[str, str]]) -> Request:
     """Title and request of a kind of work for the page of an address."""
     if kind not in KINDS or path != KINDS[kind][0].PATH:
         raise WrongUse(f"jobs: no page needs '{kind[:40]}'; {did_you_mean(kind, KINDS)}")
@@ -28,12 +28,12 @@ def of_address(settings: Settings, kind: str, path: str, query: Iterable[tuple[s
     return KINDS[kind][1](settings, state)
 
 
-def diagnosis(settings: Settings, page: MissingPage) -> Request:
+def diagnosis(settings: WorkbenchSettings, page: MissingPage) -> Request:
     """A diagnosis."""
     return f"diagnosis of {page.source}", _judging(settings, page)
 
 
-def ladder(settings: Settings, page: MissingPage) -> Request:
+def ladder(settings: WorkbenchSettings, page: MissingPage) -> Request:
     """The errors of every version."""
     content = _judging(settings, page)
     fresh = sources.resolve(settings, page.fresh, "compare") if page.fresh else ""
@@ -41,7 +41,7 @@ def ladder(settings: Settings, page: MissingPage) -> Request:
     return f"errors on {page.source}", content
 
 
-def _judging(settings: Settings, page: MissingPage) -> dict[str, Any]:
+def _judging(settings: WorkbenchSettings, page: MissingPage) -> dict[str, Any]:
     page = settled(settings, page)
     name = page.source
     return {
@@ -50,7 +50,7 @@ def _judging(settings: Settings, page: MissingPage) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def settled(settings: Settings, page: MissingPage) -> MissingPage:
+def settled(settings: WorkbenchSettings, page: MissingPage) -> MissingPage:
     """The page with the source's own name, and with the starting model if none is given."""
     name = sources.resolve(settings, page.source, "source")
     if page.effects:
@@ -74,7 +74,7 @@ def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
     return tuple(judged or default_model(read_dwells(name, archive=archive)))
 
 
-def plan(settings: Settings, page: PlanPage) -> Request:
+def plan(settings: WorkbenchSettings, page: PlanPage) -> Request:
     """The plan of a recipe."""
     if page.recipe not in recipes(settings):
         raise WrongUse(
@@ -94,7 +94,7 @@ def plan(settings: Settings, page: PlanPage) -> Request:
     return f"plan of {page.recipe}", content
 
 
-def what_if(settings: Settings, page: ModelsPage) -> Request:
+def what_if(settings: WorkbenchSettings, page: ModelsPage) -> Request:
     """The lots of the archive with a model beside their own."""
     place = models.place_of(settings, page.model)
     return f"what if {place.stem}", {
@@ -105,7 +105,7 @@ def what_if(settings: Settings, page: ModelsPage) -> Request:
     }
 
 
-def audit(settings: Settings, page: AuditPage) -> Request:
+def audit(settings: WorkbenchSettings, page: AuditPage) -> Request:
     """The audit of the archive."""
     names = ("since", "until", "device", "station")
     return "audit of the archive", {
@@ -115,14 +115,14 @@ def audit(settings: Settings, page: AuditPage) -> Request:
     }
 
 
-def bring_in(settings: Settings, page: UploadPage) -> Request:
+def bring_in(settings: WorkbenchSettings, page: UploadPage) -> Request:
     """The import of a file."""
     place = uploads.resolve(settings, page.file)
     content = page.model_dump(mode="json", exclude={"run"})
     return f"import of {place.name}", {**content, "archive": settings.archive}
 
 
-def recipes(settings: Settings) -> list[str]:
+def recipes(settings: WorkbenchSettings) -> list[str]:
     """Available recipes: the built-in one, and files of the workbench's folder."""
     found = [str(place) for place in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
     return ["production", *(name for name in found if _is_recipe(Path(name)))]
@@ -136,7 +136,7 @@ def _is_recipe(place: Path) -> bool:
     return not place.is_symlink() and "[model]" not in text and ("poses" in text or "temperatures_C" in text)
 
 
-KINDS: dict[str, tuple[type[PageState], Callable[[Settings, Any], Request]]] = {
+KINDS: dict[str, tuple[type[PageState], Callable[[WorkbenchSettings, Any], Request]]] = {
     "diagnose": (MissingPage, diagnosis),
     "ladder": (MissingPage, ladder),
     "plan": (PlanPage, plan),

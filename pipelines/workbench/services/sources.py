@@ -12,7 +12,7 @@ from pipelines.archive.keys import digest
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
 ENDINGS = (".parquet", ".csv", ".tsv", ".parquet.gz", ".csv.gz")
 OWN = ("lots", "models")
@@ -21,7 +21,7 @@ MOST_FILES = 500
 
 
 @dataclass(frozen=True)
-class Source:
+class DataSource:
     """Available dwells: ``name`` as on a command line."""
 
     name: str
@@ -30,12 +30,12 @@ class Source:
     units: int = 0
 
 
-def sources(settings: Settings) -> list[Source]:
+def sources(settings: WorkbenchSettings) -> list[DataSource]:
     """Files of dwells, then the newest runs first."""
     return [*_files(settings.folder), *_runs(settings)]
 
 
-def resolve(settings: Settings, name: str, where: str) -> str:
+def resolve(settings: WorkbenchSettings, name: str, where: str) -> str:
     """The name of an existing source.
 
     Raises
@@ -51,12 +51,12 @@ def resolve(settings: Settings, name: str, where: str) -> str:
     return Archive(settings.archive).run(name).id
 
 
-def is_file(settings: Settings, name: str) -> bool:
+def is_file(settings: WorkbenchSettings, name: str) -> bool:
     """Whether a source is a file of the folder."""
     return name in {one.name for one in _files(settings.folder)}
 
 
-def stamp(settings: Settings, name: str) -> str:
+def stamp(settings: WorkbenchSettings, name: str) -> str:
     """A value that changes with the content of a source."""
     place = Path(name)
     if place.suffix and place.is_file():
@@ -66,7 +66,7 @@ def stamp(settings: Settings, name: str) -> str:
     return run.id if "dwells" not in run.tables() else str(run.manifest("dwells")["sha256"])
 
 
-def archive_stamp(settings: Settings) -> str:
+def archive_stamp(settings: WorkbenchSettings) -> str:
     """A value that changes when a run is added, or a stage of one is finished, in a folder or in an object store."""
     archive = Archive(settings.archive)
     runs = archive.root / "runs"
@@ -79,7 +79,7 @@ def archive_stamp(settings: Settings) -> str:
     return f"{len(times)}.{max(times, default=0)}"
 
 
-def twin(settings: Settings, name: str) -> str:
+def twin(settings: WorkbenchSettings, name: str) -> str:
     """The fresh measurement beside a file of dwells; empty if there is none."""
     place = Path(name)
     for stem in (place.stem.replace("dwells", "fresh"), f"{place.stem}-fresh", f"fresh-{place.stem}"):
@@ -89,14 +89,14 @@ def twin(settings: Settings, name: str) -> str:
     return ""
 
 
-def _files(folder: Path) -> list[Source]:
+def _files(folder: Path) -> list[DataSource]:
     if not folder.is_dir():
         return []
-    found: list[Source] = []
+    found: list[DataSource] = []
     for place in sorted([*folder.iterdir(), *(p for sub in folder.iterdir() if _is_open(sub) for p in sub.iterdir())]):
         usable = place.name.endswith(ENDINGS) and place.is_file() and not place.name.startswith(".")
         if usable and "history" not in place.name and not place.is_symlink():
-            found.append(Source(str(place), place.name, is_file=True))
+            found.append(DataSource(str(place), place.name, is_file=True))
     return found[:MOST_FILES]
 
 
@@ -105,10 +105,10 @@ def _is_open(folder: Path) -> bool:
     return folder.is_dir() and folder.name not in OWN and not folder.name.startswith(".") and not folder.is_symlink()
 
 
-def _runs(settings: Settings) -> list[Source]:
+def _runs(settings: WorkbenchSettings) -> list[DataSource]:
     infos = Archive(settings.archive).runs()[-NEWEST:][::-1]
     return [
-        Source(one.id, f"{one.id} · {one.started[:10]}", is_file=False, units=len(one.units))
+        DataSource(one.id, f"{one.id} · {one.started[:10]}", is_file=False, units=len(one.units))
         for one in infos
         if {"reduce", "import"} & set(one.stages)
     ]

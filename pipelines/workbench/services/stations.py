@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Bench:
         return str(self.file or "")
 
 
-def stations(settings: Settings) -> list[Bench]:
+def stations(settings: WorkbenchSettings) -> list[Bench]:
     """The stations in the order of the command line; two of one name are told apart by their files.
 
     Raises

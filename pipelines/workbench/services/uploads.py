@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from pipelines.workbench.settings import Settings
+    from pipelines.workbench.settings import WorkbenchSettings
     from pipelines.workbench.state import UploadPage
 
 FOLDER = "uploads"
@@ -37,7 +37,7 @@ MOST_ROWS = 8
 
 
 @dataclass(frozen=True)
-class Reading:
+class UploadReading:
     """A file as it was read.
 
     columns : its own · head : the first rows · offered : meanings with the columns that their names suggest
@@ -59,7 +59,7 @@ class Reading:
     problem: str = ""
 
 
-def keep(settings: Settings, name: str, content: bytes) -> str:
+def keep(settings: WorkbenchSettings, name: str, content: bytes) -> str:
     """The path of a dropped file; another content under the same name gets a number.
 
     Raises
@@ -85,7 +85,7 @@ def keep(settings: Settings, name: str, content: bytes) -> str:
     raise WrongUse(f"upload: {folder} holds a thousand files called '{plain}'; remove some")
 
 
-def resolve(settings: Settings, name: str) -> Path:
+def resolve(settings: WorkbenchSettings, name: str) -> Path:
     """The path of an uploaded file."""
     folder = settings.folder / FOLDER
     place = Path(name)
@@ -94,7 +94,7 @@ def resolve(settings: Settings, name: str) -> Path:
     return place
 
 
-def reading(settings: Settings, page: UploadPage) -> Reading:
+def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
     """The file of a page as it is read."""
     from pipelines.importers import files
 
@@ -102,7 +102,7 @@ def reading(settings: Settings, page: UploadPage) -> Reading:
     table, _ = files.read(place)
     names = tuple(str(column) for column in table.columns)
     offered = _offered(names)
-    plain = Reading(
+    plain = UploadReading(
         file=page.file, rows=len(table), columns=names, head=_head(table), offered=offered,
         is_exchange=set(REQUIRED) <= set(names),
     )  # fmt: skip
@@ -114,7 +114,7 @@ def reading(settings: Settings, page: UploadPage) -> Reading:
         return replace(plain, problem=str(problem))
 
 
-def _read_as(plain: Reading, table: pd.DataFrame, page: UploadPage) -> Reading:
+def _read_as(plain: UploadReading, table: pd.DataFrame, page: UploadPage) -> UploadReading:
     from pipelines.importers import record
 
     data = record.imported(table, mapping_of(page.model_dump()), Path(page.file).name)

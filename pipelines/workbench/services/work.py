@@ -63,15 +63,15 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     report_progress(1, steps, "searching for missing effects")
     made = examination(dwells, history, model, request["without"])
     faulty = {unit for fault in made.document["blocked_by"] for unit in fault["units"]}
-    units = tuple(unit for unit in made.found.units if unit not in faulty)
+    units = tuple(unit for unit in made.measured.units if unit not in faulty)
     table, ladder, before = None, [], None
     if made.diagnosis is not None:
         report_progress(2, steps, "computing the residuals")
-        table, ladder = residual_table(made.found, made.diagnosis, units), ladder_of(made.diagnosis)
+        table, ladder = residual_table(made.measured, made.diagnosis, units), ladder_of(made.diagnosis)
         if added:
             report_progress(3, steps, "fitting the model before the last step")
             before = residuals_of_model(condense(dwells), history, model[:-1], units)
-    state = made.found.state
+    state = made.measured.state
     known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
     names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}
     names |= dict.fromkeys(covariates(dwells), "recorded column")

@@ -13,8 +13,7 @@ from pipelines.report.charts import Chart, Plot, PlotAxis, Trace
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
     from pipelines.audit.drifts import UnitDrift
-    from pipelines.audit.stations_over_time import Chart as ControlChart
-    from pipelines.audit.stations_over_time import StationSeries
+    from pipelines.audit.stations_over_time import ControlChart, StationSeries
 
 MONTHS = 24
 YEAR_D = 365.25

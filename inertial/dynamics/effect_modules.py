@@ -1,0 +1,39 @@
+"""Packages of effects in which every module defines one effect and is found by its file."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from inspect import isabstract
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Found = TypeVar("Found")
+
+
+class IncompleteEffect(Exception):
+    """A module without exactly one effect of its own name; its author must correct it."""
+
+
+def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str, Found]:
+    """One effect of each module of a package, by name.
+
+    Raises
+    ------
+    IncompleteEffect
+        A module does not define exactly one effect with its own name.
+    """
+    found: dict[str, Found] = {}
+    for info in iter_modules(list(path)):
+        if info.name == "base":
+            continue
+        content = vars(import_module(f"{package}.{info.name}")).values()
+        own: list[Any] = [
+            one for one in content if isinstance(one, type) and issubclass(one, base) and not isabstract(one)
+        ]
+        if len(own) != 1 or own[0].id != info.name:
+            raise IncompleteEffect(f"{package}.{info.name}: one effect with id '{info.name}' is needed; define it")
+        found[info.name] = own[0]()
+    return found

@@ -1,0 +1,154 @@
+"""The JSON documents of calibrations: certified, valid, revoked, written as certificates, traced."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+
+class CertifiedBy(TypedDict):
+    """Who certified a calibration."""
+
+    who: str
+    where: str
+    when: str
+    reason: str
+
+
+class EndedBy(TypedDict):
+    """The ledger entry that ends a calibration."""
+
+    action: str
+    sequence: int
+    who: str
+    when: str
+    reason: str
+
+
+Validity = TypedDict(
+    "Validity", {"from": Annotated[str, "first day"], "until": Annotated[str, "the day after the last"]}
+)
+
+
+class CertifiedCalibration(Validity):
+    """A calibration in the ledger, whatever its coefficients."""
+
+    certificate: str
+    serial: str
+    device: str
+    state: Literal["valid", "superseded", "revoked"]
+    run: str
+    grade: str
+    station: str
+    recipe: str
+    stated_until: NotRequired[Annotated[str, "`until` as it was certified"]]
+    certified: NotRequired[CertifiedBy]
+    ended: NotRequired[EndedBy | None]
+
+
+class CalibrationDocument(CertifiedCalibration):
+    """A calibration in the ledger."""
+
+    coefficients: Annotated[str, "hash of the table"]
+
+
+class ValidCalibration(CertifiedCalibration):
+    """The calibration that is valid, with its coefficients."""
+
+    coefficients: Annotated[list[dict[str, Any]] | None, "rows of the unit; null if the run is not in the archive"]
+    made: NotRequired[Annotated[dict[str, Any] | None, "stage, code, libraries and inputs of the coefficients"]]
+
+
+class ShowValidityDocument(TypedDict):
+    """``show UNIT --at DATE --json``: the calibration of a unit that is valid on a date."""
+
+    unit: str
+    at: str
+    valid: bool
+    calibration: ValidCalibration | None
+    history: Annotated[list[CalibrationDocument], "every calibration of the unit, oldest first"]
+
+
+class CertificateFiles(TypedDict):
+    """The files of one certificate."""
+
+    certificate: str
+    serial: str
+    run: str
+    pdf: str
+    xml: str
+    signature: Annotated[str | None, "detached signature of the XML; null: not signed"]
+
+
+class CertificateDocument(TypedDict):
+    """``certificate --json``: the files of the certificates that were written."""
+
+    certificates: list[CertificateFiles]
+    left_out: Annotated[dict[str, str], "units of a run that have no certificate, with the reason"]
+
+
+_Entry = TypedDict(
+    "_Entry",
+    {
+        "serial": str,
+        "sequence": int,
+        "action": Literal["certify", "supersede", "revoke"],
+        "device": str,
+        "run": str,
+        "from": Annotated[str, "first day; of a revocation the day on which the validity ends"],
+        "until": Annotated[str, "the day after the last"],
+        "grade": str,
+        "station": str,
+        "recipe": str,
+        "coefficients": Annotated[str, "hash of the table"],
+        "ends": Annotated[list[int], "sequences of the calibrations that end with it"],
+        "who": str,
+        "where": str,
+        "when": str,
+        "reason": str,
+        "previous": Annotated[str, "hash of the previous entry; empty for the first"],
+        "evidence": Annotated[dict[str, str], "hash of a manifest by table"],
+        "schema": int,
+    },
+)
+
+
+class RevokeDocument(_Entry):
+    """``revoke UNIT --json``: the entry of the ledger that ends calibrations."""
+
+    unit: str
+    revoked: Annotated[list[str], "certificates that it ends"]
+
+
+class LineageNode(TypedDict):
+    """A file, run or reference of a lineage."""
+
+    id: str
+    kind: str
+    label: str
+    file: Annotated[str, "below the archive's folder; empty: none"]
+    sha256: str
+    about: dict[str, Any]
+
+
+class LineageStep(TypedDict):
+    """A step that made things from other things."""
+
+    id: str
+    name: str
+    used: Annotated[list[str], "ids"]
+    made: Annotated[list[str], "ids"]
+    about: dict[str, Any]
+
+
+class LineageDocument(TypedDict):
+    """``lineage UNIT|RUN|FILE --json``: origin and results of a unit, a run or a file."""
+
+    target: str
+    kind: str
+    focus: Annotated[list[str], "ids of what was asked for"]
+    things: list[LineageNode]
+    steps: list[LineageStep]
+    prov: Annotated[str | None, "the file of `--prov`; null: none"]
+    crate: Annotated[str | None, "the folder of `--crate`; null: none"]

@@ -1,0 +1,134 @@
+"""The JSON documents of runs, their decisions and their tables."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+from pipelines.capture.interruptions import Interruptions
+
+
+class FigureDocument(TypedDict):
+    """A figure of merit of one unit."""
+
+    value: float | None
+    uncertainty: Annotated[float | None, "expanded, with the coverage factor of the limits"]
+    limit: Annotated[float | None, "null: no limit"]
+    unit_text: str
+    outcome: str
+    rule: str
+    accept: NotRequired[Annotated[float | None, "largest value that is accepted; null: no limit"]]
+    pfa: NotRequired[Annotated[float | None, "probability of false acceptance; null: no limit"]]
+    pfr: NotRequired[Annotated[float | None, "probability of false rejection; null: no limit"]]
+
+
+class UnitDocument(TypedDict):
+    """The decision on one unit."""
+
+    unit: str
+    slot: int
+    outcome: Literal["pass", "fail", "refused"]
+    grade: str
+    reasons: Annotated[str, "separated by `; `; empty if it passed"]
+    rule: str
+    figures: Annotated[dict[str, FigureDocument], "by [name](../reference/figures.md); empty if refused"]
+    basis: NotRequired[Annotated[str, "basis of the uncertainties:  `budget` or `noise only`"]]
+
+
+RunDocument = TypedDict(
+    "RunDocument",
+    {
+        "run": str,
+        "recipe": str,
+        "effects": list[str],
+        "rule": str,
+        "units": list[UnitDocument],
+        "passed": int,
+        "failed": int,
+        "refused": int,
+        "yield": Annotated[float, "passed / units"],
+        "report": Annotated[str, "path of the HTML report"],
+        "archive": str,
+        "interruptions": NotRequired[Annotated[Interruptions | None, "null: the archive has no record of them"]],
+    },
+)
+RunDocument.__doc__ = "``run --json``: the decisions of a lot. ``fit`` prints the same."
+
+
+class FillingsDocument(TypedDict):
+    """``run --json (several fillings)``: the runs of a lot that is larger than the fixture."""
+
+    fillings: Annotated[list[RunDocument], "one per filling"]
+
+
+class ListedRun(TypedDict):
+    """A run of the archive."""
+
+    id: str
+    recipe: str
+    device: str
+    units: list[str]
+    started: Annotated[str, "ISO date and time, UTC"]
+    finished: bool
+    stages: list[str]
+    station: NotRequired[Annotated[str, "its name; empty for an import"]]
+    rerun_of: NotRequired[Annotated[str, "the run that it computes again; empty for others"]]
+    passed: NotRequired[Annotated[int | None, "units that passed; null before the grades are there"]]
+    graded: NotRequired[Annotated[int | None, "units with a decision; null before the grades are there"]]
+
+
+class ListDocument(TypedDict):
+    """``list --json``: the runs of the archive, the oldest first."""
+
+    archive: str
+    runs: list[ListedRun]
+
+
+class RunProvenance(TypedDict):
+    """Who made a run, where and when."""
+
+    who: str
+    where: str
+    when: str
+    libraries: dict[str, str]
+    capture: str | None
+    source: Annotated[Any, "files that were imported; null for a captured run"]
+
+
+class ShowDocument(RunDocument):
+    """``show RUN --json``: tables and origin of a finished run, with its decisions."""
+
+    tables: list[str]
+    provenance: RunProvenance
+
+
+class ShowUnfinishedDocument(TypedDict):
+    """``show RUN --json (no grades)``: a run that was imported or is not finished."""
+
+    run: str
+    units: Annotated[list[Any], "empty"]
+    tables: list[str]
+    provenance: RunProvenance
+
+
+class ShowTableDocument(TypedDict):
+    """``show RUN TABLE --json``: the rows of one table."""
+
+    run: str
+    table: str
+    rows: Annotated[list[dict[str, Any]], "value by column"]
+
+
+class QueryDocument(TypedDict):
+    """``query --json``: the rows of an SQL query."""
+
+    columns: list[str]
+    rows: Annotated[list[dict[str, Any]], "value by column"]
+
+
+class ReportDocument(TypedDict):
+    """``report RUN --json``: the report of a run."""
+
+    run: str
+    report: Annotated[str, "path of the HTML report"]

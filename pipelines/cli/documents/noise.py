@@ -1,0 +1,68 @@
+"""The JSON documents of noise: Allan deviation and spectrum."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from typing_extensions import TypedDict
+
+
+class AllanChannel(TypedDict):
+    """The overlapping Allan deviation of a channel."""
+
+    channel: str
+    tau_s: list[float]
+    deviation: Annotated[list[float], "in `unit`"]
+    low: list[float]
+    high: list[float]
+    fitted: Annotated[list[float] | None, "deviation of the fitted terms; null: no mixture explains the curve"]
+
+
+class NoiseTermRow(TypedDict):
+    """A noise term of a channel."""
+
+    channel: str
+    term: Literal["Q", "N", "B", "K", "R"]
+    name: str
+    value: Annotated[float | None, "null: not identified"]
+    low: float
+    high: Annotated[float, "upper end of the interval, or the upper limit"]
+    identified: bool
+    unit: str
+
+
+class AllanDocument(TypedDict):
+    """``allan --json``: the overlapping Allan deviation of a record and its noise terms."""
+
+    source: str
+    unit: Annotated[str, "of the output; empty if not given"]
+    rate_hz: float
+    samples: int
+    confidence: Annotated[float, "of the intervals of the curve"]
+    term_confidence: Annotated[float, "of the intervals and limits of the terms"]
+    curves: list[AllanChannel]
+    terms: list[NoiseTermRow]
+    notes: list[str]
+
+
+class SpectrumChannel(TypedDict):
+    """The spectrum of a channel, and the Allan deviation that follows from it."""
+
+    channel: str
+    density: Annotated[list[float], "one-sided, unit²/Hz"]
+    median_amplitude: Annotated[float, "median noise density, unit/√Hz"]
+    tau_s: list[float]
+    deviation_from_density: list[float]
+    deviation: Annotated[list[float], "of the samples"]
+
+
+class PsdDocument(TypedDict):
+    """``psd --json``: the one-sided power spectral density of a record."""
+
+    source: str
+    unit: str
+    rate_hz: float
+    samples: int
+    segment: Annotated[int, "samples of a segment"]
+    frequency_hz: list[float]
+    spectra: list[SpectrumChannel]

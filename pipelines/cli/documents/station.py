@@ -1,0 +1,150 @@
+"""The JSON documents of stations: state, self-test, log, charts, server."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+
+class SlotStatus(TypedDict):
+    """A slot of the fixture."""
+
+    slot: int
+    serial: str
+    unit_C: float | None
+    supply_V: float | None
+
+
+class LeaseStatus(TypedDict):
+    """The process that drives a station."""
+
+    run: str
+    pid: int
+    host: str
+    since: str
+    role: str
+    tripped: Any
+    heard_s: Annotated[float, "time since its last sign, s"]
+
+
+class StationStatusDocument(TypedDict):
+    """``station status --json``: angles, temperatures, states, slots and lease of a station."""
+
+    ok: Annotated[bool, "true if there are no faults"]
+    station: str
+    kind: str
+    angles_deg: Annotated[dict[str, float], "by axis, outer and inner"]
+    axes: Annotated[dict[str, str], "state by axis"]
+    chamber_C: float | None
+    set_point_C: float | None
+    door: str
+    emergency_stop: str
+    sampling: str
+    slots: list[SlotStatus]
+    lease: Annotated[LeaseStatus | None, "null: no process drives it"]
+    faults: Annotated[dict[str, str], "message by part; `safe state`: a run ended without the safe state"]
+    chamber: NotRequired[str]
+    vibration_g: NotRequired[Annotated[float | None, "rms"]]
+    time_s: NotRequired[Annotated[float, "clock of the station"]]
+
+
+class RegisterReading(TypedDict):
+    """A register with its present value."""
+
+    device: str
+    device_id: int
+    register: str
+    address: int
+    value: str
+    unit: str
+    fault: Annotated[str, "reason why it cannot be read; empty otherwise"]
+
+
+class CheckedPart(TypedDict):
+    """A test of the self-test."""
+
+    check: str
+    part: str
+    ok: bool
+    value: float | str
+    unit: str
+    low: Annotated[float | None, "smallest value allowed"]
+    high: Annotated[float | None, "largest value allowed"]
+    message: Annotated[str, "empty if it is good"]
+
+
+class StationCheckDocument(TypedDict):
+    """``station check --json``: the self-test of a station."""
+
+    ok: bool
+    failed: Annotated[list[str], "a sentence for each failure"]
+    registers: list[RegisterReading]
+    checks: NotRequired[Annotated[list[CheckedPart], "missing with `--registers`"]]
+
+
+class StationEvent(TypedDict):
+    """An event of a run or a station."""
+
+    when: Annotated[str, "ISO date and time, UTC"]
+    where: Annotated[str, "run or station"]
+    kind: str
+    reason: str
+    action: str
+    record: NotRequired[Annotated[int, "−1: none"]]
+    time_s: NotRequired[Annotated[float, "clock of the station"]]
+
+
+class StationLogDocument(TypedDict):
+    """``station log --json``: events that paused or ended runs, and events of stations, in order of time."""
+
+    events: list[StationEvent]
+
+
+class WaitingRun(TypedDict):
+    """A run that waits for the operator."""
+
+    id: str
+    name: str
+    question: str
+
+
+class OperatorDocument(TypedDict):
+    """``operator --json``: the runs that wait for the operator, and the answer that was given."""
+
+    waiting: list[WaitingRun]
+    answered: Annotated[Literal["go", "stop"] | None, "null: none was answered"]
+
+
+class StationWatchDocument(TypedDict):
+    """``station watch --json``: temperatures and angles over the time of the station, pairs of s and °C or degrees."""
+
+    title: str
+    over: Annotated[bool, "whether the run has ended"]
+    chamber: list[list[float]]
+    coldest: Annotated[list[list[float]], "coldest unit"]
+    warmest: Annotated[list[list[float]], "warmest unit"]
+    outer: list[list[float]]
+    inner: list[list[float]]
+
+
+class ServedDevice(TypedDict):
+    """A device of a simulated station."""
+
+    name: str
+    device_id: int
+    profile: str
+
+
+class StationServeDocument(TypedDict):
+    """``station serve --json``: the address of a simulated station, printed when it is ready."""
+
+    host: str
+    port: int
+    devices: list[ServedDevice]
+
+
+class StationProfilesDocument(TypedDict):
+    """``station profiles --json``: the register-map profiles, without registers; with a name the whole profile."""
+
+    profiles: Annotated[list[dict[str, Any]], "keys of a [profile](../how-to/add-a-device.md)"]
