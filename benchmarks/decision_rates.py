@@ -50,14 +50,14 @@ WORLDS: dict[str, World] = {**PLAIN, **TAILED, **DWELLS}
 def decided(world: World, seed: int) -> dict[str, bool]:
     """The decisions about the noise of one lot."""
     from inertial.criticism.bad_dwells import bad_dwells
-    from inertial.criticism.examination import Run
+    from inertial.criticism.examination import ExaminedRun
     from inertial.criticism.likelihood import scatter_of_poses, shared_noise
     from inertial.criticism.tails import heavy, with_tails
     from pipelines.diagnosis.condense import condense
     from pipelines.tables.dwells import lot_of, measured
 
     made = make(world, seed)
-    run = Run(lot_of(measured(condense(made.dwells), made.history), square=False), BASE)
+    run = ExaminedRun(lot_of(measured(condense(made.dwells), made.history), square=False), BASE)
     run.removed = bad_dwells(run.model())
     model = run.model()
     listed = with_tails(model, run.removed)
