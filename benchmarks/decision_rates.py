@@ -53,7 +53,7 @@ def decided(world: World, seed: int) -> dict[str, bool]:
     from inertial.criticism.examination import ExaminedRun
     from inertial.criticism.likelihood import scatter_of_poses, shared_noise
     from inertial.criticism.tails import heavy, with_tails
-    from pipelines.diagnosis.condense import condense
+    from pipelines.tables.condense import condense
     from pipelines.tables.dwells import lot_of, measured
 
     made = make(world, seed)

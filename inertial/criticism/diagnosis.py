@@ -7,42 +7,28 @@ import numpy as np
 from numpy.random import Generator
 
 from inertial import effects as catalogue
-from inertial.criticism import decisions
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.comparison import rms as rms_of
-from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
-from inertial.criticism.drivers import Driver, Misfit, drivers_of, places
-from inertial.criticism.evidence import GROSS, Evidence, evidence, not_judged
-from inertial.criticism.examination import EffectSearch, ExaminedRun, LotPart, Named, examined, worst
+from inertial.criticism.decisions import ADEQUATE_ABOVE
+from inertial.criticism.drivers import Misfit, drivers_of, places
+from inertial.criticism.evidence import Evidence, evidence
+from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
-from inertial.criticism.likelihood import shared_noise
 from inertial.criticism.model import Model, Term
-from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.search import Rival, SearchResult
+from inertial.criticism.search import Rival
 from inertial.criticism.smallest import Smallest, smallest_named
-from inertial.criticism.tails import with_tails
-from inertial.criticism.unknown import better_curve
 from inertial.criticism.unseen import unseen
+from inertial.criticism.verdict import Unexplained, judged
 from inertial.effects.covariate import Covariate
 from inertial.planning.ranges import UnseenRange
-from inertial.probability import passes
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """A driver that the residuals follow, without an effect of the catalogue that explains it."""
-
-    driver: str
-    shape: str
-    log_p: float
 
 
 @dataclass(frozen=True)
@@ -90,57 +76,38 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     effects : ids of the model to judge
     rng : draws the noise that adequacy is measured against
     """
-    run, found = examined(lot, effects)
-    return _concluded(run, found, rng)
-
-
-def _concluded(run: ExaminedRun, search_: EffectSearch, rng: Generator) -> Diagnosis:
-    """The diagnosis by the result of the search."""
-    base, fields, found = search_.base, search_.field, search_.result
-    problem = base.problem
-    drivers = drivers_of(problem)
-    log_p = adequacy(fields, drivers, base, rng)
-    removed = tuple(with_tails(found.model, run.removed)) if run.removed else ()
-    named_data = bool(run.handled) or any(not d.tail for d in removed)
-    rms = _rms(base)
-    unjudged = not_judged(base, rms)
-    passed = passes(np.exp(log_p), ADEQUATE_ABOVE) if rms <= GROSS else False
-    if passed is None and not unjudged:
-        unjudged = "the probability of the residuals is undefined; add poses in between"
-    if unjudged:
-        # data that cannot judge the model cannot identify missing effects either
-        found = SearchResult(base, (), found.ladder)
-    sound = passed is True and not found.added
-    final, unexplained = (found.model, None) if sound or unjudged else _beyond(search_.part, base, found, drivers)
+    verdict = judged(lot, effects, rng)
+    run, drivers, base, final = verdict.run, verdict.drivers, verdict.search.base, verdict.final
+    fields, problem = verdict.search.field, base.problem
     classes = _classes(fields, base, final)
     named = _named(problem, base, classes)
-    if unexplained is None:
-        unexplained = _covariate(classes)
+    unexplained = verdict.unexplained or _covariate(classes)
     where = places(problem, drivers, base.at(final.noise), final.space.variance)
     charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
+    silent = verdict.sound or bool(verdict.unjudged)
     every = [*run.handled, *named]
     blind, in_part = unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
     return Diagnosis(
         problem=problem,
         base=base,
         final=final,
-        rms=rms,
-        floor=final.floor(),
-        log_p=log_p,
-        adequate=_verdict(sound=sound, named_data=named_data, unjudged=unjudged),
-        where=() if sound or unjudged else charged,
+        rms=verdict.rms,
+        floor=verdict.floor,
+        log_p=verdict.log_p,
+        adequate=verdict.adequate,
+        where=() if silent else charged,
         named=named,
         unexplained=unexplained,
         unseen=blind,
         unseen_in_part=in_part,
         smallest=tuple(smallest_named(fields, final)),
-        ladder=found.ladder,
+        ladder=verdict.result.ladder,
         handled=tuple(run.handled),
-        removed=removed,
-        carried=every[0].carried if every else _residuals(base, fields, None if sound or unjudged else rng),
+        removed=verdict.removed,
+        carried=every[0].carried if every else _residuals(base, fields, None if silent else rng),
         evidence=evidence(base, fields),
-        unjudged=unjudged,
-        without_removed=(None if unjudged else sound) if removed else None,
+        unjudged=verdict.unjudged,
+        without_removed=(None if verdict.unjudged else verdict.sound) if verdict.removed else None,
     )
 
 
@@ -156,20 +123,6 @@ def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carrie
     problem = Problem(replace(lot, error=error), slope=base.problem.slope)
     model = Model(problem, base.terms, near=base.noise)
     return CarriedEvidence(dwells, adequacy(Candidates(problem, fields.effects), drivers_of(problem), model, rng))
-
-
-def _verdict(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
-    """Whether a model is adequate; None if the data cannot decide."""
-    if named_data:
-        return False
-    return None if unjudged else sound
-
-
-def _rms(base: Model) -> float:
-    """Residual of the model that is judged, g: by the published fit if poses are unknown."""
-    if base.problem.lot.radial:
-        return rms_of(residuals_of(base.problem, estimate(base)))
-    return fit_rms(base.problem, base.terms)
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
@@ -217,42 +170,3 @@ def _covariate(classes: Sequence[EffectClass]) -> Unexplained | None:
         if isinstance(best.effect, Covariate):
             return Unexplained(best.effect.column, "line" if best.first == 1 else "curve", group.log_p)
     return None
-
-
-def _beyond(part: LotPart, base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
-    """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
-    instead = better_curve(part.base, found.added, part.suspected) if found.added else None
-    if instead is not None:
-        fit, kept = instead
-        before = part.base.at(fit.model.noise)
-        drop = max(before.rss - fit.model.space.rss, 0.0)
-        log_p = log_p_value(before, drop, fit.rank) + float(np.log(len(part.suspected)))
-        return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
-    final = found.model
-    convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
-    if not convincing:
-        return final, None
-    best = max(convincing, key=lambda d: _worth(final, d))
-    shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
-    return final, Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))))
-
-
-def _convincing(model: Model, driver: Driver, looks: int) -> bool:
-    """Whether a driver is significant and large, with the wander estimated beside it: slow drivers and wander look alike."""
-    if model.explained(driver.candidate, model.floor()) < decisions.UNEXPLAINED * model.floor():
-        return False
-    return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
-
-
-def _driver_log_p(model: Model, driver: Driver) -> float:
-    """Logarithm of the probability that noise follows a driver as much, with the share of wander estimated beside it."""
-    richer = model.with_curves(driver.candidate.columns[:, :, 0, :])
-    space = model.at(richer.noise)
-    gain = space.gain(driver.candidate)
-    return log_p_value(space, float(gain.drop[0]) / shared_noise(model), int(gain.rank[0]))
-
-
-def _worth(model: Model, driver: Driver) -> float:
-    """Reduction of chi-square by a driver, less the price of its coefficients."""
-    gain = model.space.gain(driver.candidate)
-    return float(gain.drop[0]) / model.space.variance - PER_COEFFICIENT * float(gain.rank[0])

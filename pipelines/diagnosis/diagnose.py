@@ -8,12 +8,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
-from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.diagnosis import diagnose as diagnose_lot
-from inertial.criticism.faults import Fault, find_faults
 from inertial.errors import InertialError
 from pipelines.diagnosis.compare import compare, without_history
-from pipelines.diagnosis.condense import condense
 from pipelines.diagnosis.next_measurement import proposed
 from pipelines.diagnosis.result_rows import (
     Names,
@@ -23,22 +20,23 @@ from pipelines.diagnosis.result_rows import (
     influence_of,
     leave_out_of,
     noise_of,
-    probability,
     removed_of,
     smallest_of,
     white_noise_of,
     without_influence,
 )
-from pipelines.tables.dwells import Measured, lot_of, measured
+from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, probability, sound_lot
 from schemas.errors import DataRejected
-from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     import pandas as pd
 
+    from inertial.criticism.diagnosis import Diagnosis
+    from inertial.criticism.faults import Fault
     from pipelines.diagnosis.next_measurement import Proposed
+    from pipelines.tables.dwells import Measured
 
 __all__ = ["compare", "default_model", "diagnose", "document", "examined"]
 
@@ -46,8 +44,6 @@ DEFAULT = ("bias", "scale", "misalignment")
 THERMAL = ("bias_temperature", "scale_temperature")
 _WARM = 5.0
 _SAME_G, _SAME_DEG = 0.02, 1.0
-_SEED = 1293
-"""Seed of the noise that adequacy is compared with: the same data give the same result."""
 
 
 def default_model(dwells: pd.DataFrame) -> list[str]:
@@ -94,10 +90,6 @@ def diagnose(
     return document(*examined(dwells, history, effects))
 
 
-MISSING = frozenset({"dropped_samples", "truncated_file"})
-"""Names of the faults of a unit without dwells that other units have."""
-
-
 def examined(
     dwells: pd.DataFrame,
     history: pd.DataFrame | None,
@@ -112,26 +104,15 @@ def examined(
     """
     model = list(effects) if effects else default_model(dwells)
     catalogue.get_all(model)
-    found = measured(condense(dwells), history)
-    faults = find_faults(found.readings) if found.reference != "norm" else []
-    faults = [fault for fault in faults if not _on_purpose(found, fault, left_out)]
-    blocked = {f.unit for f in faults}
-    sound = [u for u in range(len(found.units)) if u not in blocked]
-    if not sound:
+    found, faults, lot = sound_lot(dwells, history, model, left_out)
+    if lot is None:
         return found, faults, None
     try:
         # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
         with threadpool_limits(1):
-            lot = lot_of(found.pick(sound) if blocked else found, square="misalignment" not in model)
-            return found, faults, diagnose_lot(lot, model, np.random.default_rng(_SEED))
+            return found, faults, diagnose_lot(lot, model, generator())
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
-
-
-def _on_purpose(found: Measured, fault: Fault, left_out: Collection[str]) -> bool:
-    """Whether a fault is only that dwells were left out."""
-    named = {f"{found.units[fault.unit]}:{int(found.dwells[k])}" for k in fault.dwells}
-    return fault.name in MISSING and bool(named) and named <= set(left_out)
 
 
 def document(
@@ -147,7 +128,7 @@ def document(
     if diagnosis is None:
         return {
             "adequate": None,
-            "reason": f"every unit ({len({f.unit for f in faults})}) has a data fault; correct the faults, then judge the model",
+            "reason": every_unit_faulty(faults),
             "blocked_by": blocked,
             "evidence": None,
             "leave_out": None,
@@ -175,10 +156,8 @@ def document(
         "blocked_by": blocked,
         "evidence": evidence_of(diagnosis, names),
         "error": {
-            "rms_ug": MICRO * diagnosis.rms,
-            "floor_ug": MICRO * diagnosis.floor,
+            **error_of(diagnosis),
             "white_noise_ug": white_noise_of(diagnosis.base),
-            "p_value": probability(diagnosis.log_p),
             **noise_of(diagnosis.final),
         },
         "where": [

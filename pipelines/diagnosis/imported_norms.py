@@ -9,10 +9,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from inertial.state import T_REFERENCE
-from pipelines.diagnosis.condense import MOST
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, dwells_of, gravity_of
 from pipelines.stages.norm_fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
+from pipelines.tables.condense import MOST
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 

@@ -11,6 +11,7 @@ from inertial import effects as catalogue
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import intervals, settled, terms_of
+from pipelines.tables.sound_lot import probability
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -28,11 +29,6 @@ class Names:
 
     units: tuple[str, ...]
     dwells: tuple[int, ...]
-
-
-def probability(log_p: float) -> float:
-    """A probability; values below the smallest number are given as that."""
-    return float(max(np.exp(min(log_p, 0.0)), 1e-300))
 
 
 def known(value: float) -> float | None:

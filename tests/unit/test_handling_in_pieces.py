@@ -8,7 +8,7 @@ from inertial.criticism import problem as problems
 from inertial.criticism.examination import ExaminedRun, candidates_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling import alternatives
-from pipelines.diagnosis.condense import condense
+from pipelines.tables.condense import condense
 from pipelines.tables.dwells import lot_of, measured
 
 MODEL = ("bias", "scale", "misalignment")

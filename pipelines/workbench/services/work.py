@@ -51,10 +51,10 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     steps = 4
     report_progress(0, steps, "reading the dwells")
     from inertial.quantities import formula_names
-    from pipelines.diagnosis.condense import condense
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.examination import examination
     from pipelines.report.residual_table import ladder_of, residual_table, residuals_of_model
+    from pipelines.tables.condense import condense
     from pipelines.tables.dwell_table import covariates
 
     dwells, history, judged = _inputs(request, "diagnose")

@@ -1,0 +1,163 @@
+"""The verdict on a model: whether it is adequate, with its residual, the noise of the measurement, and the probability."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+
+from inertial.criticism import decisions
+from inertial.criticism.adequacy import adequacy
+from inertial.criticism.bad_dwells import BadDwell
+from inertial.criticism.comparison import estimate, residuals_of
+from inertial.criticism.comparison import rms as rms_of
+from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
+from inertial.criticism.drivers import Driver, drivers_of
+from inertial.criticism.evidence import GROSS, not_judged
+from inertial.criticism.examination import EffectSearch, ExaminedRun, LotPart, examined
+from inertial.criticism.heldout import fit_rms
+from inertial.criticism.likelihood import shared_noise
+from inertial.criticism.model import Model
+from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
+from inertial.criticism.problem import Lot
+from inertial.criticism.search import SearchResult
+from inertial.criticism.tails import with_tails
+from inertial.criticism.unknown import better_curve
+from inertial.probability import passes
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """A driver that the residuals follow, without an effect of the catalogue that explains it."""
+
+    driver: str
+    shape: str
+    log_p: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict on a model by a lot, with the examination that it rests on; errors in g.
+
+    run, search, drivers : the examined lot, the search for effects in it, and the recorded quantities
+    result : of the search; without effects where the data cannot judge the model
+    final : the model with all identified effects
+    unexplained : a driver that no effect explains
+    removed : single dwells that were left out, those marked that are tails of the noise
+    rms : of the residuals of the judged model; floor : of the noise of the measurement, white and wander
+    log_p : natural logarithm of the probability that an adequate model fits as badly somewhere
+    sound : whether the other dwells and the search have nothing against the model
+    adequate : None if the data cannot decide, for the reason in ``unjudged``
+    """
+
+    run: ExaminedRun
+    search: EffectSearch
+    drivers: list[Driver]
+    result: SearchResult
+    final: Model
+    unexplained: Unexplained | None
+    removed: tuple[BadDwell, ...]
+    rms: float
+    floor: float
+    log_p: float
+    sound: bool
+    adequate: bool | None
+    unjudged: str = ""
+
+
+def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
+    """The verdict of a lot on a model.
+
+    A handling error makes a model that passes not adequate, and the noise of the measurement is that beside the missing effects:
+    so the search for both belongs to the verdict.
+
+    Parameters
+    ----------
+    lot : dwells in g
+    effects : ids of the model to judge
+    rng : draws the noise that adequacy is measured against
+    """
+    run, search = examined(lot, effects)
+    base, found = search.base, search.result
+    drivers = drivers_of(base.problem)
+    log_p = adequacy(search.field, drivers, base, rng)
+    removed = tuple(with_tails(found.model, run.removed)) if run.removed else ()
+    named_data = bool(run.handled) or any(not d.tail for d in removed)
+    rms = _rms(base)
+    unjudged = not_judged(base, rms)
+    passed = passes(np.exp(log_p), ADEQUATE_ABOVE) if rms <= GROSS else False
+    if passed is None and not unjudged:
+        unjudged = "the probability of the residuals is undefined; add poses in between"
+    if unjudged:
+        # data that cannot judge the model cannot identify missing effects either
+        found = SearchResult(base, (), found.ladder)
+    sound = passed is True and not found.added
+    final, unexplained = (found.model, None) if sound or unjudged else _beyond(search.part, base, found, drivers)
+    return Verdict(
+        run=run,
+        search=search,
+        drivers=drivers,
+        result=found,
+        final=final,
+        unexplained=unexplained,
+        removed=removed,
+        rms=rms,
+        floor=final.floor(),
+        log_p=log_p,
+        sound=sound,
+        adequate=_adequate(sound=sound, named_data=named_data, unjudged=unjudged),
+        unjudged=unjudged,
+    )
+
+
+def _adequate(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
+    """Whether a model is adequate; None if the data cannot decide."""
+    if named_data:
+        return False
+    return None if unjudged else sound
+
+
+def _rms(base: Model) -> float:
+    """Residual of the model that is judged, g: by the published fit if poses are unknown."""
+    if base.problem.lot.radial:
+        return rms_of(residuals_of(base.problem, estimate(base)))
+    return fit_rms(base.problem, base.terms)
+
+
+def _beyond(part: LotPart, base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
+    """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
+    instead = better_curve(part.base, found.added, part.suspected) if found.added else None
+    if instead is not None:
+        fit, kept = instead
+        before = part.base.at(fit.model.noise)
+        drop = max(before.rss - fit.model.space.rss, 0.0)
+        log_p = log_p_value(before, drop, fit.rank) + float(np.log(len(part.suspected)))
+        return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
+    final = found.model
+    convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
+    if not convincing:
+        return final, None
+    best = max(convincing, key=lambda d: _worth(final, d))
+    shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
+    return final, Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))))
+
+
+def _convincing(model: Model, driver: Driver, looks: int) -> bool:
+    """Whether a driver is significant and large, with the wander estimated beside it: slow drivers and wander look alike."""
+    if model.explained(driver.candidate, model.floor()) < decisions.UNEXPLAINED * model.floor():
+        return False
+    return _driver_log_p(model, driver) + np.log(looks) < np.log(NAMED_BELOW)
+
+
+def _driver_log_p(model: Model, driver: Driver) -> float:
+    """Logarithm of the probability that noise follows a driver as much, with the share of wander estimated beside it."""
+    richer = model.with_curves(driver.candidate.columns[:, :, 0, :])
+    space = model.at(richer.noise)
+    gain = space.gain(driver.candidate)
+    return log_p_value(space, float(gain.drop[0]) / shared_noise(model), int(gain.rank[0]))
+
+
+def _worth(model: Model, driver: Driver) -> float:
+    """Reduction of chi-square by a driver, less the price of its coefficients."""
+    gain = model.space.gain(driver.candidate)
+    return float(gain.drop[0]) / model.space.variance - PER_COEFFICIENT * float(gain.rank[0])

@@ -1,0 +1,116 @@
+"""Dwells as the lot that a verdict on a model rests on: long runs reduced, units with a data fault left out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from inertial.criticism.faults import find_faults
+from inertial.errors import InertialError
+from pipelines.tables.condense import condense
+from pipelines.tables.dwells import lot_of, measured
+from schemas.errors import DataRejected
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
+
+    import pandas as pd
+
+    from inertial.criticism.faults import Fault
+    from inertial.criticism.problem import Lot
+    from pipelines.tables.dwells import Measured
+
+MISSING = frozenset({"dropped_samples", "truncated_file"})
+"""Names of the faults of a unit without dwells that other units have."""
+
+SMALL_MISFIT = "the misfit is smaller than the noise, but significant"
+_SMALL = 1.1
+_SEED = 1293
+
+
+class HasFigures(Protocol):
+    """A verdict, or a diagnosis: rms and floor in g, and the natural logarithm of the probability."""
+
+    @property
+    def rms(self) -> float:
+        """Residual of the judged model, g."""
+        ...
+
+    @property
+    def floor(self) -> float:
+        """Noise of the measurement, g."""
+        ...
+
+    @property
+    def log_p(self) -> float:
+        """Natural logarithm of the probability of such a residual if the model is adequate."""
+        ...
+
+
+def generator() -> np.random.Generator:
+    """Draws the noise that adequacy is compared with: the same data give the same result."""
+    return np.random.default_rng(_SEED)
+
+
+def sound_lot(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], left_out: Collection[str] = ()
+) -> tuple[Measured, list[Fault], Lot | None]:
+    """Readings, data faults, and the lot of the units without a fault, g; no lot where every unit has one.
+
+    Parameters
+    ----------
+    dwells, history : exchange format
+    effects : the model to judge
+    left_out : ``UNIT:DWELL``, removed from ``dwells`` on purpose, so that it is no fault if a unit lacks them
+
+    Raises
+    ------
+    DataRejected
+        There are no dwells, or too few to judge anything.
+    """
+    found = measured(condense(dwells), history)
+    faults = find_faults(found.readings) if found.reference != "norm" else []
+    faults = [fault for fault in faults if not _on_purpose(found, fault, left_out)]
+    blocked = {f.unit for f in faults}
+    sound = [u for u in range(len(found.units)) if u not in blocked]
+    if not sound:
+        return found, faults, None
+    try:
+        # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
+        with threadpool_limits(1):
+            return found, faults, lot_of(found.pick(sound) if blocked else found, square="misalignment" not in effects)
+    except InertialError as problem:
+        raise DataRejected(str(problem)) from None
+
+
+def _on_purpose(found: Measured, fault: Fault, left_out: Collection[str]) -> bool:
+    """Whether a fault is only that dwells were left out."""
+    named = {f"{found.units[fault.unit]}:{int(found.dwells[k])}" for k in fault.dwells}
+    return fault.name in MISSING and bool(named) and named <= set(left_out)
+
+
+def every_unit_faulty(faults: Sequence[Fault]) -> str:
+    """The reason why a lot without a sound unit cannot be judged."""
+    return f"every unit ({len({f.unit for f in faults})}) has a data fault; correct the faults, then judge the model"
+
+
+def probability(log_p: float) -> float:
+    """A probability; values below the smallest number are given as that."""
+    return float(max(np.exp(min(log_p, 0.0)), 1e-300))
+
+
+def error_of(verdict: HasFigures) -> dict[str, Any]:
+    """Residual and noise, µg, and the probability of a verdict."""
+    return {
+        "rms_ug": MICRO * verdict.rms,
+        "floor_ug": MICRO * verdict.floor,
+        "p_value": probability(verdict.log_p),
+    }
+
+
+def is_small(error: Mapping[str, Any]) -> bool:
+    """Whether a significant error, ``rms_ug`` and ``floor_ug``, is so near the noise that it can be mistaken for it."""
+    return bool(error["rms_ug"] < _SMALL * error["floor_ug"])
