@@ -11,8 +11,7 @@ from pipelines.audit.document import counts, furthest
 from pipelines.audit.finding import WHO
 from pipelines.audit.parameters import unit_text
 from pipelines.audit.pictures import chart_plot, drift_plot, due_plot, series_plot, yield_plot
-from pipelines.report.diagnosis import chance
-from pipelines.report.numbers import THIN, significant
+from pipelines.report.numbers import THIN, chance, significant
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:

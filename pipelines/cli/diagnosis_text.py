@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 from pipelines.cli.evidence_text import print_evidence
 from pipelines.cli.next_commands import command_line, print_extension, print_next
 from pipelines.cli.options import console, print_table, short, short_values
+from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from rich.console import Console
@@ -23,9 +24,6 @@ HIDDEN, SHOWN = 3.0, 4
 listed."""
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
 """Style of a verdict; None: it cannot be judged."""
-
-SMALL = 1.1
-"""An error below this multiple of the noise floor can be mistaken for noise, although it is significant."""
 
 
 def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None) -> None:
@@ -128,27 +126,39 @@ def verdict(document: dict[str, Any]) -> str:
         return (
             f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; correct the faults, then judge the model."
         )
-    sound = len(document["units"]) - len(faulty)
-    left = f"residual {short(error['rms_ug'])} µg rms over {sound} unit{'s' if sound != 1 else ''}"
-    left += f"; noise of the measurement {short(error['floor_ug'])} µg rms (p {equal(error['p_value'])})"
-    if document["adequate"]:
-        return f"ADEQUATE: {left}."
-    if document["adequate"] is None:
-        return f"CANNOT BE JUDGED: {document.get('reason')}."
-    if error["rms_ug"] < SMALL * error["floor_ug"]:
-        left += "; the misfit is smaller than the noise, but significant"
+    judged = {"adequate": document["adequate"], "reason": document.get("reason"), **error}
+    told = plain_verdict({**judged, "units": len(document["units"]) - len(faulty)})
+    if document["adequate"] is not False:
+        return f"{told}."
     spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
         rest = f"; also missing: {', and '.join(named)}" if named else ""
-        return f"NOT ADEQUATE: {left}; the data: {'; '.join(spoilt)}{rest}."
+        return f"{told}; the data: {'; '.join(spoilt)}{rest}."
     if named:
-        return f"NOT ADEQUATE: {left}; missing: {', and '.join(named)}."
+        return f"{told}; missing: {', and '.join(named)}."
     driver = (document["unexplained"] or {}).get("driver")
     rest = "no recorded quantity explains the residual"
     if driver:
         rest = f"the residual follows {driver}, and no effect of the catalogue explains it"
-    return f"NOT ADEQUATE: {left}; {rest}."
+    return f"{told}; {rest}."
+
+
+def plain_verdict(judged: Mapping[str, Any]) -> str:
+    """The verdict with residual, noise and probability, without a full stop.
+
+    Parameters
+    ----------
+    judged : ``adequate``, ``reason``, ``rms_ug``, ``floor_ug``, ``p_value`` and ``units``, the number of units that were judged
+    """
+    if judged["adequate"] is None:
+        return f"CANNOT BE JUDGED: {judged['reason']}"
+    units = judged["units"]
+    left = f"residual {short(judged['rms_ug'])} µg rms over {units} unit{'s' if units != 1 else ''}"
+    left += f"; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
+    if judged["adequate"]:
+        return f"ADEQUATE: {left}"
+    return f"NOT ADEQUATE: {left}{f'; {SMALL_MISFIT}' if is_small(judged) else ''}"
 
 
 def class_text(group: dict[str, Any]) -> str:

@@ -43,6 +43,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
+    from pipelines.cli.adequacy_text import judged, print_adequacy
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.jobs.job import job_of_run
 
@@ -65,9 +66,10 @@ def command(
     except Exception:
         runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
         raise
-    document = summary(runner.run)
+    document = judged(summary(runner.run), runner.run)
     if as_json:
         print_json(document)
     else:
         print_summary(document)
+        print_adequacy(document["adequacy"])
     raise typer.Exit(exit_status(document))

@@ -74,6 +74,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import library_remarks
+    from pipelines.cli.adequacy_text import judged, print_adequacy
     from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
@@ -102,12 +103,13 @@ def command(
     ]
     for line in (line for run in runs for line in library_remarks(run)):
         error_console().print(f"run: {line}", markup=False, soft_wrap=True)
-    documents = [summary(run) for run in runs]
+    documents = [judged(summary(run), run) for run in runs]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
     else:
         for document in documents:
             print_summary(document)
+            print_adequacy(document["adequacy"])
         print_next(
             console(),
             [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
@@ -116,12 +118,16 @@ def command(
 
 
 def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
-    """The commands after a run: is its model adequate, and its certificates where they can be given."""
+    """The commands after a run: what its model lacks or its plan cannot show, and its certificates where they can be given."""
     from pipelines.cli.next_commands import archive_words, command_line
+    from pipelines.stages.grade import NO_GRADE
 
     own = [run.id, *archive_words(archive)]
-    lines = [command_line("diagnose", *own)] if len(document["effects"]) and "dwells" in run.tables() else []
-    certain = any(unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"])
+    lines = [command_line("diagnose", *own)] if document["adequacy"] is not None else []
+    certain = any(
+        unit["outcome"] == "pass" and unit.get("basis") == "budget" and unit["grade"] != NO_GRADE
+        for unit in document["units"]
+    )
     return [*lines, command_line("certify", *own)] if certain else lines
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pipelines.archive import Run
+
 
 _TEXTS = ("kind", "pose", "out_unit", "status")
 _CORRECT = "correct it in the file"
@@ -48,7 +50,7 @@ def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.
     if is_file(source):
         frame, _ = files.read(Path(source))
         return checked(frame, where=Path(source).name, foreign=True)
-    return checked(_from_run(source, archive, "dwells"), where=f"run {source}")
+    return dwells_of(_run(source, archive))
 
 
 def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd.DataFrame:
@@ -62,7 +64,17 @@ def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd
     if is_file(source):
         frame, _ = files.read(Path(source))
         return _checked_history(frame, Path(source).name, foreign=True)
-    return _checked_history(_from_run(source, archive, "history"), f"run {source}", foreign=False)
+    return history_of(_run(source, archive))
+
+
+def dwells_of(run: Run) -> pd.DataFrame:
+    """The dwells of a run, as :func:`read_dwells` reads them by its name."""
+    return checked(run.table("dwells"), where=f"run {run.id}")
+
+
+def history_of(run: Run) -> pd.DataFrame:
+    """The temperatures of a run against time, as :func:`read_history` reads them by its name."""
+    return _checked_history(run.table("history"), f"run {run.id}", foreign=False)
 
 
 def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.DataFrame:
@@ -100,14 +112,14 @@ def _is_run_like(source: str | Path) -> bool:
     return isinstance(source, str) and "/" not in source and not Path(source).suffix
 
 
-def _from_run(source: str | Path, archive: str | Path | None, table: str) -> pd.DataFrame:
+def _run(source: str | Path, archive: str | Path | None) -> Run:
     store = Archive(archive)
     if not store.runs():
         raise WrongUse(
             f"'{shown(str(source))}': neither a file nor a run (the archive {store.root} is empty); name a file of dwells, "
             "or give the archive with --archive"
         )
-    return store.table(str(source), table)
+    return store.run(str(source))
 
 
 def _require(frame: pd.DataFrame, names: Iterable[str], where: str) -> None:
@@ -165,6 +177,8 @@ def _all_or_none(frame: pd.DataFrame, names: tuple[str, ...], where: str) -> Non
 
 
 def _plausible(frame: pd.DataFrame, where: str) -> None:
+    if frame.empty:
+        return  # a run whose units were all refused: who judges it says that nothing is left
     _inside(frame.drop(columns="n", errors="ignore"), where)  # which has its own check
     if FORCE[0] in frame.columns:
         size = float(np.median(np.linalg.norm(frame[list(FORCE)].to_numpy(dtype=np.float64), axis=1)))

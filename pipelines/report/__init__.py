@@ -20,6 +20,7 @@ INPUTS = (
     *("allan", "noise", "figures", "grades"),
 )
 OPTIONAL = (
+    "history",
     *("wander", "budget", "uncertainties", "lot_risks"),
     *("procedure_points", "procedure_figures", "procedure_findings"),
 )

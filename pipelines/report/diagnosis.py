@@ -9,7 +9,7 @@ import numpy as np
 from inertial import effects
 from inertial.criticism.handling import named as handled
 from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
-from pipelines.report.numbers import significant
+from pipelines.report.numbers import chance, equal, significant
 from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals
 from pipelines.report.templates import template
 from schemas.units import MICRO
@@ -56,21 +56,6 @@ def render_diagnosis(
         chance=chance,
         equal=equal,
     )
-
-
-def chance(p: float | None) -> str:
-    """A probability for people."""
-    if p is None:
-        return ""
-    if p <= 1e-299:
-        return "< 1e−299"
-    return significant(p, 2) if p > 1e-3 else f"{p:.0e}".replace("-", "−")
-
-
-def equal(p: float) -> str:
-    """A probability with its sign: equal, or below the smallest value that is printed."""
-    text = chance(p)
-    return text if text.startswith("<") else f"= {text}"
 
 
 def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:

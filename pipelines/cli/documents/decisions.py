@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from pipelines.capture.interruptions import Interruptions
+from pipelines.jobs.adequacy import AdequacyDocument
 
 
 class FigureDocument(TypedDict):
@@ -51,6 +52,7 @@ RunDocument = TypedDict(
         "report": Annotated[str, "path of the HTML report"],
         "archive": str,
         "interruptions": NotRequired[Annotated[Interruptions | None, "null: the archive has no record of them"]],
+        "adequacy": NotRequired[Annotated[AdequacyDocument | None, "null: no multi-position test; not in `show`"]],
     },
 )
 RunDocument.__doc__ = "``run --json``: the decisions of a lot. ``fit`` prints the same."

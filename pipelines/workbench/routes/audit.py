@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.audit.finding import WHO
-from pipelines.report.diagnosis import chance
+from pipelines.report.numbers import chance
 from pipelines.stages.figures import FIGURES
 from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import requests

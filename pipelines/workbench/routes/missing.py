@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
 from pipelines.diagnosis.inputs import use_written_formulas
-from pipelines.report.diagnosis import chance
+from pipelines.report.numbers import chance
 from pipelines.workbench.pages import (
     RequestBody,
     figure,

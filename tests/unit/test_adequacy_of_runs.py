@@ -1,0 +1,165 @@
+"""The verdict on the model of a run: the line after it, the panel of its report and ``diagnose`` say the same."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from capture_double import small_run
+from lots import lot
+from typer.testing import CliRunner
+
+from pipelines.archive import Run
+from pipelines.cli import app
+from pipelines.cli.adequacy_text import judged, print_adequacy
+from pipelines.cli.diagnosis_text import verdict
+from pipelines.cli.run import _next
+from pipelines.cli.summary import summary
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.jobs.adequacy import adequacy, adequacy_of
+from pipelines.report.context import ReportContext
+from pipelines.report.numbers import chance, significant
+from pipelines.report.panels import model_adequacy
+
+MODEL = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
+FIGURES = ("rms_ug", "floor_ug", "p_value")
+
+
+def _cubic(force, _temperature, _time, _rng):
+    return 3e-4 * force**3
+
+
+def _plain() -> pd.DataFrame:
+    return lot(np.random.default_rng(31), units=3)
+
+
+def _hidden() -> pd.DataFrame:
+    return lot(np.random.default_rng(32), units=3, hidden=_cubic)
+
+
+def _knocked() -> pd.DataFrame:
+    """One dwell of one unit that is far off: a fault of the data, not of the model."""
+    table = _plain()
+    table.loc[(table["unit"] == "U001") & (table["dwell"] == 17), "out_x"] += 0.002
+    return table
+
+
+def _few() -> pd.DataFrame:
+    return lot(np.random.default_rng(33), units=1, plan="six", temperatures=(25.0,))
+
+
+def _swapped() -> pd.DataFrame:
+    """Two axes of one unit exchanged: this unit is left out."""
+    table = _plain()
+    unit = table["unit"] == "U002"
+    table.loc[unit, ["out_x", "out_y"]] = table.loc[unit, ["out_y", "out_x"]].to_numpy()
+    return table
+
+
+def _all_swapped() -> pd.DataFrame:
+    table = _plain()
+    return table.assign(out_x=table["out_y"], out_y=table["out_x"])
+
+
+CASES = [
+    (_plain, True),
+    (_hidden, False),
+    (_knocked, False),
+    (_few, None),
+    (_swapped, True),
+    (_all_swapped, None),
+]
+
+
+@pytest.mark.parametrize(("made", "adequate"), CASES, ids=lambda value: getattr(value, "__name__", str(value)))
+def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
+    table = made()
+    effects = MODEL if made is not _few else MODEL[:3]
+    short, whole = adequacy(table, None, effects), diagnose(table, None, effects)
+    assert short["adequate"] is adequate
+    assert (short["adequate"], short["reason"]) == (whole["adequate"], whole["reason"])
+    assert {name: short[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
+    assert short["faulty"] == sorted({unit for fault in whole["blocked_by"] for unit in fault["units"]})
+    assert (short["reason"] is None) == (adequate is not None)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return small_run(tmp_path_factory.mktemp("judged"))
+
+
+def _command(*words: object) -> str:
+    return CliRunner().invoke(app, [str(word) for word in words]).stdout
+
+
+def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    place = ("--archive", run.archive.root)
+    whole = json.loads(_command("diagnose", run.id, "--json", *place))
+    found = adequacy_of(run)
+    assert found is not None
+    assert found["adequate"] is whole["adequate"]
+    assert {name: found[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
+    print_adequacy(found)
+    line = capsys.readouterr().out.strip()
+    assert line.startswith("model ")
+    assert verdict(whole).startswith(line.removeprefix("model").strip())
+    panel = model_adequacy.render(ReportContext(run, {}))
+    assert panel is not None
+    cards = re.findall(r"<b>(.*?)</b>", panel)
+    assert cards == [f"{significant(found[n])} µg" for n in FIGURES[:2]] + [chance(found["p_value"])]
+    assert f"tumbleline diagnose {run.id}" in panel
+
+
+def test_a_judged_run_keeps_its_tables_and_hashes(run: Run) -> None:
+    before = {path.name: path.read_bytes() for path in Path(str(run.path)).glob("*.json")}
+    tables = run.tables()
+    adequacy_of(run)
+    assert run.tables() == tables
+    assert {path.name: path.read_bytes() for path in Path(str(run.path)).glob("*.json")} == before
+
+
+class Pictured:
+    """What a panel asks of a report."""
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+
+
+def test_a_run_whose_units_were_all_refused_says_what_is_missing(tmp_path: Path) -> None:
+    run = small_run(tmp_path, dict.fromkeys(("A1", "A2", "A3"), "silent"))
+    found = adequacy_of(run)
+    assert found is not None
+    assert found["adequate"] is None
+    assert "refused" in str(found["reason"])
+    panel = model_adequacy.render(Pictured(run))  # pyright: ignore[reportArgumentType]
+    assert panel is not None
+    assert "Cannot be judged: every unit was refused" in panel
+
+
+class WithoutTumbling:
+    """A run of a list of procedures without a multi-position test."""
+
+    id = "shocked"
+
+    def __init__(self) -> None:
+        self.about = {"capture": "c", "recipe": {"poses": [], "effects": ["bias"]}}
+
+    def tables(self) -> list[str]:
+        return ["dwells", "history"]
+
+
+def test_a_run_without_a_multi_position_test_has_neither_line_nor_panel() -> None:
+    run = WithoutTumbling()
+    assert adequacy_of(run) is None  # pyright: ignore[reportArgumentType]
+    assert model_adequacy.render(Pictured(run)) is None  # pyright: ignore[reportArgumentType]
+
+
+def test_a_certificate_is_offered_only_for_a_grade(run: Run) -> None:
+    document = judged(summary(run), run)
+    unit = document["units"][0] | {"outcome": "pass", "basis": "budget"}
+    for grade, offered in (("industrial", True), ("none", False)):
+        lines = _next(run, document | {"units": [unit | {"grade": grade}]}, None)
+        assert any(line.startswith("tumbleline certify") for line in lines) is offered
+        assert lines[0] == f"tumbleline diagnose {run.id}"
