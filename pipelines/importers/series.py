@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 UNEVEN = 0.5
 """Largest deviation of a time from the even grid, in steps; above it a sample is missing or duplicated."""
 
+EVEN = 1e-3
+"""Largest range of the steps of a column, over their mean, with which it rises evenly: a clock, no output with noise."""
+
+FEWEST_STEPS = 16
+"""Steps from which on a column that always rises is a time: noise does so in one of 10¹⁴ records."""
+
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
@@ -82,6 +88,7 @@ def series_of_file(
     if not chosen:
         raise DataRejected(f"{path.name}: no column of numbers, one at least is needed; name one with --columns")
     values = np.stack([_numbers(table[name], path.name) for name in chosen])
+    _refuse_clock(chosen, values, path.name, named=bool(columns), timed=bool(time))
     rate = (
         rate_hz if rate_hz is not None else _rate(TIME_UNITS[time_unit] * _numbers(table[time], path.name), path.name)
     )
@@ -128,6 +135,26 @@ def _numbers(column: pd.Series, where: str) -> Array:
             "number is needed; remove the gap, or cut the record there"
         )
     return values
+
+
+def _refuse_clock(names: Sequence[str], values: Array, where: str, *, named: bool, timed: bool) -> None:
+    """Refuse a time or a counter among the channels: it rises from row to row and has no noise.
+
+    Parameters
+    ----------
+    named : whether the channels were named: then only a column that rises evenly is none
+    timed : whether the column of the time is known
+    """
+    for name, column in zip(names, values, strict=True):
+        steps = np.diff(column)
+        if steps.size < FEWEST_STEPS or not bool(np.all(steps > 0.0)):
+            continue
+        if not named or float(np.ptp(steps)) < EVEN * float(steps.mean()):
+            instead = "" if timed else f"give --time {shown(name)} instead of --rate, or "
+            raise DataRejected(
+                f"{where}: column '{shown(name)}' rises in every row (from {column[0]:g} to {column[-1]:g}) as a time or a "
+                f"counter does, the output of a sensor at rest is needed; {instead}name the channels with --columns"
+            )
 
 
 def _rate(time: Array, where: str) -> float:

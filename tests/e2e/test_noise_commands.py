@@ -117,6 +117,15 @@ def test_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_told(record: Pat
     assert "no channel ever changes" in refused("allan", tmp_path / "dead.csv", "--time", "t", "--columns", "ay")
 
 
+@pytest.mark.parametrize("command", ["allan", "psd"])
+def test_a_time_taken_for_an_output_is_refused(command: str, record: Path) -> None:
+    message = refused(command, record, "--rate", 100)
+    assert "column 't' rises in every row (from 0 to 399.99)" in message
+    assert "give --time t instead of --rate, or name the channels with --columns" in message
+    assert "column 't' rises" in refused(command, record, "--rate", 100, "--columns", "t,ax")
+    assert run(command, record, "--rate", 100, "--columns", "ax").exit_code == 0
+
+
 def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
