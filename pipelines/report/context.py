@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipelines.report.reasons import plain_reason
 from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ class UnitContext:
         self.slot = row["slot"]
         self.outcome: str = row["outcome"]
         self.grade: str = row["grade"]
-        self.reasons = [reason for reason in str(row["reasons"]).split("; ") if reason]
+        self.reasons = [plain_reason(reason) for reason in str(row["reasons"]).split("; ") if reason]
         self.certificate = report.certificates.get(self.unit)
 
     @cached_property

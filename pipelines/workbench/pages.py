@@ -19,6 +19,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from pipelines.archive import Archive
 from pipelines.report.charts import csv_text, plotly_figure, png_bytes
 from pipelines.report.numbers import significant
+from pipelines.report.reasons import plain_reason
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
@@ -177,6 +178,7 @@ def _environment() -> Environment:
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["short"] = short
+    environment.filters["plain_reason"] = plain_reason
     environment.filters["tuple_of"] = _tuple_of
     return environment
 

@@ -25,7 +25,7 @@ TEMPLATE = """\
 {% if verdict.rms_ug is not none %}
 <div class="cards">
   <div class="card"><b>{{ number(verdict.rms_ug) }} µg</b><span>residual of the model, rms over {{ verdict.units }} unit{{ "s" if verdict.units != 1 }}</span></div>
-  <div class="card"><b>{{ number(verdict.floor_ug) }} µg</b><span>noise of the measurement, rms{{ ": with the missing effects in the model" if verdict.adequate is false }}</span></div>
+  <div class="card"><b>{{ number(verdict.floor_ug) }} µg</b><span>noise of the measurement, rms</span></div>
   <div class="card"><b>{{ chance(verdict.p_value) }}</b><span>probability of the residual under noise alone</span></div>
 </div>
 {% endif %}

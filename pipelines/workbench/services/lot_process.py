@@ -13,6 +13,7 @@ from pipelines.archive import Archive, files
 from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Request
+from pipelines.report.reasons import plain_reason
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.services.lots import write_state
 from schemas.errors import OperatorNeeded, TumblelineError
@@ -108,7 +109,7 @@ def _measured(request: dict[str, Any], pages: Pages) -> None:
 
 
 def _result(row: dict[str, Any]) -> str:
-    why = f": {row['reasons']}" if row["reasons"] and row["outcome"] != "pass" else ""
+    why = f": {plain_reason(row['reasons'])}" if row["reasons"] and row["outcome"] != "pass" else ""
     return f"{row['outcome']}{why}"
 
 
