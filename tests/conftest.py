@@ -54,3 +54,13 @@ def no_error_of_a_server(request: pytest.FixtureRequest) -> Iterator[None]:
     yield
     for log in folder.rglob(LOG) if folder is not None else ():
         assert not errors_in(log), f"{log} has an error:\n{errors_in(log)}"
+
+
+@pytest.fixture(scope="module")
+def no_pictures() -> Iterator[None]:
+    """Reports without drawn plots, for modules that make runs and look at no picture: plots are most of a run's time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pipelines.report.unit_panels.model.model_plots", lambda *_: "<svg/>")
+        patch.setattr("pipelines.report.unit_panels.model.check_plots", lambda *_: "<svg/>")
+        patch.setattr("matplotlib.figure.Figure.savefig", lambda _, sink, **__: sink.write("<svg/>"))
+        yield

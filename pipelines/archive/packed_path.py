@@ -6,16 +6,17 @@ removed, and a file lies in both for a while: what lists a folder looks at the s
 
 The functions of :mod:`os` stand here where the methods of a path would ask the packs again.
 """
-# ruff: noqa: PTH100, PTH110, PTH112, PTH113, PTH116, PTH123, PTH208
+# ruff: noqa: PTH100, PTH110, PTH116, PTH123, PTH208
 
 from __future__ import annotations
 
 import io
 import os
+from errno import EBADF, ELOOP, ENOENT, ENOTDIR
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
-from stat import S_IFDIR, S_IFREG
+from stat import S_IFDIR, S_IFREG, S_ISDIR, S_ISREG
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pipelines.archive import packs
@@ -55,16 +56,26 @@ class PackedPath(Base):
 
     def exists(self, *, follow_symlinks: bool = True) -> bool:
         """Whether there is anything here, by itself or packed."""
-        alone = os.path.exists(self) if follow_symlinks else os.path.lexists(self)
-        return alone or self._packed() is not None
+        return self._mode(follow_symlinks=follow_symlinks) is not None or self._packed() is not None
 
     def is_file(self, **_: bool) -> bool:
         """Whether a file is here, by itself or packed."""
-        return os.path.isfile(self) or (not os.path.exists(self) and isinstance(self._packed(), packs.Member))
+        mode = self._mode()
+        return isinstance(self._packed(), packs.Member) if mode is None else S_ISREG(mode)
 
     def is_dir(self, **_: bool) -> bool:
         """Whether a folder is here, by itself or with packed files."""
-        return os.path.isdir(self) or (not os.path.exists(self) and isinstance(self._packed(), int))
+        mode = self._mode()
+        return isinstance(self._packed(), int) if mode is None else S_ISDIR(mode)
+
+    def _mode(self, *, follow_symlinks: bool = True) -> int | None:
+        """What is here by itself, None for nothing; a folder that may not be looked into is an error, as of any path."""
+        try:
+            return os.stat(self, follow_symlinks=follow_symlinks).st_mode
+        except OSError as problem:
+            if problem.errno in {ENOENT, ENOTDIR, EBADF, ELOOP}:
+                return None
+            raise
 
     def open(self, mode: str = "r", *arguments: Any, **options: Any) -> Any:
         """The file, for reading also from a pack."""

@@ -19,6 +19,10 @@ EXAMPLES = (
     "tumbleline archive backup /mnt/copy --database /mnt/copies",
 )
 EXAMPLES_OF = {
+    "compact": (
+        "tumbleline archive compact",
+        "tumbleline archive compact --before 2026-05-01",
+    ),
     "clean": (
         "tumbleline archive clean --dry-run",
         "tumbleline archive clean --archive /srv/archive",

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -48,7 +49,10 @@ OUTPUTS = {
     "monitor": ["monitor"],
     "archive": ["archive", "clean", "--dry-run"],
 }
-"""The main output of each command, in this order, in a folder with one run."""
+"""The main output of each command, in a folder with one run."""
+
+BEFORE = {"revoke": OUTPUTS["certify"]}
+"""What is given before a command whose output needs it."""
 
 ELSEWHERE = {
     "demo": "measures for half a minute; its tables are those of compare and diagnose",
@@ -71,7 +75,7 @@ def test_every_command_has_an_output_here_or_a_reason() -> None:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a line: recipe, archive with one run, a model, a record at rest."""
     place = tmp_path_factory.mktemp("line")
     rng = np.random.default_rng(3)
@@ -83,6 +87,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv(VARIABLE, "")
         list(Runner(small_job(place), Archive(place / "archive"), measure=CaptureDouble()).all())
     return place
+
+
+@pytest.fixture
+def folder(line: Path, tmp_path: Path) -> Path:
+    """A copy of it for each test: what one command writes is not there for the next."""
+    return Path(shutil.copytree(line, tmp_path / "line"))
 
 
 def printed(words: list[str], columns: str | None) -> str:
@@ -107,6 +117,8 @@ def copied(line: str) -> bool:
 def test_the_output_of_a_command_needs_eighty_columns(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.setenv(VARIABLE, "")
+    if name in BEFORE:
+        printed(BEFORE[name], str(WIDE))
     text = printed(OUTPUTS[name], str(WIDE))
     if name != "export":  # a file, whose lines are as long as its format needs
         assert [line for line in text.splitlines() if len(line) > WIDE and not copied(line)] == []

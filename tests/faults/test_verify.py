@@ -20,6 +20,8 @@ from pipelines.cli import app
 from pipelines.integrity import Report, seals, verify
 from schemas.errors import ArchiveUnusable, WrongUse
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 
 def make(folder: Path) -> Path:
     """An archive with a finished run, certified, one unit of it revoked."""

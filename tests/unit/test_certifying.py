@@ -26,6 +26,8 @@ from pipelines.stages.figures import UNITS
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
 from schemas.limits import VALIDITY_MONTHS, parse_limits
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 Typed = Callable[..., Result]
 LIMITS = 'name = "half"\nvalidity_months = 6\n[figures]\nresidual_rms_ug = {max = 5000.0, unit = "µg"}\n'
 
