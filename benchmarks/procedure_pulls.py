@@ -57,7 +57,7 @@ PARTS = {
     "ratiometry": f'supplies_V = {list(SUPPLIES)}\naxes = ["z"]\ndwell_s = 10.0\nsettle_s = 1.0',
     "sweep": "low_hz = 10.0\nhigh_hz = 6000.0\nper_octave = 4\nlevel_g = 2.0\nrecord_s = 0.1\n"
     f"nominal_scale = {SCALE}\nflat_to_hz = {FLAT_HZ}",
-    "transverse": f"step_deg = 30.0\nrecord_s = 0.2\nscale = {SCALE}",
+    "transverse": f"step_deg = 30.0\nrecord_s = 0.2\nscale = {SCALE}\nscale_percent = 0.2",
     "random_vibration": f"seconds = 5.0\nlevels_g = [2.0, 3.0, 4.0]\nscale = {SCALE}",
     "step_response": "steps = 16",
     "shock": f"shocks = 2\nwindow_s = 20.0\nsettle_s = 5.0\nduration_ms = {1e3 * PULSE_S}\nreference_percent = 0.25\n"

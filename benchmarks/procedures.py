@@ -131,6 +131,7 @@ def naming(n: int, seed: int) -> None:
         points, model = at_twice_the_floor(kind, rng)
         found = diagnose_transfer(points, model)
         hits[kind].append(any(kind in one.effects for one in found.classes))
+        print(f"  {k + 1} of {n}, named: {sum(map(sum, hits.values()))}", flush=True)  # a stop keeps what was counted
         if not hits[kind][-1]:
             print(
                 f"  missed {kind}: p {found.fit.p_value:.2g}, {[one.effects for one in found.classes]}",
@@ -158,6 +159,7 @@ def null(n: int, seed: int) -> None:
         rng.bit_generator.state = after
         found = diagnose_transfer(points_of(c, truth, rng), MODEL)
         named += bool(found.classes)
+        print(f"  null {k + 1} of {n}, named: {named}", flush=True)
         true = {"natural_hz": w0, "damping": zeta, "delay_s": delay}
         pulls.append([(found.fit.of(p)[0] - t) / found.fit.of(p)[1] for p, t in true.items()])
     spread = np.std(np.array(pulls), axis=0, ddof=1)

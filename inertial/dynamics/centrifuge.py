@@ -145,13 +145,31 @@ def linearity_percent(polynomial: Polynomial, full_scale_g: float, line: str = "
     y = columns(x, polynomial.names) @ polynomial.value
     gain = polynomial.of("scale")[0]
     if line == "least_squares":
-        deviation = y - np.polyval(np.polyfit(x, y, 1), x)
+        deviation = _apart(x, y)
     elif line == "end_point":
         slope = (y[-1] - y[0]) / (x[-1] - x[0])
         deviation = y - (y[0] + slope * (x - x[0]))
     else:
         deviation = _minimax(x, y)
     return float(100.0 * np.max(np.abs(deviation)) / (abs(gain) * full_scale_g))
+
+
+def linearity_error(polynomial: Polynomial, full_scale_g: float) -> float:
+    """Standard uncertainty of the linearity by the least-squares line, % of the one-sided range.
+
+    The deviation is linear in the coefficients, whose errors are correlated: over one set of speeds the terms are nearly of one
+    shape, and errors of one are made up for by the others. At the place of the largest deviation it is √(dᵀCd).
+    """
+    x = np.linspace(-full_scale_g, full_scale_g, 2001)
+    each = _apart(x, columns(x, polynomial.names))
+    place = each[int(np.argmax(np.abs(each @ polynomial.value)))]
+    gain = abs(polynomial.of("scale")[0])
+    return float(100.0 * np.sqrt(place @ polynomial.covariance @ place) / (gain * full_scale_g))
+
+
+def _apart(x: Array, y: Array) -> Array:
+    """Deviations (n,) or (n, k) from the least-squares line."""
+    return np.asarray(y - np.vander(x, 2) @ np.polyfit(x, y, 1), dtype=np.float64)
 
 
 def _minimax(x: Array, y: Array) -> Array:

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 Array = NDArray[np.float64]
+ADEQUATE = 0.005  # least p-value of a line that is adequate
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,7 @@ class Follows:
     zero_g, zero_error_g : (n,), g
     slope_g_V, slope_error_g_V : of the zero over the supply, by weighted least squares through the first point
     scale : sensitivity at the first supply, output per g, positive
+    own_error, own_zero_error : (n,), share and g, of each supply without that of the first, which departures have in common
     """
 
     supply: Array
@@ -31,6 +34,8 @@ class Follows:
     slope_g_V: float
     slope_error_g_V: float
     scale: float
+    own_error: Array
+    own_zero_error: Array
 
 
 def zero_and_sensitivity(means: Array, errors: Array) -> tuple[Array, Array, Array]:
@@ -67,10 +72,36 @@ def departures(
     spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own, own[0]))
     own_zero = own if zero_error is None else zero_error / ratio / scale
     zero_spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own_zero, own_zero[0]))
-    step = supply - supply[0]
-    covariance = np.diag(own_zero**2) + own_zero[0] ** 2
-    used = slice(1, None)
-    weight = np.linalg.solve(covariance[used, used], step[used])
-    norm = float(step[used] @ weight)
-    slope = float(weight @ level[used]) / norm
-    return Follows(supply, gain, spread, level, zero_spread, slope, float(norm**-0.5), scale)
+    slope, slope_error, _ = _line(supply, level, own_zero)
+    return Follows(supply, gain, spread, level, zero_spread, slope, slope_error, scale, own, own_zero)
+
+
+def largest_departure(supply: Array, departure: Array, own: Array) -> tuple[float, float]:
+    """Largest departure over the supplies and its standard uncertainty, unit of the departures.
+
+    The largest of several departures within the noise is that of the noise: for four of no true departure it is 1.6 standard
+    uncertainties on average. So where a straight line through the first supply is adequate (χ², p ≥ 0.005), the departure is the
+    line's at the supply that is farthest from the first, which noise does not choose. Else some departure is significant, and the
+    largest is taken.
+
+    Parameters
+    ----------
+    supply, departure : (n,), that of the first supply is 0; own : (n,), standard uncertainties without the first one's share
+    """
+    slope, error, square = _line(supply, departure, own)
+    if chi2.sf(square, max(1, len(supply) - 2)) >= ADEQUATE:
+        step = float(max(supply - supply[0], key=abs))
+        return slope * step, error * abs(step)
+    k = int(np.argmax(np.abs(departure)))
+    return float(departure[k]), float(np.hypot(own[k], own[0]))
+
+
+def _line(supply: Array, departure: Array, own: Array) -> tuple[float, float, float]:
+    """Slope of a straight line through the first supply, its standard uncertainty, and χ²; departures share the first's error."""
+    step = (supply - supply[0])[1:]
+    covariance = np.diag(own[1:] ** 2) + own[0] ** 2
+    weight = np.linalg.solve(covariance, step)
+    norm = float(step @ weight)
+    slope = float(weight @ departure[1:]) / norm
+    left = departure[1:] - slope * step
+    return slope, float(norm**-0.5), float(left @ np.linalg.solve(covariance, left))

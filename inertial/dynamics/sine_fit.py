@@ -38,7 +38,7 @@ class Tone:
     frequency_error: float = 0.0
 
 
-def fit_tone(record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0) -> Tone:
+def fit_tone(record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0, harmonics: int = 1) -> Tone:
     """The tone of a known frequency in every channel, by least squares with constant and drift.
 
     Parameters
@@ -46,13 +46,14 @@ def fit_tone(record: Array, rate_hz: float, frequency: float, *, first_s: float 
     record : (n, channels), any unit
     rate_hz, frequency : Hz
     first_s : time of the first sample, s
+    harmonics : highest one that is fitted beside the tone, below half the rate; distortion of an exciter is no noise of a sample
     """
     n = len(record)
     if n < 8:
         msg = f"sine fit: {n} samples, 8 or more are needed; record longer"
         raise NotIdentified(msg)
     time = first_s + np.arange(n) / rate_hz
-    design = _columns(time, frequency)
+    design = np.hstack([_columns(time, frequency), *_harmonics(time, rate_hz, frequency, harmonics)])
     c = np.linalg.lstsq(design, record, rcond=None)[0]
     left = record - design @ c
     sigma = np.sqrt(np.sum(left**2, axis=0) / (n - design.shape[1]))
@@ -95,11 +96,7 @@ def fit_tone_and_frequency(record: Array, rate_hz: float, frequency: float, *, f
 def harmonic_distortion(record: Array, rate_hz: float, frequency: float) -> Array:
     """Total harmonic distortion of every channel, a share: harmonics 2 to 5 below half the rate over the fundamental."""
     time = np.arange(len(record)) / rate_hz
-    orders = [k for k in range(2, HARMONICS + 1) if k * frequency < 0.49 * rate_hz]
-    parts = [_columns(time, frequency)]
-    parts += [
-        np.column_stack([np.cos(w * time), np.sin(w * time)]) for w in (2.0 * np.pi * k * frequency for k in orders)
-    ]
+    parts = [_columns(time, frequency), *_harmonics(time, rate_hz, frequency, HARMONICS)]
     c = np.linalg.lstsq(np.hstack(parts), record, rcond=None)[0]
     fundamental = np.hypot(c[0], c[1])
     return np.sqrt(np.sum(c[4:] ** 2, axis=0)) / np.where(fundamental > 0.0, fundamental, np.inf)
@@ -114,6 +111,12 @@ def _columns(time: Array, frequency: float) -> Array:
     turn = 2.0 * np.pi * frequency * time
     drift = (time - time.mean()) / max(float(np.ptp(time)), 1e-300)
     return np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(time), drift])
+
+
+def _harmonics(time: Array, rate_hz: float, frequency: float, last: int) -> list[Array]:
+    """Columns (n, 2) of every harmonic from the second to the last, as far as the rate holds them."""
+    turns = [2.0 * np.pi * k * frequency * time for k in range(2, last + 1) if k * frequency < 0.49 * rate_hz]
+    return [np.column_stack([np.cos(turn), np.sin(turn)]) for turn in turns]
 
 
 def _coarse(record: Array, time: Array, frequency: float, span: float) -> float:

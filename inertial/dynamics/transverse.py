@@ -11,7 +11,9 @@ from scipy.stats import chi2, norm
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 FEWEST = 6
+ROUNDS, TURNED = 60, 1e-9
 Z95 = float(norm.ppf(0.975))
 
 
@@ -91,3 +93,36 @@ def fit_transverse(first: Array, second: Array, output: Array, error: Array) -> 
         float(chi2.sf(square, dof)),
         np.asarray(fitted),
     )
+
+
+def relative_phase(drive: Complex, answer: Complex) -> Complex:
+    """Factor (n,) of magnitude one that turns the tones of each record into phase with the motion.
+
+    A unit and the reference move and are sampled with a phase that differs from record to record. Motion along the sensitive axis
+    in quadrature (an exciter has 5 %) turns it into an apparent transverse output: 1 mrad of phase into 50 ppm. The phase of a
+    record is common to the three axes, so it follows from those that the motion drives. Their own cross-axis response to the same
+    quadrature must not be taken for phase: answer = g·M·drive is solved for g of each record, complex, and M, real, in turn.
+
+    Parameters
+    ----------
+    drive, answer : (n, 3), complex tones of the motion and of the unit
+
+    Raises
+    ------
+    NotIdentified
+        The unit does not answer the motion.
+    """
+    matrix, gain = np.eye(3), np.zeros(len(drive), dtype=np.complex128)
+    inverse = np.linalg.pinv(np.concatenate([drive.real, drive.imag]))
+    for _ in range(ROUNDS):
+        moved, before = drive @ matrix, gain
+        gain = np.sum(np.conj(moved) * answer, axis=1) / np.sum(np.abs(moved) ** 2, axis=1)
+        if not np.all(np.abs(gain) > 0.0):
+            msg = "transverse sensitivity: the unit does not answer the motion; check cable and mounting"
+            raise NotIdentified(msg)
+        gain = gain * len(gain) / np.sum(np.abs(gain))  # the size belongs to the matrix
+        if np.max(np.abs(gain - before)) < TURNED:
+            break
+        turned = answer / gain[:, None]
+        matrix = inverse @ np.concatenate([turned.real, turned.imag])
+    return np.asarray(np.conj(gain) / np.abs(gain), dtype=np.complex128)

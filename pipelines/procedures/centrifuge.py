@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.stats import chi2
 
-from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial, linearity_percent
+from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
@@ -248,13 +248,7 @@ def _responds(rows: pd.DataFrame) -> float:
 
 def _figures(part: CentrifugePart, fit: Polynomial) -> list[FigureValue]:
     linearity = linearity_percent(fit, part.full_scale_g)
-    curved = [name for name in fit.names if name not in {"bias", "scale"}]
-    spread = 0.0
-    for name in curved:
-        k, error = fit.names.index(name), fit.of(name)[1]
-        moved = Polynomial(fit.names, fit.value.copy(), fit.covariance, fit.residuals, fit.chi_square, fit.dof)
-        moved.value[k] += error
-        spread = float(np.hypot(spread, linearity_percent(moved, part.full_scale_g) - linearity))
+    spread = linearity_error(fit, part.full_scale_g)
     k2, k3, k1 = fit.of("second_order"), fit.of("third_order"), fit.of("scale")
     radius = 1e-4 * part.radius_um / part.radius_m  # %
     return [

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from inertial.dynamics.ratiometry import Follows, departures, zero_and_sensitivity
-from inertial.dynamics.stability import difference_error, white_and_flicker
+from inertial.dynamics.ratiometry import Follows, departures, largest_departure, zero_and_sensitivity
+from inertial.dynamics.stability import difference_error, short_noise
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -23,6 +23,7 @@ from pipelines.procedures.base import (
     worst,
 )
 from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.noise_columns import noise_columns, pooled_noise
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Pose
@@ -96,7 +97,7 @@ class Ratiometry(SetsEquipment, Evaluated):
             SENSITIVITY,
             "%",
             "largest departure of the sensitivity from that at the nominal supply (times the voltage ratio where the output "
-            "follows it)",
+            "follows it), by a straight line over the supply where that is adequate",
         ),
         FigureSpec(ZERO, "%", "the same departure of the zero, of the full scale of the output"),
         FigureSpec(
@@ -147,16 +148,17 @@ class Ratiometry(SetsEquipment, Evaluated):
             axis = int(record.step.setting["axis"])
             for unit, reading, own in record.by_unit():
                 output = own.output[:, axis]
-                white, flicker = white_and_flicker(output, own.rate_hz)
+                noise = short_noise(output, own.rate_hz)
                 rows.append(
                     {
                         "unit": unit, "axis": AXES[axis], "series": "face", "point": k,
                         "setting": record.step.setting["supply_V"], "value": float(output.mean()),
                         "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": record.step.setting["side"],
-                        "white": white, "flicker": flicker, "window_s": output.size / own.rate_hz,
+                        "window_s": output.size / own.rate_hz,
                         "time_s": float(own.time.mean()),
                         "measured_V": float(reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
                     }
+                    | noise_columns(noise)
                 )  # fmt: skip
         del part, device
         return point_table(rows)
@@ -218,10 +220,10 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
                 means[k, side], errors[k, side] = float(one["value"].iloc[0]), float(one["uncertainty"].iloc[0])
     zero, sensitivity, error = zero_and_sensitivity(means, errors)
     apart = _time_between(rows)
-    white, flicker, window = (float(rows[name].mean()) for name in ("white", "flicker", "window_s"))
+    noise, window = pooled_noise(rows), float(rows["window_s"].mean())
     # both faces of a voltage follow each other: slow wander is the same on them, so their mean has it like one longer record
-    zero_error = np.maximum(error, difference_error(white, flicker, 2.0 * window, apart) / np.sqrt(2.0))
-    error = np.maximum(error, 0.5 * difference_error(white, flicker, window, apart))
+    zero_error = np.maximum(error, difference_error(noise, 2.0 * window, apart) / np.sqrt(2.0))
+    error = np.maximum(error, 0.5 * difference_error(noise, window, apart))
     own = 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0)
     error, zero_error = np.hypot(error, own), np.hypot(zero_error, own)
     return departures(measured, zero, sensitivity, error, follows=part.follows, zero_error=zero_error)
@@ -240,13 +242,13 @@ def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:
         note = "a face was not recorded at a voltage; measure again"
         return FigureValue.not_determined(name, axis, note)
     if name == SENSITIVITY:
-        k = int(np.argmax(np.abs(one.sensitivity)))
-        return FigureValue(name, axis, 100.0 * float(one.sensitivity[k]), 100.0 * float(one.sensitivity_error[k]))
+        value, error = largest_departure(one.supply, one.sensitivity, one.own_error)
+        return FigureValue(name, axis, 100.0 * value, 100.0 * error)
     if name == SLOPE:
         return FigureValue(name, axis, MICRO * one.slope_g_V, MICRO * one.slope_error_g_V)
-    k = int(np.argmax(np.abs(one.zero_g)))
+    value, error = largest_departure(one.supply, one.zero_g, one.own_zero_error)
     share = 100.0 * one.scale / device.full_scale
-    return FigureValue(name, axis, share * float(one.zero_g[k]), share * float(one.zero_error_g[k]))
+    return FigureValue(name, axis, share * value, share * error)
 
 
 def _text(part: RatiometryPart, one: Follows) -> str:

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from inertial.dynamics.pulses import Pulse, measured_pulse, velocity_change
 from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
+from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
 from pipelines.procedures import shock_waves
 from pipelines.procedures.base import (
@@ -275,7 +276,9 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
     scatter = float(value.std(ddof=1) / np.sqrt(value.size)) if value.size > 2 else 0.0
     spread = max(scatter, float(np.sqrt(np.mean(each**2)) / np.sqrt(value.size)))
     under = good["undershoot_percent"].to_numpy(dtype=float)
-    floor = 100.0 * float(good["noise_g"].mean()) / part.peak_g
+    floor = 100.0 * float(good["noise_g"].mean()) / part.peak_g / np.sqrt(under.size)
+    # shocks differ in duration, and so in undershoot: of a few, their scatter is itself uncertain
+    scatter = float(under.std(ddof=1) / np.sqrt(under.size)) if under.size > 1 else 0.0
     return [
         FigureValue(
             names[0],
@@ -287,7 +290,7 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
             names[1],
             part.axis,
             float(under.mean()),
-            float(np.hypot(floor, under.std(ddof=1) / np.sqrt(under.size) if under.size > 1 else 0.0)),
+            stated_error(floor**2 + scatter**2, 1.0, scatter**2 * np.sqrt(2.0 / max(1, under.size - 1))),
         ),
     ]
 

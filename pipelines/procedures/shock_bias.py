@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.dynamics.stability import difference_error, error_of_mean, white_and_flicker
+from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
 from pipelines.procedures.base import FigureValue, worst
+from pipelines.procedures.noise_columns import noise_columns, pooled_noise
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
@@ -24,14 +25,14 @@ def bias_points(
     """Mean of every axis in µg, its uncertainty from the scatter of ten parts; ``setting`` is 0 before, 1 after."""
     output = own.output / scale * MICRO
     error = error_of_mean(output)
-    noise = [white_and_flicker(output[:, i], own.rate_hz) for i in range(3)]
+    noise = [short_noise(output[:, i], own.rate_hz) for i in range(3)]
     after = 0.0 if record.step.name == "before" else 1.0
     return [
         {
             "unit": unit, "axis": axis, "series": "bias", "point": number, "setting": after, "value": float(output[:, i].mean()),
-            "uncertainty": float(error[i]), "white": noise[i][0], "flicker": noise[i][1], "window_s": len(output) / own.rate_hz,
-            "time_s": float(own.time.mean()),
+            "uncertainty": float(error[i]), "window_s": len(output) / own.rate_hz, "time_s": float(own.time.mean()),
         }
+        | noise_columns(noise[i])
         for i, axis in enumerate(AXES)
     ]  # fmt: skip
 
@@ -57,6 +58,6 @@ def bias_shift(rows: pd.DataFrame) -> FigureValue:
 
 def _pooled_error(bias: pd.DataFrame) -> float:
     """Standard uncertainty of after minus before by white noise and flicker, pooled over the axes."""
-    white, flicker, window = (float(bias[name].mean()) for name in ("white", "flicker", "window_s"))
+    window = float(bias["window_s"].mean())
     time = bias["time_s"].to_numpy(dtype=float) if "time_s" in bias else np.zeros(1)  # earlier versions have none
-    return difference_error(white, flicker, window, float(np.ptp(time)))
+    return difference_error(pooled_noise(bias), window, float(np.ptp(time)))

@@ -128,7 +128,8 @@ class Tilt(Evaluated):
         for unit, rows in points.groupby("unit", sort=False):
             fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
             linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
-            found = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, linear)]
+            # of the whole model: what K2 and K3 leave in a sine's residual is no wander
+            found = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
             if part.orders == 3:
                 found.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
             else:

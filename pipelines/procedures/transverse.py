@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from inertial.dynamics.sine_fit import fit_tone, fit_tone_and_frequency
-from inertial.dynamics.transverse import Transverse, fit_transverse
+from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency
+from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     REFERENCE,
@@ -48,8 +48,8 @@ FIGURE = "transverse_sensitivity_percent"
 class TransversePart(NominalScale):
     """Motion across ``axis`` while the units are turned about it through a whole circle in steps of ``step_deg``.
 
-    Uncertainties are standard ones: ``reference_percent`` is the reference's, as a share of the result; ``repeatability_ppm`` is
-    each angle's own, of the driven acceleration.
+    Uncertainties are standard ones: ``reference_percent`` is the reference's, as a share of the result; ``scale_percent`` is that
+    of the nominal scale, where no calibration precedes; ``repeatability_ppm`` is each angle's own, of the driven acceleration.
     """
 
     kind: Literal["transverse"]
@@ -60,6 +60,7 @@ class TransversePart(NominalScale):
     record_s: Annotated[Positive, Field(ge=0.05, le=60.0)] = 0.5
     temperature_C: Annotated[float, Field(ge=-100.0, le=200.0)] = 25.0
     reference_percent: NotNegative = 0.25
+    scale_percent: NotNegative = 1.0
     repeatability_ppm: NotNegative = 5.0
 
     @model_validator(mode="after")
@@ -121,14 +122,13 @@ class TransverseTest(InG, OnEquipment, Evaluated):
         for unit in units:
             own = [(k, record) for k, record in enumerate(records) if unit in record.samples]
             tones = [_tones(part, record, record.samples[unit], scale_of(part, device, unit)) for _, record in own]
-            turn = np.exp(-1j * _phase(part, tones))
-            for (k, record), (drive, answer, noise, whole) in zip(own, tones, strict=True):
-                rows.append(_point(part, k, record, (drive, answer, noise), turn, device, whole=whole) | {"unit": unit})
+            turns = _turns(tones)
+            for (k, record), (drive, answer, noise, whole), turn in zip(own, tones, turns, strict=True):
+                rows.append(_point(part, k, record, (drive, answer, noise), turn, whole=whole) | {"unit": unit})
         return point_table(rows)
 
     def evaluate(self, part: TransversePart, points: pd.DataFrame, device: Device) -> Outcome:
         """The maximum and its direction for every unit."""
-        del device
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):
@@ -139,8 +139,14 @@ class TransverseTest(InG, OnEquipment, Evaluated):
                 figures[name] = [FigureValue.not_determined(FIGURE, part.axis, str(problem))]
                 continue
             value = 100.0 * found.value
-            error = float(np.hypot(100.0 * found.error, 1e-2 * part.reference_percent * value))
-            figures[name] = [FigureValue(FIGURE, part.axis, value, error, 100.0 * found.low, 100.0 * found.high)]
+            known = device.scale_error.get(name)
+            scale = part.scale_percent if known is None else 100.0 * float(known[AXES.index(part.axis)])
+            share = 1e-2 * float(np.hypot(part.reference_percent, scale)) * value
+            error = float(np.hypot(100.0 * found.error, share))
+            low, high = value - Z95 * error, value + Z95 * error
+            figures[name] = [
+                FigureValue(FIGURE, part.axis, value, error, max(0.0, low) if found.low > 0.0 else 0.0, high)
+            ]
             findings += [Finding(name, subject, text) for subject, text in _texts(part, found)]
         return Outcome(figures, findings)
 
@@ -180,12 +186,12 @@ def fitted(rows: pd.DataFrame) -> Transverse:
 def _tones(
     part: TransversePart, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Tones (3,) of the reference and of the unit in g, their standard uncertainties (3,), and whether the unit responds.
+    """Tones (3,) of the reference and of the unit in g, standard uncertainties of their difference (3,), whether it responds.
 
     The frequency on the clock of the device is that of its strongest channel.
     """
     reference = record.samples[REFERENCE]
-    drive = fit_tone(reference.output, reference.rate_hz, part.frequency_hz)
+    drive = fit_tone(reference.output, reference.rate_hz, part.frequency_hz, harmonics=HARMONICS)
     output = own.output / scale
     alive = bool(np.all(np.isfinite(output)) and np.ptp(output[:, AXES.index(part.axis)]) > 0.0)
     frequency = part.frequency_hz
@@ -195,16 +201,20 @@ def _tones(
         tone = fit_tone_and_frequency(output[:, [strongest]], own.rate_hz, part.frequency_hz)
         seen = abs(tone.value[0]) > SILENT * tone.amplitude_error[0]
         frequency = tone.frequency if seen else frequency
-    answer = fit_tone(output if alive else np.zeros_like(output), own.rate_hz, frequency)
-    return drive.value, answer.value, answer.amplitude_error, alive and seen
+    shown = output if alive else np.zeros_like(output)
+    answer = fit_tone(shown, own.rate_hz, frequency, harmonics=HARMONICS)
+    # the motion along the axis that the reference measures is subtracted, with its noise
+    return drive.value, answer.value, np.hypot(answer.amplitude_error, drive.amplitude_error), alive and seen
 
 
-def _phase(part: TransversePart, tones: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]) -> float:
-    """Phase of the device against the reference, from its axes in the plane of motion; rad."""
-    axis = AXES.index(part.axis)
-    plane = [(axis + 1) % 3, (axis + 2) % 3]
-    total = sum((np.sum(np.conj(drive[plane]) * answer[plane]) for drive, answer, _, whole in tones if whole), 0j)
-    return float(np.angle(total))
+def _turns(tones: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]) -> np.ndarray:
+    """Phase factor (records,) that turns the unit into phase with the reference; 1 where the unit does not respond."""
+    seen = np.array([whole for *_, whole in tones], dtype=bool)
+    turns = np.ones(len(tones), dtype=np.complex128)
+    if np.count_nonzero(seen) >= FEWEST_ANGLES:
+        drive, answer = (np.array([tone[k] for tone in tones])[seen] for k in (0, 1))
+        turns[seen] = relative_phase(drive, answer)
+    return turns
 
 
 def _point(
@@ -213,7 +223,6 @@ def _point(
     record: ProcedureRecord,
     tones: tuple[np.ndarray, np.ndarray, np.ndarray],
     turn: complex,
-    device: Device,
     *,
     whole: bool,
 ) -> dict[str, Any]:
@@ -224,8 +233,10 @@ def _point(
     angle = record.step.setting["angle_deg"]
     driven = drive[first] * np.cos(np.radians(angle)) + drive[second] * np.sin(np.radians(angle))
     ratio = float(np.real(answer[axis] * turn / driven) - np.real(drive[axis] / driven))
-    error = float(np.hypot(noise[axis] / abs(driven), 1e-6 * part.repeatability_ppm))
-    del device
+    # noise of the phase moves what is subtracted by the motion along the axis that is in quadrature
+    quadrature = abs(np.imag(drive[axis] / driven)) * float(np.hypot(noise[first], noise[second])) / np.sqrt(2.0)
+    own = float(np.hypot(noise[axis], quadrature)) / abs(driven)
+    error = float(np.hypot(own, 1e-6 * part.repeatability_ppm))
     return {
         "axis": part.axis,
         "series": "across",

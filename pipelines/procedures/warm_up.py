@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from inertial.dynamics.stability import block_means, settled_error, warm_up_time, white_and_flicker
+from inertial.dynamics.stability import block_means, settled_error, short_noise
+from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
 from pipelines.procedures.base import (
     Device,
@@ -121,12 +122,11 @@ class WarmUp(InG, Evaluated):
 
 
 def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
-    """Warm-up time of one axis; its uncertainty is that of the smoothed output minus its final value, over the slope."""
+    """Warm-up time of one axis; its uncertainty is that of the noise over the slope at the entry, and of the means of 1 s."""
     time, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
-    lasting, half = float(np.ptp(time)) + 1.0, value[value.size // 2 :]
-    white, flicker = white_and_flicker(half, 1.0)
-    white = max(white, float(rows["uncertainty"].iloc[0]) ** 2)
-    noise = settled_error(white, flicker, max(part.window_s, 1.0), 0.2 * lasting, 0.5 * lasting)
+    lasting = float(np.ptp(time)) + 1.0
+    of_half = short_noise(value[value.size // 2 :], 1.0, trend=1)
+    noise = settled_error(of_half.white, of_half.flicker, max(part.window_s, 1.0), 0.2 * lasting, 0.5 * lasting)
     if 3.0 * noise > part.band_ug:
         note = (
             f"noise of the smoothed output against its final value is {noise:.3g} µg, a third of the band of {part.band_ug:g} µg "
@@ -134,13 +134,10 @@ def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
         )
         return FigureValue.not_determined("warm_up_s", axis, note)
     try:
-        found, final = warm_up_time(time, value, band=part.band_ug, window_s=part.window_s)
+        found = entered(time, value, band=part.band_ug, window_s=part.window_s)
     except NotIdentified as problem:
         return FigureValue.not_determined("warm_up_s", axis, str(problem))
-    near = np.abs(time - found) <= 5.0 * part.window_s
-    slope = abs(float(np.polyfit(time[near], value[near] - final, 1)[0])) if np.count_nonzero(near) > 3 else 0.0
-    spread = noise / slope if slope > 0.0 else 0.0
-    return FigureValue("warm_up_s", axis, found, float(np.hypot(1.0 / np.sqrt(12.0), min(spread, found))))
+    return FigureValue("warm_up_s", axis, found.value, float(np.hypot(1.0 / np.sqrt(12.0), found.error)))
 
 
 PROCEDURE = WarmUp()

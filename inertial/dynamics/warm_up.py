@@ -1,0 +1,106 @@
+"""Warm-up time with its uncertainty in white and 1/f noise: where a curve through the noise enters the band for good."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial.dynamics.stability import short_noise, warm_up_time
+from inertial.dynamics.wander import stated_error, variance_of_sum
+from inertial.errors import NotIdentified
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+SPANS = (1.0, 2.0, 4.0, 8.0)  # windows on either side of the entry that the parabola spans
+REACH = 3.0  # least span, in standard uncertainties of the time
+ROUNDS = 20
+SETTLED = 0.02  # of the span: a step of the crossing that ends the search
+FEWEST = 5  # means under the parabola
+
+
+@dataclass(frozen=True)
+class WarmUpTime:
+    """Time from power-on, its standard uncertainty, both s, and the final value; the unit of the record."""
+
+    value: float
+    error: float
+    final: float
+
+
+def entered(time: Array, record: Array, *, band: float, window_s: float) -> WarmUpTime:
+    """Time at which the record enters ± band about its final value for good.
+
+    The last excursion of a noisy record beyond the band comes late: by half a standard uncertainty where noise crosses it several
+    times. So a parabola is laid through the record about the entry, over at least three standard uncertainties of the time on
+    either side where eight windows are as much, and its crossing is taken. Its weights, and those of the final value, give the
+    variance in white and 1/f noise.
+
+    Parameters
+    ----------
+    time : (n,), s since power-on, evenly spaced
+    record : (n,), any unit
+    band : unit of the record
+    window_s : shortest length over which the record is smoothed, s
+
+    Raises
+    ------
+    NotIdentified
+        The record leaves the band in its last fifth, or noise leaves the entry open.
+    """
+    last, final = warm_up_time(time, record, band=band, window_s=window_s)
+    if last <= time[0]:
+        return WarmUpTime(last, 0.0, final)  # within its band from the first mean on
+    step, away = float(time[1] - time[0]), record - final
+    noise = short_noise(record[len(record) // 2 :], 1.0 / step, trend=1)
+    tail = np.zeros(len(record))
+    tail[int(0.8 * len(record)) :] = 1.0
+    tail /= tail.sum()
+    at, error, reach = last, 0.0, SPANS[-1] * window_s
+    for _ in range(2):  # the longest span first; then the shortest that holds the entry with its uncertainty
+        starts = (at, *(at - k * window_s for k in SPANS))  # noise has left the band late: the curve crosses before
+        found = next((one for start in starts if (one := _crossing(time, away, band, start, reach))), None)
+        if found is None:
+            break
+        at, slope, weights = found
+        shares = weights - tail
+        over = variance_of_sum(shares) / (2.0 * np.log(2.0))  # variance over F², h = F²/(2 ln 2)
+        variance = noise.flicker * over + noise.white / step * float(np.sum(shares**2))
+        error = stated_error(variance, over, noise.flicker_error) / slope
+        shorter = min((k for k in SPANS if k * window_s >= REACH * error), default=SPANS[-1]) * window_s
+        if shorter >= reach:
+            return WarmUpTime(at, error, final)
+        reach = shorter
+    else:
+        return WarmUpTime(at, error, final)
+    msg = (
+        f"warm-up: noise of the output leaves open when it enters ± {band:.3g}, last seen outside at {last:.0f} s; lengthen "
+        "window_s, or widen the band"
+    )
+    raise NotIdentified(msg)
+
+
+def _crossing(time: Array, away: Array, band: float, at: float, reach: float) -> tuple[float, float, Array] | None:
+    """Crossing of a parabola over ± reach about itself, its slope there, and weights (n,) of the record in its value there."""
+    for _ in range(ROUNDS):
+        near = np.flatnonzero(np.abs(time - at) <= reach)
+        if near.size < FEWEST:
+            return None
+        inverse = np.linalg.pinv(np.vander(time[near] - at, 3))
+        curve = inverse @ away[near]
+        side = 1.0 if curve[2] >= 0.0 else -1.0
+        roots = np.roots(curve - np.array([0.0, 0.0, side * band]))
+        inside = roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) <= reach)]
+        inside = inside[side * np.polyval(np.polyder(curve), inside) < 0.0]  # towards the final value
+        if inside.size == 0:
+            return None
+        at += float(inside[0])
+        if abs(inside[0]) < SETTLED * reach:
+            weights = np.zeros(len(time))
+            weights[near] = np.vander(inside[:1], 3)[0] @ inverse
+            return at, float(abs(np.polyval(np.polyder(curve), inside[0]))), weights
+    return None
