@@ -24,6 +24,9 @@ _BATCH = 33
 _NUMBERS = 4_000_000
 """Largest number of random numbers per batch: large lots get fewer draws."""
 
+_PIECE = 1_000_000
+"""Largest number of them worked on at a time."""
+
 _OFF = (-8, -4, 0, 4, 8)
 """Eighths of a decade about the fitted shares within which the noise of a draw is estimated."""
 
@@ -104,8 +107,14 @@ class _Draws:
             if self.heavy
             else self.rng.standard_normal(shape)
         )
-        series = covariance.coloured(self.model.noise, white)
-        deviances = np.stack([self._deviances(shares, series) for shares in self.places])
+        # a few draws at a time: each step makes several arrays of their size
+        series, few = np.empty(shape), max(_PIECE // (shape[0] * shape[1]), 1)
+        deviances = np.empty((len(self.places), count))
+        for start in range(0, count, few):
+            some = slice(start, start + few)
+            series[..., some] = covariance.coloured(self.model.noise, white[..., some])
+            for place, shares in enumerate(self.places):
+                deviances[place, some] = self._deviances(shares, series[..., some])
         chosen = np.argmin(deviances, axis=0)
         spaces = {int(k): _At(self.model, self.places[k], series[:, :, chosen == k]) for k in np.unique(chosen)}
         worst = np.zeros(count)

@@ -33,10 +33,10 @@ _FEW = 16
 _EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
 
-_WHITENERS = 24_000_000
+_WHITENERS = 12_000_000
 """Largest number of stored whiteners."""
 
-_COLUMNS = 12_000_000
+_COLUMNS = 6_000_000
 """Largest number of whitened columns stored between passes; more are computed again."""
 
 

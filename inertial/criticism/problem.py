@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 SHARED = ("station", "data")
 """Scopes of effects whose coefficients all blocks share."""
 
-_PIECE = 4_000_000
+_PIECE = 1_000_000
 """Number of columns processed at a time."""
 
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
 
-_CACHE = 15_000_000
+_CACHE = 8_000_000
 """Number of columns stored between passes; more are computed again, to limit the memory for large lots."""
 
 
