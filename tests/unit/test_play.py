@@ -6,9 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from inertial import effects as catalogue
 from inertial import operators
-from inertial.criticism import adequacy, covariance, model, problem
-from inertial.criticism.diagnosis import Diagnosis, diagnose
+from inertial.criticism import adequacy, covariance, model, problem, space
+from inertial.criticism.drivers import drivers_of
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling.wrong_pose import WrongPose
+from inertial.criticism.lot import Lot
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Problem
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
@@ -36,21 +42,28 @@ def test_a_play_is_its_definition_point_by_point(shape: tuple[int, ...], half_wi
     np.testing.assert_allclose(operators.play_memory(signal, half_width), memory, atol=1e-12)
 
 
-def numbers(found: Diagnosis) -> list[float]:
-    """Every number of the search: the probability, and score and drop of all rivals."""
-    return [found.log_p, found.floor, *(v for r in found.ladder for v in (r.cost, r.drop))]
+EFFECTS = ("third_order", "odd_quadratic", "adc_nonlinearity", "level_error")
+
+
+def numbers(lot: Lot) -> list[np.ndarray]:
+    """Gains of effects and of every dwell's alternatives, and the probability that noise fits as badly."""
+    series = Problem(lot)
+    base = Model(series, [Term(catalogue.get(name)) for name in ("bias", "scale", "misalignment")])
+    field = Candidates(series, [catalogue.get(name) for name in EFFECTS], [WrongPose()])
+    gains = field.gains(base.space, set(), handling=True)
+    probability = adequacy.adequacy(field, drivers_of(series), base, np.random.default_rng(1))
+    return [np.array(probability), np.array(base.noise.shares), *(g.drop for _, g in sorted(gains.items()))]
 
 
 def test_small_pieces_and_empty_stores_change_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = make(World(units=2, poses=18, soaks=(25.0,), hidden=(("third_order", 3.0),)), 5_510_000)
-    effects = ("bias", "scale", "misalignment")
-    whole = diagnose(lot_of(measured(made.dwells, made.history)), effects, np.random.default_rng(1))
-    monkeypatch.setattr(problem, "_PIECE", 5_000)
+    made = make(World(units=2, poses=18, soaks=(25.0,)), 5_510_000)
+    lot = lot_of(measured(made.dwells, made.history))
+    whole = numbers(lot)
+    assert whole[0] > np.log(adequacy.CERTAIN_BELOW)  # then noise is drawn
+    for module in (problem, adequacy, space):
+        monkeypatch.setattr(module, "_PIECE", 300)
     monkeypatch.setattr(problem, "_CACHE", 0)
     monkeypatch.setattr(covariance, "_COLUMNS", 0)
-    monkeypatch.setattr(adequacy, "_PIECE", 500)
     monkeypatch.setattr(model, "_SPACES", 0)
-    pieces = diagnose(lot_of(measured(made.dwells, made.history)), effects, np.random.default_rng(1))
-    assert [n.effects.ids for n in pieces.named] == [n.effects.ids for n in whole.named]
-    assert whole.named
-    np.testing.assert_allclose(numbers(pieces), numbers(whole), rtol=1e-6)
+    for one, other in zip(numbers(lot), whole, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-8)
