@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 _DIMENSIONS = {"force": 3, "felt": 3, "slot": 1}
 """Number of dimensions of the arrays of a lot of units; two for all others."""
 
+_REMEMBERED = 3_000_000
+"""Largest number of values that a state remembers of operators with memory."""
+
 T_REFERENCE = 25.0
 """Reference temperature in °C: θ = T − 25 °C."""
 
@@ -73,7 +76,11 @@ class State:
     def remember(self, key: tuple[object, ...], make: Callable[[], Array]) -> Array:
         """The array that ``make`` returns, computed once per key: operators with memory are the same for every axis."""
         if key not in self.memory:
-            self.memory[key] = make()
+            found = make()
+            # all have about one size; the oldest go first
+            while self.memory and (len(self.memory) + 1) * found.size > _REMEMBERED:
+                del self.memory[next(iter(self.memory))]
+            self.memory[key] = found
         return self.memory[key]
 
     def need(self, quantity: str, effect: str) -> Array:

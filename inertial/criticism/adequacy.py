@@ -24,6 +24,9 @@ _BATCH = 33
 _NUMBERS = 4_000_000
 """Largest number of random numbers per batch: large lots get fewer draws."""
 
+_PIECE = 1_000_000
+"""Largest number of them worked on at a time."""
+
 _OFF = (-8, -4, 0, 4, 8)
 """Eighths of a decade about the fitted shares within which the noise of a draw is estimated."""
 
@@ -104,8 +107,14 @@ class _Draws:
             if self.heavy
             else self.rng.standard_normal(shape)
         )
-        series = covariance.coloured(self.model.noise, white)
-        deviances = np.stack([self._deviances(shares, series) for shares in self.places])
+        # a few draws at a time: each step makes several arrays of their size
+        series, few = np.empty(shape), max(_PIECE // (shape[0] * shape[1]), 1)
+        deviances = np.empty((len(self.places), count))
+        for start in range(0, count, few):
+            some = slice(start, start + few)
+            series[..., some] = covariance.coloured(self.model.noise, white[..., some])
+            for place, shares in enumerate(self.places):
+                deviances[place, some] = self._deviances(shares, series[..., some])
         chosen = np.argmin(deviances, axis=0)
         spaces = {int(k): _At(self.model, self.places[k], series[:, :, chosen == k]) for k in np.unique(chosen)}
         worst = np.zeros(count)
@@ -164,22 +173,48 @@ def _lattice(shares: Shares) -> list[Shares]:
 
 def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array, int]]:
     """For every value of the nonlinear parameters: the reduction of each draw by the candidate, and its rank."""
+    if candidate.shared:
+        return _shared_drops(candidate, space, noise)
+    if candidate.key is not None or candidate.columns.size <= _PIECE:
+        white = candidate.whitened(space.covariance, space.noise)
+        parts = [_local_drops(white, space.project(white.reshape(*white.shape[:2], -1)), noise)]
+    else:
+        few = max(_PIECE // max(candidate.columns[0].size, 1), 1)
+        whole = np.arange(len(candidate.columns))
+        parts = [
+            _local_drops(*space.whitened(candidate.columns[b], b), noise[b]) for b in np.split(whole, whole[few::few])
+        ]
+    drops, ranks = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
+    return [(drop, int(rank)) for drop, rank in zip(drops, ranks.tolist(), strict=True)]
+
+
+def _shared_drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array, int]]:
     white = candidate.whitened(space.covariance, space.noise)
     blocks, n, grid, p = white.shape
     flat = white.reshape(blocks, n, grid * p)
     size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
-    left = space.project(flat)
+    left = space.project(flat).reshape(blocks * n, grid, p) / np.maximum(
+        np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0)), 1e-300
+    )
+    noise_flat = noise.reshape(blocks * n, -1)
     found: list[tuple[Array, int]] = []
-    if candidate.shared:
-        left = left.reshape(blocks * n, grid, p) / np.maximum(
-            np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0)), 1e-300
-        )
-        noise_flat = noise.reshape(blocks * n, -1)
-        for g in range(grid):
-            u, s, _ = np.linalg.svd(left[:, g], full_matrices=False)
-            along = u[:, s > SEEN].T @ noise_flat
-            found.append((np.sum(along**2, axis=0), int(np.count_nonzero(s > SEEN))))
-        return found
+    for g in range(grid):
+        u, s, _ = np.linalg.svd(left[:, g], full_matrices=False)
+        along = u[:, s > SEEN].T @ noise_flat
+        found.append((np.sum(along**2, axis=0), int(np.count_nonzero(s > SEEN))))
+    return found
+
+
+def _local_drops(white: Array, left: Array, noise: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Reductions (grid, draws) by columns of some blocks, and ranks (grid,).
+
+    Parameters
+    ----------
+    white, left : (b, n, grid, p) whitened, and (b, n, grid·p) after the local columns
+    """
+    blocks, n, grid, p = white.shape
+    flat = white.reshape(blocks, n, grid * p)
+    size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
     unit = left / np.where(size > 0.0, size, 1.0)[:, None, :]
     along = (np.swapaxes(unit, -1, -2) @ noise).reshape(blocks, grid, p, -1)
     each = unit.reshape(blocks, n, grid, p).transpose(0, 2, 3, 1)
@@ -190,5 +225,4 @@ def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array
         np.swapaxes(vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None, :], -1, -2)
         @ along
     )
-    drops, ranks = np.einsum("bgpd,bgpd->gd", turned, turned), seen.sum(axis=(0, 2))
-    return [(drop, int(rank)) for drop, rank in zip(drops, ranks.tolist(), strict=True)]
+    return np.einsum("bgpd,bgpd->gd", turned, turned), seen.sum(axis=(0, 2))

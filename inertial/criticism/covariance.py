@@ -33,11 +33,16 @@ _FEW = 16
 _EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
 
-_WHITENERS = 24_000_000
+_WHITENERS = 12_000_000
 """Largest number of stored whiteners."""
 
-_COLUMNS = 12_000_000
+_COLUMNS = 6_000_000
 """Largest number of whitened columns stored between passes; more are computed again."""
+
+
+LARGE = 15_000
+"""Values of a column of all blocks above which columns are not stored between passes: a store has room for a small part of those
+that a pass goes through in turn, and each would be gone before it is used again."""
 
 
 class Shares(NamedTuple):
@@ -294,6 +299,8 @@ class Covariance:
         if found is None:
             found = self._repeated(columns, shares, distinct) if distinct and blocks is None else None
             found = self.whiten(columns, shares, blocks) if found is None else found
+            if self.there.size > LARGE:
+                return found
             self._kept[name] = found
             self._used += found.size
             while self._used > _COLUMNS and self._kept:

@@ -1,7 +1,8 @@
 """Drivers of the residual: smooth dependence on every recorded quantity."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -26,12 +27,18 @@ class Driver:
     """Columns of a smooth dependence on one driver.
 
     name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
+    make : its columns
     values : (units, n) of the driver itself, None if it is not a single quantity
     """
 
     name: str
-    candidate: Candidate
+    make: Callable[[], Candidate]
     values: Array | None
+
+    @property
+    def candidate(self) -> Candidate:
+        """The columns as a candidate, made for each use: those of all drivers of a large lot take hundreds of megabytes."""
+        return self.make()
 
 
 @dataclass(frozen=True)
@@ -50,16 +57,16 @@ def drivers_of(problem: Problem) -> list[Driver]:
     """Every driver that varies in a lot."""
     state = problem.lot.state
     found = [
-        Driver(name, _by_block(problem, curve(values, knots)), values)
+        Driver(name, partial(_by_block, problem, curve(values, knots)), values)
         for name, values, knots in quantities(state)
         if varies(values)
     ]
     pose = _pose_columns(state, most=max(4, (problem.n - 8) // 3))
     if pose.shape[-1]:
-        found.append(Driver("pose", _by_block(problem, pose), None))
+        found.append(Driver("pose", partial(_by_block, problem, pose), None))
     approach = np.tanh(state.force_step / 0.05)
     if np.any(np.abs(approach) > 0.1):
-        found.append(Driver("approach", _by_axis(problem, approach), None))
+        found.append(Driver("approach", partial(_by_axis, problem, approach), None))
     return found
 
 

@@ -24,6 +24,9 @@ _LONG = 400
 _HANGING = 1e-3
 """Independent part of a column below which a single factorisation is inaccurate."""
 
+_SPACES = 2_000_000
+"""Largest number of whitened values stored for shares that were tried; at least two spaces are stored."""
+
 _SHARE_OF_WHITE = 0.5
 """Part of the recorded white variance that the noise of norms has at the least."""
 
@@ -157,6 +160,9 @@ class Model:
             scale = np.ones(self.problem.blocks) if self._near is None else self._near.scale
             if self._near is None and self.shared.shape[-1]:
                 scale = self._own_scale
+            most = max(2, _SPACES // max(self.local.size, 1))
+            while len(self._spaces) >= most:  # the oldest first: a search for shares seldom goes back
+                del self._spaces[next(iter(self._spaces))]
             self._spaces[shares] = self.at(Noise(shares, scale))
         return self._spaces[shares]
 

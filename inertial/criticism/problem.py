@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.covariance import Covariance
+from inertial.criticism.covariance import LARGE, Covariance
 from inertial.criticism.handling.base import Handling, by_block
 from inertial.criticism.lot import Lot
 from inertial.criticism.space import Candidate
@@ -19,13 +19,13 @@ Array = NDArray[np.float64]
 SHARED = ("station", "data")
 """Scopes of effects whose coefficients all blocks share."""
 
-_PIECE = 4_000_000
+_PIECE = 1_000_000
 """Number of columns processed at a time."""
 
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
 
-_CACHE = 15_000_000
+_CACHE = 8_000_000
 """Number of columns stored between passes; more are computed again, to limit the memory for large lots."""
 
 
@@ -55,7 +55,8 @@ class Problem:
         self.y = self._series()
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
-        self._room = _CACHE
+        # a model's own columns are stored, whatever the size of the lot
+        self._room = _CACHE if self.y.size <= LARGE else _CACHE // 4
 
     @property
     def series(self) -> Array:

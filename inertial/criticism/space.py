@@ -15,6 +15,9 @@ from inertial.criticism.covariance import Covariance, Noise
 
 Array = NDArray[np.float64]
 
+_PIECE = 1_000_000
+"""Largest number of columns' values that are worked on at a time, of candidates whose whitened columns are not stored."""
+
 SEEN = 0.01
 """Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
 
@@ -154,6 +157,22 @@ class Space:
 
     def gain(self, candidate: Candidate) -> Gain:
         """Gain of a candidate on the residuals."""
+        if candidate.shared or candidate.key is not None or candidate.columns.size <= _PIECE:
+            return self._gain_at_once(candidate)
+        # some blocks at a time: every step makes several arrays of the size of their columns
+        few = max(_PIECE // max(candidate.columns[0].size, 1), 1)
+        whole = np.arange(len(candidate.columns))
+        parts = [self._part(candidate.columns[b], b) for b in np.split(whole, whole[few::few])]
+        along, seen = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return self._gain_along(along, seen)
+
+    def _part(self, columns: Array, blocks: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
+        """Targets along the directions of the columns (b, n, grid, p) of some blocks."""
+        white, left = self.whitened(columns, blocks)
+        size = np.sqrt(np.einsum("bngp,bngp->bgp", white, white))[:, None]
+        return self._along(left.reshape(columns.shape) / np.where(size > 0.0, size, 1.0), self.targets[blocks])
+
+    def _gain_at_once(self, candidate: Candidate) -> Gain:
         white = candidate.whitened(self.covariance, self.noise)
         blocks, n, grid, p = white.shape
         flat = white.reshape(blocks, n, grid * p)
@@ -196,27 +215,36 @@ class Space:
             (own / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places], blocks
         )
 
+    def whitened(self, columns: Array, blocks: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Columns (b, n, grid, p) of some blocks in this space, and (b, n, grid·p) after the local columns."""
+        flat = columns.reshape(*columns.shape[:2], -1)
+        white = self.covariance.whiten(flat, self.noise.shares, blocks) / self.noise.scale[blocks, None, None]
+        return white.reshape(columns.shape), self.project(white, blocks)
+
     def _gain_local(self, left: Array) -> Gain:
-        inside = np.einsum("bngp,bnt->bgpt", left, self.targets)
+        return self._gain_along(*self._along(left, self.targets))
+
+    @staticmethod
+    def _along(left: Array, targets: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Targets (b, n, t) along the directions of columns (b, n, grid, p), (b, grid, p, t); which directions are seen."""
+        inside = np.einsum("bngp,bnt->bgpt", left, targets)
         if left.shape[-1] == 1:
             gram = np.einsum("bngp,bngp->bg", left, left)
             seen = gram > SEEN**2
             scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, gram, 1.0)), 0.0)
-            along = (inside * scale[..., None, None])[:, :, 0, :]
-            rank = seen.sum(axis=0)
-            by_block = along[..., 0] ** 2
-            taken = np.einsum("bgt,bgs->gts", along, along) if self.targets.shape[-1] > 1 else None
-        else:
-            gram = np.einsum("bngp,bngr->bgpr", left, left)
-            values, vectors = np.linalg.eigh(gram)
-            seen = values > SEEN**2
-            scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
-            along = np.einsum("bgpr,bgpt->bgrt", vectors, inside) * scale[..., None]
-            rank = seen.sum(axis=(0, 2))
-            by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])
-            taken = np.einsum("bgrt,bgrs->gts", along, along) if self.targets.shape[-1] > 1 else None
-        if taken is None:
+            return inside * scale[..., None, None], seen[..., None]
+        gram = np.einsum("bngp,bngr->bgpr", left, left)
+        values, vectors = np.linalg.eigh(gram)
+        seen = values > SEEN**2
+        scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+        return np.einsum("bgpr,bgpt->bgrt", vectors, inside) * scale[..., None], seen
+
+    def _gain_along(self, along: Array, seen: NDArray[np.bool_]) -> Gain:
+        rank = seen.sum(axis=(0, 2))
+        by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])
+        if self.targets.shape[-1] == 1:
             return Gain(by_block.sum(axis=0), rank, by_block)
+        taken = np.einsum("bgrt,bgrs->gts", along, along)
         drop = np.array([self.rss - _schur(self.gram - t) for t in taken])
         return Gain(drop, rank, by_block)
 

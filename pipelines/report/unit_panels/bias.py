@@ -27,8 +27,9 @@ TEMPLATE = """\
 <tr><td>{{ line.name }}</td>{% for axis in ["x", "y", "z"] %}<td class="n">{{ line.cells[axis] }}</td>{% endfor %}<td>µg</td></tr>
 {% endfor %}
 </table>
-<p class="note">U with k = {{ coverage }}. The coefficient is the same for all; flicker and random walk between the record and the later time are added. Not stated: no
-repeatability of switching on is known for this device.</p>
+<p class="note">U with k = {{ coverage }}. The coefficient is the same for all; flicker and random walk between the record and the later time are added. The later
+means hold for flicker, and for the random walk as far as the record shows one: of a walk that its flicker hides, nothing is carried beyond the record, and over a day it adds K·170 √s
+(K in µg/√s); an Allan record of hours shows it. Not stated: no repeatability of switching on is known for this device.</p>
 """
 
 

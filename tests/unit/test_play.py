@@ -1,0 +1,69 @@
+"""A play in stretches is the play point by point; a lot's verdict does not depend on how many columns are worked on at a time."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inertial import effects as catalogue
+from inertial import operators
+from inertial.criticism import adequacy, covariance, model, problem, space
+from inertial.criticism.drivers import drivers_of
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling.wrong_pose import WrongPose
+from inertial.criticism.lot import Lot
+from inertial.criticism.model import Model, Term
+from inertial.criticism.problem import Problem
+from pipelines.tables.dwells import lot_of, measured
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
+
+from world import World, make
+
+
+def point_by_point(signal: np.ndarray, half_width: float, start: float) -> np.ndarray:
+    """The definition: every step moves the position, which stays within −1 … 1."""
+    out = np.empty(signal.shape)
+    out[..., 0] = start
+    for k, change in enumerate(np.moveaxis(np.diff(signal, axis=-1), -1, 0)):
+        out[..., k + 1] = np.clip(out[..., k] + change / half_width, -1.0, 1.0)
+    return out
+
+
+@pytest.mark.parametrize("shape", [(1,), (2,), (7,), (3, 1), (3, 101), (2, 3, 50), (65, 400)])
+@pytest.mark.parametrize("half_width", [0.3, 5.0, 1000.0])
+def test_a_play_is_its_definition_point_by_point(shape: tuple[int, ...], half_width: float) -> None:
+    signal = np.cumsum(np.random.default_rng(20_261_150).standard_normal(shape), axis=-1)
+    for start in (-1.0, 0.0, 0.3, 1.0):
+        expected = point_by_point(signal, half_width, start)
+        np.testing.assert_allclose(operators.play(signal, half_width, start), expected, atol=1e-12)
+    memory = 0.5 * (point_by_point(signal, half_width, 1.0) - point_by_point(signal, half_width, -1.0))
+    np.testing.assert_allclose(operators.play_memory(signal, half_width), memory, atol=1e-12)
+
+
+EFFECTS = ("third_order", "odd_quadratic", "adc_nonlinearity", "level_error")
+
+
+def numbers(lot: Lot) -> list[np.ndarray]:
+    """Gains of effects and of every dwell's alternatives, and the probability that noise fits as badly."""
+    series = Problem(lot)
+    base = Model(series, [Term(catalogue.get(name)) for name in ("bias", "scale", "misalignment")])
+    field = Candidates(series, [catalogue.get(name) for name in EFFECTS], [WrongPose()])
+    gains = field.gains(base.space, set(), handling=True)
+    probability = adequacy.adequacy(field, drivers_of(series), base, np.random.default_rng(1))
+    return [np.array(probability), np.array(base.noise.shares), *(g.drop for _, g in sorted(gains.items()))]
+
+
+def test_small_pieces_and_empty_stores_change_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = make(World(units=2, poses=18, soaks=(25.0,)), 5_510_000)
+    lot = lot_of(measured(made.dwells, made.history))
+    whole = numbers(lot)
+    assert whole[0] > np.log(adequacy.CERTAIN_BELOW)  # then noise is drawn
+    for module in (problem, adequacy, space):
+        monkeypatch.setattr(module, "_PIECE", 300)
+    monkeypatch.setattr(problem, "_CACHE", 0)
+    monkeypatch.setattr(covariance, "_COLUMNS", 0)
+    monkeypatch.setattr(model, "_SPACES", 0)
+    for one, other in zip(numbers(lot), whole, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-8)
