@@ -49,8 +49,6 @@ import sys
 sys.path.insert(0, {root!r})
 from pipelines.archive import Archive, files
 from pipelines.audit import index
-
-pytestmark = pytest.mark.usefixtures("no_pictures")
 index.RUNS_PER_PART = 2
 write = files._write_durably
 def slowly(path, data):

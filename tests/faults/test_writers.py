@@ -55,8 +55,6 @@ import sys
 sys.path[:0] = [{tests!r}, {root!r}]
 from pathlib import Path
 from pipelines.archive import files
-
-pytestmark = pytest.mark.usefixtures("no_pictures")
 folder, data, n = Path(sys.argv[1]), b"x" * 2_000_000, 0
 print("ready", flush=True)
 while True:
