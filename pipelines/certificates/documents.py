@@ -6,16 +6,14 @@ from typing import Annotated, Literal
 
 from typing_extensions import TypedDict
 
-CertifiedDocument = TypedDict(
-    "CertifiedDocument",
+LedgerEntryDocument = TypedDict(
+    "LedgerEntryDocument",
     {
-        "certificate": Annotated[str, "number: serial and sequence"],
         "serial": str,
         "sequence": Annotated[int, "number of the entry in the unit's ledger"],
-        "action": Annotated[Literal["certify", "supersede"], "`supersede`: it ended other calibrations"],
         "device": str,
         "run": str,
-        "from": Annotated[str, "first day of validity, ISO date"],
+        "from": Annotated[str, "first day of validity, ISO date; of a revocation the day on which the validity ends"],
         "until": Annotated[str, "the day after the last"],
         "grade": str,
         "station": str,
@@ -31,10 +29,17 @@ CertifiedDocument = TypedDict(
             dict[str, str], "SHA-256 of the manifests of the run that support the decision, by table"
         ],
         "schema": int,
-        "was_there": Annotated[bool, "true if it was in the ledger before"],
     },
 )
-CertifiedDocument.__doc__ = "A calibration that was entered into the ledger."
+LedgerEntryDocument.__doc__ = "An entry of a unit's ledger; its action stands in the documents of the commands."
+
+
+class CertifiedDocument(LedgerEntryDocument):
+    """A calibration that was entered into the ledger."""
+
+    certificate: Annotated[str, "number: serial and sequence"]
+    action: Annotated[Literal["certify", "supersede"], "`supersede`: it ended other calibrations"]
+    was_there: Annotated[bool, "true if it was in the ledger before"]
 
 
 class CertifyDocument(TypedDict):

@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
+from pipelines.certificates.documents import LedgerEntryDocument
+
 
 class CertifiedBy(TypedDict):
     """Who certified a calibration."""
@@ -88,35 +90,10 @@ class CertificateDocument(TypedDict):
     left_out: Annotated[dict[str, str], "units of a run that have no certificate, with the reason"]
 
 
-_Entry = TypedDict(
-    "_Entry",
-    {
-        "serial": str,
-        "sequence": int,
-        "action": Literal["certify", "supersede", "revoke"],
-        "device": str,
-        "run": str,
-        "from": Annotated[str, "first day; of a revocation the day on which the validity ends"],
-        "until": Annotated[str, "the day after the last"],
-        "grade": str,
-        "station": str,
-        "recipe": str,
-        "coefficients": Annotated[str, "hash of the table"],
-        "ends": Annotated[list[int], "sequences of the calibrations that end with it"],
-        "who": str,
-        "where": str,
-        "when": str,
-        "reason": str,
-        "previous": Annotated[str, "hash of the previous entry; empty for the first"],
-        "evidence": Annotated[dict[str, str], "hash of a manifest by table"],
-        "schema": int,
-    },
-)
-
-
-class RevokeDocument(_Entry):
+class RevokeDocument(LedgerEntryDocument):
     """``revoke UNIT --json``: the entry of the ledger that ends calibrations."""
 
+    action: Literal["certify", "supersede", "revoke"]
     unit: str
     revoked: Annotated[list[str], "certificates that it ends"]
 
