@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism import variance
-from inertial.criticism.covariance import Noise, Shares
+from inertial.criticism.covariance import LARGE, Noise, Shares
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.problem import SHARED, Problem
 from inertial.criticism.shares import best_shares, plausible_shares
 from inertial.criticism.space import Candidate, Space
+from inertial.criticism.whitened_columns import WhitenedColumns
 from inertial.effects.base import AnyEffect
 from inertial.errors import NotIdentified
 
@@ -21,17 +22,16 @@ Array = NDArray[np.float64]
 _LONG = 400
 """Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""
 
-_HANGING = 1e-3
-"""Independent part of a column below which a single factorisation is inaccurate."""
 
 _SPACES = 2_000_000
 """Largest number of whitened values stored for shares that were tried; at least two spaces are stored."""
 
+_RICHER = 2
+"""Number of models with one more term that a model keeps."""
+
 _SHARE_OF_WHITE = 0.5
 """Part of the recorded white variance that the noise of norms has at the least."""
 
-VANISHING = 3e-5
-"""Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
 
 _OWN = 20
 """Degrees of freedom of a block from which on its own variance is used for the shares; blocks with fewer have a common one."""
@@ -73,6 +73,7 @@ class Model:
     ----------
     near : noise at which the search for this model's noise starts
     curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, sized by block or for all blocks
+    simpler : the model without the last term, whose whitened columns serve this one, too; None where there is none
     """
 
     def __init__(
@@ -83,10 +84,13 @@ class Model:
         near: Noise | None = None,
         curves: Array | None = None,
         shared_curves: Array | None = None,
+        simpler: "Model | None" = None,
     ) -> None:
         self.problem, self.terms, self._near = problem, tuple(terms), near
         self._curves, self._shared_curves = curves, shared_curves
+        self._simpler = simpler
         self._spaces: dict[Shares, Space] = {}
+        self._richer: dict[tuple[object, ...], Model] = {}
 
     @cached_property
     def local(self) -> Array:
@@ -174,13 +178,13 @@ class Model:
 
     def _restricted(self, shares: Shares) -> float:
         """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
-        quick = self._quick(shares)
+        quick = None if self.shared.shape[-1] else self._columns.at_once(shares)
         if quick is None:
             space = self._rough(shares)
             information, squares, dof = space.information, space.squares, space.by_block
         else:
             information, squares = quick
-            dof = self.problem.covariance.count - float(self._determined.shape[-1])
+            dof = self.problem.covariance.count - float(self._columns.rank)
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
         if self._least.any():
             known = dof > 0
@@ -193,55 +197,13 @@ class Model:
         return logdet + information + float(np.sum(own))
 
     @cached_property
-    def _determined(self) -> Array:
-        """Columns (blocks, n, r) that span those with coefficients by block, without combinations that vanish.
-
-        Of misalignment only three of six columns show in a norm, and a turn about one axis shows two of three forces. Counted
-        among the information, a combination that vanishes takes off ln F per share F of wander: the largest would always be best.
-        """
-        unit = self.local * self.problem.covariance.there[..., None]
-        size = np.linalg.norm(unit, axis=1)
-        unit = unit / np.where(size > 0.0, size, 1.0)[:, None, :]
-        _, values, turn = np.linalg.svd(unit, full_matrices=False)
-        if not values.size:
-            return self.local
-        ranks = np.sum(values > VANISHING * values[:, :1], axis=1)
-        rank = int(ranks.max())
-        if rank == self.local.shape[-1] or int(ranks.min()) != rank:
-            return self.local
-        scaled = self.local / np.where(size > 0.0, size, 1.0)[:, None, :]
-        return scaled @ np.swapaxes(turn[:, :rank], -1, -2)
-
-    @cached_property
-    def _stacked(self) -> Array:
-        """Determined columns, of unit size, and the measurements behind them, (blocks, n, r + 1)."""
-        unit = self._determined / self._sizes[:, None, :]
-        return np.concatenate([unit, self.problem.y[..., None]], axis=-1)
-
-    def _quick(self, shares: Shares) -> tuple[float, Array] | None:
-        """log|HᵀV⁻¹H|, up to a constant, and sums of squares, by one factorisation; None if columns are collinear."""
-        if self.shared.shape[-1]:
-            return None
-        white = self.problem.covariance.whiten(self._stacked, shares)
-        gram = np.swapaxes(white, -1, -2) @ white
-        size = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-300))
-        try:
-            root = np.linalg.cholesky(gram / (size[:, :, None] * size[:, None, :]))
-        except np.linalg.LinAlgError:
-            return None
-        diagonal = np.diagonal(root, axis1=-2, axis2=-1)
-        if float(diagonal[:, :-1].min(initial=1.0)) < _HANGING:
-            return None
-        information = 2.0 * float(np.sum(np.log(diagonal[:, :-1] * size[:, :-1])))
-        information += 2.0 * float(np.sum(np.log(self._sizes)))
-        return information, np.asarray((diagonal[:, -1] * size[:, -1]) ** 2, dtype=np.float64)
-
-    @cached_property
-    def _sizes(self) -> Array:
-        """Sizes of the determined columns, (blocks, r)."""
-        own = self._determined * self.problem.covariance.there[..., None]
-        size = np.sqrt(np.einsum("bnp,bnp->bp", own, own))
-        return np.where(size > 0.0, size, 1.0)
+    def _columns(self) -> WhitenedColumns:
+        """The columns with coefficients by block, and the measurements behind them, at any shares."""
+        further = None
+        if self._simpler is not None and not self.terms[-1].shared:
+            further = np.concatenate([self._of(self.terms[-1]), self._start(self.terms[-1])], axis=-1)
+        before = None if self._simpler is None or further is None else self._simpler._columns  # noqa: SLF001 - of its own kind
+        return WhitenedColumns(self.problem, self.local, before, further)
 
     @cached_property
     def space(self) -> Space:
@@ -292,7 +254,11 @@ class Model:
         return self.at(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))
 
     def _variant(
-        self, terms: Sequence[Term], curves: Array | None = None, shared_curves: Array | None = None
+        self,
+        terms: Sequence[Term],
+        curves: Array | None = None,
+        shared_curves: Array | None = None,
+        simpler: "Model | None" = None,
     ) -> "Model":
         """Another model near this one; curves are kept unless others are given."""
         return Model(
@@ -301,11 +267,20 @@ class Model:
             near=self.noise,
             curves=self._curves if curves is None else curves,
             shared_curves=self._shared_curves if shared_curves is None else shared_curves,
+            simpler=simpler,
         )
 
     def with_term(self, term: Term) -> "Model":
-        """The model with one more term."""
-        return self._variant([*self.terms, term])
+        """The model with one more term; the last few are kept, as a term is fitted, judged and sized one after the other."""
+        key = (term.effect.id, term.values, term.first, term.rest)
+        found = self._richer.get(key)
+        if found is None:
+            found = self._variant([*self.terms, term], simpler=self)
+            if self.problem.y.size <= LARGE:
+                while len(self._richer) >= _RICHER:
+                    del self._richer[next(iter(self._richer))]
+                self._richer[key] = found
+        return found
 
     def with_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, sized by block."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from inertial.criticism.classes import EffectClass
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.menus import Kind, StepSequence, TableReach, courses, pose_grid, present, reach_of, temperatures
 from inertial.criticism.model import Model, Term
+from inertial.criticism.offers import Offer, Offers
 from inertial.criticism.separation import FEW, MANY, Rivals, rivals_of
 from inertial.criticism.twins import never_apart, twins_of
 from inertial.design import grid_of
@@ -160,16 +162,6 @@ def _drivers(state: State, term: Term) -> frozenset[str]:
     return frozenset() if isinstance(term.effect, Handling) else frozenset(drivers_of(state, term.effect))
 
 
-@dataclass(frozen=True)
-class _Offer:
-    """A sequence with the share of the aim after it, the station time until then, and its gain per minute."""
-
-    course: StepSequence
-    worth: float
-    minutes: float
-    rate: float
-
-
 class ProposalSearch:
     """The choice of sequences for one aim."""
 
@@ -177,7 +169,7 @@ class ProposalSearch:
         self.aim, self.around, self.already = aim, around, tuple(already)
         self.state = aim.lot.state
         self.reach = around.reach or reach_of(self.state)
-        self.pace = around.pace
+        self.pace, self.budget, self.least = around.pace, around.budget, aim.least
         # dwells during a ramp disturb every effect of temperature: only for effects that respond to its rate
         answers = [_drivers(self.state, t) for t in aim.terms]
         self.rated = any("rate" in found for found in answers)
@@ -186,18 +178,16 @@ class ProposalSearch:
     def best(self) -> Proposal | None:
         """Sequences in order, each the best after those before it, until the aim is reached or nothing more helps.
 
-        A single
-        sequence that reaches the aim replaces them if they take more time, or do not reach it.
+        A single sequence that reaches the aim replaces them if they take more time, or do not reach it.
         """
         chosen: list[StepSequence] = []
         now = self.aim.worth(self.already, self.pace)
-        whole: _Offer | None = None
-        for turn in range(_ROUNDS):
+        singles: Offers | None = None
+        for _ in range(_ROUNDS):
             if now >= _ALL:
                 break
-            offers = self._weighed(chosen, now)
-            if turn == 0:
-                whole = min((o for o in offers if o.worth >= _ALL), key=lambda o: o.minutes, default=None)
+            offers = Offers(self, chosen, now)
+            singles = singles or offers
             taken = self._kept(chosen, offers, now)
             if taken is None:
                 break
@@ -205,29 +195,27 @@ class ProposalSearch:
         while chosen and now < _ALL and len(chosen) < 2 * _ROUNDS:
             # the grid shows no difference any more: what parts them once parts them better twice
             promised = self._promised([*chosen, chosen[0]])
-            within = self._minutes([*chosen, chosen[0]]) <= self.around.budget
+            within = self.minutes([*chosen, chosen[0]]) <= self.around.budget
             if not within or promised - now < min(self.aim.least, 0.5 * (1.0 - now)):
                 break
             chosen, now = [*chosen, chosen[0]], promised
-        if whole is not None and (now < _ALL or self._minutes(chosen) > whole.minutes):
+        whole = None
+        if singles is not None:
+            whole = singles.shortest(_ALL, below=self.minutes(chosen) if now >= _ALL else float("inf"))
+        if whole is not None:
             promised = self._promised([whole.course])
             if promised >= min(now, _ALL):
                 chosen, now = [whole.course], promised
         return self._proposal(chosen, now) if chosen else None
 
-    def _kept(
-        self, chosen: Sequence[StepSequence], offers: Sequence[_Offer], now: float
-    ) -> tuple[_Offer, float] | None:
+    def _kept(self, chosen: Sequence[StepSequence], offers: Offers, now: float) -> tuple[Offer, float] | None:
         """The offer with the largest gain per minute whose gain remains when every rival is fitted, and the share after it.
 
         On the grid alone the wrong rivals seem more distant than they are: an offer is judged with every rival fitted, the best
         of each kind in turn. Where none keeps half of its gain, the offer with the largest gain is taken.
         """
-        by_kind: dict[str, _Offer] = {}
-        for offer in sorted(offers, key=lambda o: -o.rate):
-            by_kind.setdefault(offer.course.kind, offer)
-        best: tuple[_Offer, float] | None = None
-        for offer in list(by_kind.values())[:_TRIED]:
+        best: tuple[Offer, float] | None = None
+        for offer in islice(offers.by_kind(), _TRIED):
             promised = self._promised([*chosen, offer.course])
             if promised - now >= _KEPT * (offer.worth - now):
                 return offer, promised
@@ -235,29 +223,19 @@ class ProposalSearch:
                 best = offer, promised
         return best if best is not None and best[1] - now >= min(self.aim.least, 0.5 * (1.0 - now)) else None
 
+    def share(self, chosen: Sequence[StepSequence], *, fine: bool = False) -> float:
+        """Share of the aim after sequences, by the grid of the rivals' parameters; ``fine`` with every rival fitted."""
+        return self.aim.worth([*self.already, *(s for c in chosen for s in c.steps)], self.pace, fine=fine)
+
     def _promised(self, chosen: Sequence[StepSequence]) -> float:
         """Share of the aim after sequences, with every rival fitted as in the diagnosis."""
-        return self.aim.worth([*self.already, *(s for c in chosen for s in c.steps)], self.pace, fine=True)
+        return self.share(chosen, fine=True)
 
-    def _minutes(self, chosen: Sequence[StepSequence]) -> float:
+    def minutes(self, chosen: Sequence[StepSequence]) -> float:
+        """Station time of sequences after those planned already."""
         return self.around.cost(self.aim, [*self.already, *(s for c in chosen for s in c.steps)])
 
-    def _weighed(self, chosen: Sequence[StepSequence], now: float) -> list["_Offer"]:
-        """Sequences that help after the chosen ones, within the budget."""
-        held = [*self.already, *(s for c in chosen for s in c.steps)]
-        spent = self.around.cost(self.aim, held)
-        found: list[_Offer] = []
-        for course in self._offers(held):
-            minutes = self.around.cost(self.aim, [*held, *course.steps])
-            if minutes > self.around.budget:
-                continue
-            worth = self.aim.worth([*held, *course.steps], self.pace)
-            if worth - now >= min(self.aim.least, 0.5 * (1.0 - now)):
-                rate = (worth - now) / (minutes - spent + 1.0)  # a minute for the start of the follow-up
-                found.append(_Offer(course, worth, minutes, rate))
-        return found
-
-    def _offers(self, held: Sequence[SequenceStep]) -> list[StepSequence]:
+    def offers(self, held: Sequence[SequenceStep]) -> list[StepSequence]:
         """All candidate sequences."""
         here = held[-1].temperature if held else present(self.state, self.pace)
         picks = self._picked(held, here)
