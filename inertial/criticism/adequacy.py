@@ -92,7 +92,7 @@ class _Draws:
 
     def __init__(self, model: Model, rng: Generator) -> None:
         self.model, self.rng = model, rng
-        self.places = _lattice(model.noise.shares)
+        self.lattice, self.start = _lattice(model.noise.shares)
         left = model.space.residual[model.problem.covariance.there]
         self.heavy = heavy(left)
         self._values = left / np.sqrt(np.mean(left**2))
@@ -101,22 +101,12 @@ class _Draws:
         """Smallest log p over all tests of each draw."""
         covariance = self.model.problem.covariance
         shape = (self.model.problem.blocks, self.model.problem.n, count)
-        # heavy tails: the residuals of the model in random order
-        white = (
-            self._values[self.rng.integers(self._values.size, size=shape)]
-            if self.heavy
-            else self.rng.standard_normal(shape)
-        )
         # a few draws at a time: each step makes several arrays of their size
-        series, few = np.empty(shape), max(_PIECE // (shape[0] * shape[1]), 1)
-        deviances = np.empty((len(self.places), count))
-        for start in range(0, count, few):
-            some = slice(start, start + few)
-            series[..., some] = covariance.coloured(self.model.noise, white[..., some])
-            for place, shares in enumerate(self.places):
-                deviances[place, some] = self._deviances(shares, series[..., some])
-        chosen = np.argmin(deviances, axis=0)
-        spaces = {int(k): _At(self.model, self.places[k], series[:, :, chosen == k]) for k in np.unique(chosen)}
+        series = np.empty(shape)
+        for some in self._pieces(count):
+            series[..., some] = covariance.coloured(self.model.noise, self._white(series[..., some].shape))
+        chosen = self._estimated(series)
+        spaces = {k: _At(self.model, self._shares(k), series[:, :, chosen == k]) for k in np.unique(chosen).tolist()}
         worst = np.zeros(count)
         for candidate in looks:
             for k, space in spaces.items():
@@ -124,13 +114,54 @@ class _Draws:
                 worst[own] = np.minimum(worst[own], space.worst(candidate))
         return worst
 
+    def _white(self, shape: tuple[int, ...]) -> Array:
+        """White noise of variance one; with heavy tails the residuals of the model in random order."""
+        if self.heavy:
+            return self._values[self.rng.integers(self._values.size, size=shape)]
+        return self.rng.standard_normal(shape)
+
+    def _pieces(self, count: int) -> list[slice]:
+        """Draws that are worked on together."""
+        few = max(_PIECE // (self.model.problem.blocks * self.model.problem.n), 1)
+        return [slice(start, min(start + few, count)) for start in range(0, count, few)]
+
+    def _shares(self, place: int) -> Shares:
+        flicker, walk = self.lattice
+        return shares_at((flicker[place // len(walk)], walk[place % len(walk)]))
+
+    def _estimated(self, series: Array) -> NDArray[np.intp]:
+        """The place of the lattice with the smallest restricted deviance of each draw, (draws,).
+
+        Descent from the shares that the draws were made with, by the places about the best of each draw.
+        """
+        rows, columns = (len(each) for each in self.lattice)
+        deviances = np.full((rows * columns, series.shape[-1]), np.inf)
+        done = np.zeros(deviances.shape, dtype=bool)
+        best = np.full(series.shape[-1], self.start)
+        while True:
+            wanted = np.zeros(done.shape, dtype=bool)
+            for draw, place in enumerate(best.tolist()):
+                row, column = divmod(place, columns)
+                near = np.zeros((rows, columns), dtype=bool)
+                near[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
+                wanted[:, draw] = near.ravel() & ~done[:, draw]
+            if not wanted.any():
+                return best
+            for place in np.flatnonzero(wanted.any(axis=1)).tolist():
+                deviances[place, wanted[place]] = self._deviances(self._shares(place), series[..., wanted[place]])
+            done |= wanted
+            best = np.argmin(deviances, axis=0)
+
     def _deviances(self, shares: Shares, series: Array) -> Array:
         """Restricted deviance of each draw at some shares, (draws,)."""
         space = self._space(shares)
-        left = space.project(space.whiten(series))
-        squares = np.einsum("bnd,bnd->bd", left, left)
         dof = space.by_block[:, None]
-        return space.logdet + space.information + np.sum(dof * np.log(np.maximum(squares, 1e-300)), axis=0)
+        found = np.empty(series.shape[-1])
+        for some in self._pieces(series.shape[-1]):
+            left = space.project(space.whiten(series[..., some]))
+            squares = np.einsum("bnd,bnd->bd", left, left)
+            found[some] = np.sum(dof * np.log(np.maximum(squares, 1e-300)), axis=0)
+        return space.logdet + space.information + found
 
     def _space(self, shares: Shares) -> Space:
         return self.model.at(Noise(shares, np.ones(self.model.problem.blocks)))
@@ -148,7 +179,8 @@ class _At:
             variance = (squares + prior) / (dof + prior)  # the centre of the prior is one in units of the fitted scale
         else:
             variance = np.broadcast_to(squares.sum(axis=0) / max(float(dof.sum()), 1.0), squares.shape)
-        self.left = left / np.sqrt(variance)[:, None, :]
+        left /= np.sqrt(variance)[:, None, :]
+        self.left = left
         self.total = np.einsum("bnd,bnd->d", self.left, self.left)
 
     def worst(self, candidate: Candidate) -> Array:
@@ -162,13 +194,17 @@ class _At:
         return found
 
 
-def _lattice(shares: Shares) -> list[Shares]:
-    """Shares about the fitted ones, and none."""
-    each: list[set[int | None]] = []
-    for k in place_of(shares):
-        near = {LEAST_SHARE, LEAST_SHARE + 8} if k is None else {max(k + d, LEAST_SHARE) for d in _OFF}
-        each.append({None, *near})
-    return [shares_at((a, b)) for a in each[0] for b in each[1]]
+def _lattice(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]], int]:
+    """The lattice about fitted shares, none first, each share in rising order; and the place in it of the fitted ones."""
+    fitted = place_of(shares)
+    rows, columns = (_about(k) for k in fitted)
+    return (rows, columns), rows.index(fitted[0]) * len(columns) + columns.index(fitted[1])
+
+
+def _about(k: int | None) -> list[int | None]:
+    """A share of the lattice, those about it, and none."""
+    near = {LEAST_SHARE, LEAST_SHARE + 8} if k is None else {max(k + d, LEAST_SHARE) for d in _OFF}
+    return [None, *sorted(near)]
 
 
 def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array, int]]:

@@ -185,7 +185,9 @@ class Covariance:
         key = (place, index[0], index[1])
         if key not in self._whiteners:
             self._whiteners[key] = self._made(place, index)
-            most = max(_WHITENERS // self.there.shape[1] ** 2, 4)
+            # applied to many blocks, a whitener costs little beside its use
+            room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 4
+            most = max(room // self.there.shape[1] ** 2, 4)
             while len(self._whiteners) > most:
                 self._whiteners.popitem(last=False)
         self._whiteners.move_to_end(key)

@@ -24,7 +24,7 @@ _LONG = 400
 
 
 _SPACES = 2_000_000
-"""Largest number of whitened values stored for shares that were tried; at least two spaces are stored."""
+"""Largest number of whitened values stored for shares that were tried; of small lots at least two spaces are stored."""
 
 _RICHER = 2
 """Number of models with one more term that a model keeps."""
@@ -164,7 +164,7 @@ class Model:
             scale = np.ones(self.problem.blocks) if self._near is None else self._near.scale
             if self._near is None and self.shared.shape[-1]:
                 scale = self._own_scale
-            most = max(2, _SPACES // max(self.local.size, 1))
+            most = max(2 if self.problem.y.size <= LARGE else 1, _SPACES // max(self.local.size, 1))
             while len(self._spaces) >= most:  # the oldest first: a search for shares seldom goes back
                 del self._spaces[next(iter(self._spaces))]
             self._spaces[shares] = self.at(Noise(shares, scale))

@@ -36,7 +36,7 @@ class WhitenedColumns:
         self.problem, self.local = problem, local
         self.whole = self._determined is local
         # a combination that vanishes mixes the columns: then all are whitened together
-        nested = before is not None and further is not None and self.whole and before.whole
+        nested = before is not None and further is not None and self.whole and before.whole and problem.y.size <= LARGE
         self._before = before if nested else None
         self._further = self._unit(further) if nested and further is not None else None
         self._kept: dict[Shares, Array] = {}
@@ -91,7 +91,7 @@ class WhitenedColumns:
             else:
                 own = self._before.at(shares, keep=True)
                 kept = np.concatenate([own[..., :-1], whiten(self._further, shares), own[..., -1:]], axis=-1)
-            if keep and self.problem.y.size <= LARGE:
+            if keep:
                 while len(self._kept) >= max(2, _KEPT // kept.size):
                     del self._kept[next(iter(self._kept))]
                 self._kept[shares] = kept
