@@ -105,7 +105,13 @@ class BiasStability(InG, Evaluated):
             figures[str(unit)] = [
                 worst(
                     [
-                        FigureValue(name, axis, getattr(one, key), getattr(one, f"{key}_error"))
+                        FigureValue(
+                            name,
+                            axis,
+                            getattr(one, key),
+                            getattr(one, f"{key}_error"),
+                            *getattr(one, f"{key}_interval"),
+                        )
                         for axis, one in by_axis.items()
                     ]
                 )
