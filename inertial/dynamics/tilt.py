@@ -25,7 +25,7 @@ class TiltFit:
     value, covariance : (terms,), (terms, terms), terms as in ``names``; output unit
     residuals : (n,), output unit
     weights : (terms, n), of the outputs in the terms
-    error : (n,), standard uncertainty of each output with the wander between the dwells; output unit
+    spread : (n,), standard deviation of each residual: noise, angle and the wander that the terms do not take up; output unit
     """
 
     names: tuple[str, ...]
@@ -34,7 +34,7 @@ class TiltFit:
     residuals: Array
     angle: Array
     weights: Array
-    error: Array
+    spread: Array
 
     @property
     def scale(self) -> tuple[float, float]:
@@ -137,9 +137,9 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time
     c = np.linalg.lstsq(white_rows, white_output, rcond=None)[0]
     covariance = np.asarray(np.linalg.inv(white_rows.T @ white_rows), dtype=np.float64)
     weights = np.asarray(np.linalg.solve(root.T, white_rows @ covariance).T, dtype=np.float64)
-    return TiltFit(
-        names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle, weights, np.sqrt(np.diag(whole))
-    )
+    left = np.eye(len(angle)) - rows @ weights
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", left, whole, left))
+    return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle, weights, spread)
 
 
 def left_open(*, in_plane: bool) -> tuple[str, ...]:

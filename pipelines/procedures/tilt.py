@@ -154,7 +154,7 @@ class Tilt(Evaluated):
             one = _fit(part, points[points["axis"] == axis], orders=1)
             order = np.argsort(one.angle)
             residual = MICRO * one.residuals / one.scale[0]
-            error = 2.0 * MICRO * _fit(part, points[points["axis"] == axis]).error / one.scale[0]
+            error = 2.0 * MICRO * _fit(part, points[points["axis"] == axis]).spread / one.scale[0]
             place.errorbar(
                 np.degrees(one.angle)[order],
                 residual[order],
@@ -163,7 +163,7 @@ class Tilt(Evaluated):
                 ms=3,
                 lw=0.8,
                 c=colour,
-                label=f"axis {axis}, U (k = 2)",
+                label=f"axis {axis}, ± 2 σ",
             )
             if part.orders == 3:
                 turn = np.linspace(-np.pi, np.pi, 361)

@@ -118,3 +118,10 @@ def test_the_departure_by_tilt_is_that_of_the_curve(k2: float, k3: float, rng: n
         low, high = np.sqrt(chi2.ppf([0.005, 0.995], 299) / 299)
         assert low < np.std(pulls, ddof=1) < high
         assert abs(np.mean(pulls)) < 2.6 / np.sqrt(300.0)
+
+
+def test_the_spread_of_a_residual_is_that_of_many_turns(rng: np.random.Generator) -> None:
+    fits = [turn(rng, 0.0, 0.0, 1e-4, 0.0)[0] for _ in range(400)]
+    residuals = np.array([one.residuals for one in fits])
+    assert fits[0].spread == pytest.approx(residuals.std(axis=0), rel=0.15)  # 0.035 by chance, 24 values
+    assert np.sqrt(np.mean(fits[0].spread ** 2)) == pytest.approx(np.sqrt(np.mean(residuals**2)), rel=0.03)
