@@ -82,7 +82,7 @@ def variance_of_sum(weights: Array) -> float:
     return float(products[0] * kernel[0] + 2.0 * products[1:] @ kernel[1:])
 
 
-def stated_error(variance: float, slope: float, error: float) -> float:
+def stated_error(variance: float, slope: float, error: float, scatter: float = 0.0) -> float:
     """Standard uncertainty u, half of whose U (k = 2) has 95 % where a part of the variance is an estimate from few data.
 
     Welch and Satterthwaite: ν = 2·V²/Var V, and u = √V·t₀.₉₇₅(ν)/z₀.₉₇₅ (GUM, G.4).
@@ -90,10 +90,11 @@ def stated_error(variance: float, slope: float, error: float) -> float:
     Parameters
     ----------
     variance : V; slope : of V over the estimated variance; error : standard deviation of that estimate
+    scatter : relative standard deviation of a factor of √V that is estimated from the same record
     """
     if variance <= 0.0:
         return 0.0
-    spread = (slope * error / variance) ** 2
+    spread = (slope * error / variance) ** 2 + (2.0 * scatter) ** 2
     dof = max(FEWEST_DOF, 2.0 / spread) if spread > 0.0 else np.inf
     return float(np.sqrt(variance) * t.ppf(0.975, dof) / norm.ppf(0.975))
 

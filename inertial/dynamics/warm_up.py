@@ -75,11 +75,14 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
         found = next((one for start, reach in tries if (one := _crossing(time, away, band, start, reach))), None)
         if found is None:
             break
-        at, slope, weights = found
+        at, slope, weights, of_slope = found
         shares = weights - tail
         over = variance_of_sum(shares) / (2.0 * np.log(2.0))  # variance over F², h = F²/(2 ln 2)
         variance = noise.flicker * over + noise.white / step * float(np.sum(shares**2))
-        error = stated_error(variance, over, noise.flicker_error) / slope
+        steep = noise.flicker * variance_of_sum(of_slope) / (2.0 * np.log(2.0)) + noise.white / step * float(
+            of_slope @ of_slope
+        )
+        error = stated_error(variance, over, noise.flicker_error, float(np.sqrt(steep)) / slope) / slope
         best = WarmUpTime(at, error, final, *_ends(at, error, band / slope, error * slope / band))
         starts, reaches = [at], [k * window_s for k in SPANS[:-1] if k * window_s >= REACH * error]
     if best is not None:
@@ -103,8 +106,10 @@ def _ends(at: float, error: float, constant: float, share: float) -> tuple[float
     return at - constant * float(np.log1p(wide)), at - constant * float(np.log1p(-wide))
 
 
-def _crossing(time: Array, away: Array, band: float, at: float, reach: float) -> tuple[float, float, Array] | None:
-    """Crossing of a parabola over ± reach about itself, its slope there, and weights (n,) of the record in its value there."""
+def _crossing(
+    time: Array, away: Array, band: float, at: float, reach: float
+) -> tuple[float, float, Array, Array] | None:
+    """Crossing of a parabola over ± reach about itself, its slope there, and weights (n,) of the record in value and slope."""
     for _ in range(ROUNDS):
         near = np.flatnonzero(np.abs(time - at) <= reach)
         if near.size < FEWEST:
@@ -119,7 +124,8 @@ def _crossing(time: Array, away: Array, band: float, at: float, reach: float) ->
             return None
         at += float(inside[0])
         if abs(inside[0]) < SETTLED * reach:
-            weights = np.zeros(len(time))
+            weights, of_slope = np.zeros((2, len(time)))
             weights[near] = np.vander(inside[:1], 3)[0] @ inverse
-            return at, float(abs(np.polyval(np.polyder(curve), inside[0]))), weights
+            of_slope[near] = np.array([2.0 * inside[0], 1.0, 0.0]) @ inverse
+            return at, float(abs(np.polyval(np.polyder(curve), inside[0]))), weights, of_slope
     return None

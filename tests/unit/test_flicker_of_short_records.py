@@ -57,6 +57,8 @@ def test_few_data_widen_the_uncertainty_by_students_t() -> None:
     assert stated_error(1.0, 1.0, np.sqrt(2.0 / 5.0)) == pytest.approx(2.5706 / 1.95996, rel=1e-4)
     assert stated_error(1.0, 0.0, 1.0) == pytest.approx(1.0)
     assert stated_error(0.0, 1.0, 1.0) == 0.0
+    # a factor of √V known to 1/√(2ν) is as much as a variance of ν degrees of freedom
+    assert stated_error(1.0, 0.0, 0.0, np.sqrt(1.0 / 10.0)) == pytest.approx(2.5706 / 1.95996, rel=1e-4)
 
 
 def test_the_difference_of_two_short_windows_is_held_by_its_uncertainty(rng: np.random.Generator) -> None:
