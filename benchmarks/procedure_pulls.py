@@ -2,9 +2,11 @@
 
 A pull is (figure − true value)/standard uncertainty, for axis z. True values are those of the plant's physics
 (:mod:`benchmarks.procedure_truths`); of bias stability they are roots of expected variances of the noise's process. Every lot
-has a station of its own, whose reference sensor and radius err differently. Printed are the number of units with a determined
-figure, mean and standard deviation of the pulls, the latter's 95 % interval, and the share of units whose 95 % interval holds
-the true value. A figure that is a largest magnitude cannot have normal pulls where the true value is of the size of the noise.
+has a station of its own, whose reference sensor and radius err differently. The calibration of a reference, the scatter of an
+exciter and the rate of a centrifuge are common to the units of a lot, so on such equipment a lot has one unit. Printed are the
+number of units with a determined figure, mean and standard deviation of the pulls, the latter's 95 % interval, and the share of
+units whose 95 % interval holds the true value. A figure that is a largest magnitude cannot have normal pulls where the true value
+is of the size of the noise.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.schedule.steps import steps
 from schemas.progress import silent
 from schemas.recipe import Lot, Unit
-from schemas.station import Hidden, Simulation, load_station
+from schemas.station import Hidden, ReferenceErrors, Simulation, load_station
 from stations import open_station
 from stations.plant.plant import Plant
 
@@ -64,8 +66,9 @@ PARTS = {
     f"scale = {SCALE}",
     "centrifuge": f"record_s = 2.0\nscale = {SCALE}",
 }
-LOTS = {"sweep": 4, "transverse": 4, "shock": 4, "centrifuge": 2}
-MOST = 8  # units of a lot, and so of a station, of the other procedures
+ONE_TABLE = {"tilt", "bias_stability", "warm_up", "turn_on"}
+MOST = 8  # units of a lot on the tilt table; on other equipment all units of a lot share its errors: one unit a lot
+TILT_URAD = 34.9  # 0.002°, the standard uncertainty of the table's angle that the part of a recipe states
 ONE_AXIS = {"step_response", "turn_on", "shock", "bias_stability", "warm_up"}
 
 
@@ -74,7 +77,10 @@ def station_of(name: str, seed: int) -> StationConfig:
     station = load_station(STATION)
     simulation = (station.simulation or Simulation()).model_copy(update={"seed": seed})
     if name == "tilt":  # a device whose K3 shows within 1 g
-        simulation = simulation.model_copy(update={"preset_overrides": {"linearity_pct_fs": 400.0}})
+        errors = ReferenceErrors(pose_urad=TILT_URAD)
+        simulation = simulation.model_copy(
+            update={"preset_overrides": {"linearity_pct_fs": 400.0}, "reference_errors": errors}
+        )
     if name == "warm_up":
         hidden = [Hidden(kind="warm_up", figures={"size": WARM_G, "tau": WARM_S})]
         simulation = simulation.model_copy(update={"hidden": hidden})
@@ -132,6 +138,7 @@ def main() -> None:
     reader.add_argument("procedures", nargs="*", default=list(PARTS))
     reader.add_argument("--units", type=int, default=200)
     reader.add_argument("--seed", type=int, default=2026)
+    reader.add_argument("--units-per-lot", type=int, help="by default 8 on the tilt table, 1 on other equipment")
     asked = reader.parse_args()
     for name in asked.procedures or list(PARTS):
         setattr(getattr(procedures, name), "worst", of_axis("z"))  # noqa: B010 - not every module has one
@@ -139,7 +146,7 @@ def main() -> None:
         begun, left, lot = time.process_time(), asked.units, 0
         rows: list[dict[str, Any]] = []
         while left > 0:
-            most = min(LOTS.get(name, MOST), left)
+            most = min(asked.units_per_lot or (MOST if name in ONE_TABLE else 1), left)
             figures, plant = outcome(name, most, asked.seed + 17 * lot)
             known = {unit: truths(name, plant, k) for k, unit in enumerate(plant.serials)}
             whole: list[dict[str, Any]] = [{str(k): v for k, v in row.items()} for row in figures.to_dict("records")]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
-from inertial.dynamics.wander import logarithmic_kernel, stated_error, wander, wander_variance
+from inertial.dynamics.wander import logarithmic_kernel, stated_error, wander, wander_posterior, wander_variance
 from inertial.errors import NotIdentified
 from inertial.noise.allan import overlapping
 from inertial.noise.flicker import flicker_kernel
@@ -28,6 +28,8 @@ class StabilityFigures:
     sd_1s, range_1s, range_100s : standard deviation and range of 1 s means, range of 100 s means
     allan_100s, allan_100s_error : Allan deviation at 100 s
     drift_h, drift_h_error : slope per hour and its standard uncertainty for white and 1/f noise, which looks like drift
+    sd_100s_interval, allan_100s_interval, drift_h_interval : ends (2,) of 95 % intervals: by χ² with the effective degrees of
+        freedom of correlated means for the deviations, over the probable strengths of the 1/f noise for the drift
     """
 
     sd_100s: float
@@ -39,6 +41,9 @@ class StabilityFigures:
     allan_100s_error: float
     drift_h: float
     drift_h_error: float
+    sd_100s_interval: tuple[float, float]
+    allan_100s_interval: tuple[float, float]
+    drift_h_interval: tuple[float, float]
 
 
 def block_means(record: Array, size: int) -> Array:
@@ -70,39 +75,55 @@ def stability(record: Array, rate_hz: float) -> StabilityFigures:
     rows: Array = np.asarray(np.column_stack([np.ones_like(time), time - time.mean()]), dtype=np.float64)
     c = np.linalg.lstsq(rows, hundred, rcond=None)[0]
     noise = float(np.var(np.diff(second), ddof=1)) / 2.0 / 100.0  # white part of a mean of 100 s
-    inverse = np.linalg.pinv(rows)
-    drift_error = float(np.sqrt((inverse @ _covariance(rows, hundred, time, noise) @ inverse.T)[1, 1]))
+    drift_error = _error_of_slope(rows, hundred, noise)
     rate = rate_hz / max(1, round(rate_hz))
     curve = overlapping(second, rate, np.array([1, 3, 10, 30, round(100.0 * rate)]))
-    allan = float(curve.deviation[-1])
-    sd = float(hundred.std(ddof=1))
+    allan, sd = float(curve.deviation[-1]), float(hundred.std(ddof=1))
+    dof, allan_dof = _dof_of_sd(hundred, time, noise), float(curve.edf[-1])
+    reach = float(norm.ppf(0.975)) * drift_error
     return StabilityFigures(
         sd_100s=sd,
-        sd_100s_error=_error_of_sd(hundred, time, noise),
+        sd_100s_error=sd / float(np.sqrt(2.0 * dof)),
         sd_1s=float(second.std(ddof=1)),
         range_1s=float(np.ptp(second)),
         range_100s=float(np.ptp(hundred)),
         allan_100s=allan,
-        allan_100s_error=0.5 * float(curve.high[-1] - curve.low[-1]),
+        allan_100s_error=allan / float(np.sqrt(2.0 * allan_dof)),
         drift_h=float(c[1]),
         drift_h_error=drift_error,
+        sd_100s_interval=deviation_interval(sd, dof),
+        allan_100s_interval=deviation_interval(allan, allan_dof),
+        drift_h_interval=(float(c[1]) - reach, float(c[1]) + reach),
     )
 
 
-def _covariance(rows: Array, means: Array, time: Array, white: float) -> Array:
-    """Covariance (n, n) of means: a known white variance, and 1/f wander by restricted likelihood beside the terms ``rows``."""
-    known, kernel = white * np.eye(means.size), flicker_kernel(time)
-    return known + wander_variance(rows, means, known, kernel) * kernel
+def deviation_interval(deviation: float, dof: float) -> tuple[float, float]:
+    """95 % interval of a standard deviation that is known with ``dof`` degrees of freedom: σ²·ν/χ²."""
+    low, high = (deviation * float(np.sqrt(dof / chi2.ppf(p, dof))) for p in (0.975, 0.025))
+    return low, high
 
 
-def _error_of_sd(means: Array, time: Array, white: float) -> float:
-    """Standard uncertainty of the standard deviation of correlated means: Var s² = 2 tr((CV)²)/(n − 1)²."""
+def _error_of_slope(rows: Array, means: Array, white: float) -> float:
+    """Standard uncertainty of the slope by least squares in white noise and 1/f noise, which is itself estimated.
+
+    1/f noise goes on below one period of the record, and is a slope there: the kernel is that of the logarithm.
+    """
     n = means.size
-    centred = _covariance(np.ones((n, 1)), means, time, white)
+    kernel = toeplitz(logarithmic_kernel(n) + np.log(n) + 1.0)
+    weights = np.linalg.pinv(rows)[1]
+    own = wander_posterior(rows, means, white, kernel)
+    return own.error_of(white * float(weights @ weights), float(weights @ kernel @ weights))
+
+
+def _dof_of_sd(means: Array, time: Array, white: float) -> float:
+    """Effective degrees of freedom of the variance of correlated means: (tr CV)²/tr((CV)²), with C the centring."""
+    n = means.size
+    known, kernel = white * np.eye(n), flicker_kernel(time)
+    centred = known + wander_variance(np.ones((n, 1)), means, known, kernel) * kernel
     centred = centred - centred.mean(axis=0)
     centred = centred - centred.mean(axis=1)[:, None]
-    sd = float(means.std(ddof=1))
-    return float(np.sqrt(2.0 * np.sum(centred * centred.T)) / (n - 1) / (2.0 * sd)) if sd > 0.0 else 0.0
+    squares = float(np.sum(centred * centred.T))
+    return float(np.trace(centred)) ** 2 / squares if squares > 0.0 else float(n - 1)
 
 
 @dataclass(frozen=True)

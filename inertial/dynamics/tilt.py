@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.dynamics.folded import magnitude
 from inertial.dynamics.wander import wander_variance
 from inertial.errors import NotIdentified
 from inertial.noise.flicker import flicker_kernel
@@ -23,6 +24,8 @@ class TiltFit:
     ----------
     value, covariance : (terms,), (terms, terms), terms as in ``names``; output unit
     residuals : (n,), output unit
+    weights : (terms, n), of the outputs in the terms
+    spread : (n,), standard deviation of each residual: noise, angle and the wander that the terms do not take up; output unit
     """
 
     names: tuple[str, ...]
@@ -30,6 +33,8 @@ class TiltFit:
     covariance: Array
     residuals: Array
     angle: Array
+    weights: Array
+    spread: Array
 
     @property
     def scale(self) -> tuple[float, float]:
@@ -56,13 +61,32 @@ class TiltFit:
     def departure(self) -> tuple[float, float]:
         """Largest departure of the K2–K3 curve from bias and scale over the turn, and its standard uncertainty; output unit.
 
-        K2·sin² departs by −½·K2·cos 2θ and K3·sin³ by −¼·K3·sin 3θ from a constant and a sine.
+        K2·sin² departs by −½·K2·cos 2θ and K3·sin³ by −¼·K3·sin 3θ from a constant and a sine. At θ = 90° and 270° both are
+        largest, once with equal and once with opposite signs: ½·|K2| + ¼·|K3|, magnitudes without the share of their noise.
         """
-        curve = _departures(np.linspace(0.0, 2.0 * np.pi, 721))
         place = [self.names.index(name) for name in TERMS[3:]]
-        found = curve @ self.value[place]
-        k = int(np.argmax(np.abs(found)))
-        return float(abs(found[k])), float(np.sqrt(curve[k] @ self.covariance[np.ix_(place, place)] @ curve[k]))
+        value, covariance = self.value[place], self.covariance[np.ix_(place, place)]
+        error = np.sqrt(np.diag(covariance))
+        share = np.array([0.5, 0.25])
+        sizes = np.array([magnitude(float(v), float(e)) for v, e in zip(value, error, strict=True)])
+        slope = share * np.where(value < 0.0, -1.0, 1.0)
+        return float(share @ sizes), float(np.sqrt(slope @ covariance @ slope))
+
+    def phase_covariance(self, other: TiltFit, angle_error: float) -> float:
+        """Covariance of the phases of two axes from the errors of the angles, which both axes have in common; rad².
+
+        Parameters
+        ----------
+        other : fit of the other axis at the same angles
+        angle_error : standard uncertainty of each angle, rad
+        """
+        shares = [one.phase_slope() * one.scale[0] * np.cos(one.angle + one.phase[0]) for one in (self, other)]
+        return float(angle_error**2 * (shares[0] @ shares[1]))
+
+    def phase_slope(self) -> Array:
+        """Derivative (n,) of the phase by the outputs, rad over the output unit."""
+        s, c = self.value[1:3]
+        return np.asarray((s * self.weights[2] - c * self.weights[1]) / (s**2 + c**2))
 
     def of(self, name: str) -> tuple[float, float]:
         """Value and standard uncertainty of a term."""
@@ -112,7 +136,10 @@ def fit_tilt(angle: Array, output: Array, error: Array, *, orders: int = 1, time
     white_rows, white_output = np.linalg.solve(root, rows), np.linalg.solve(root, output)
     c = np.linalg.lstsq(white_rows, white_output, rcond=None)[0]
     covariance = np.asarray(np.linalg.inv(white_rows.T @ white_rows), dtype=np.float64)
-    return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle)
+    weights = np.asarray(np.linalg.solve(root.T, white_rows @ covariance).T, dtype=np.float64)
+    left = np.eye(len(angle)) - rows @ weights
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", left, whole, left))
+    return TiltFit(names, np.asarray(c, dtype=np.float64), covariance, output - rows @ c, angle, weights, spread)
 
 
 def left_open(*, in_plane: bool) -> tuple[str, ...]:

@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.linalg import null_space
+from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import norm, t
 
 Array = NDArray[np.float64]
 FEWEST_DOF = 1.0
+GRID = 120  # variances of wander of a posterior
+REACHED, FARTHEST = 0.99, 30.0  # bracket of a 95 % interval: the deviation at this probability, times this
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def variance_of_sum(weights: Array) -> float:
     return float(products[0] * kernel[0] + 2.0 * products[1:] @ kernel[1:])
 
 
-def stated_error(variance: float, slope: float, error: float) -> float:
+def stated_error(variance: float, slope: float, error: float, scatter: float = 0.0) -> float:
     """Standard uncertainty u, half of whose U (k = 2) has 95 % where a part of the variance is an estimate from few data.
 
     Welch and Satterthwaite: ν = 2·V²/Var V, and u = √V·t₀.₉₇₅(ν)/z₀.₉₇₅ (GUM, G.4).
@@ -87,9 +90,60 @@ def stated_error(variance: float, slope: float, error: float) -> float:
     Parameters
     ----------
     variance : V; slope : of V over the estimated variance; error : standard deviation of that estimate
+    scatter : relative standard deviation of a factor of √V that is estimated from the same record
     """
     if variance <= 0.0:
         return 0.0
-    spread = (slope * error / variance) ** 2
+    spread = (slope * error / variance) ** 2 + (2.0 * scatter) ** 2
     dof = max(FEWEST_DOF, 2.0 / spread) if spread > 0.0 else np.inf
     return float(np.sqrt(variance) * t.ppf(0.975, dof) / norm.ppf(0.975))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Variances of wander (g,), squares of the output's unit, with their probabilities (g,)."""
+
+    variance: Array
+    probability: Array
+
+    def error_of(self, known: float, slope: float) -> float:
+        """Standard uncertainty u, half of whose U (k = 2) has 95 %, of an estimate of the variance known + slope·wander.
+
+        The estimate is normal for each variance of the wander; the 95 % are those of the mixture.
+        """
+        each = np.sqrt(known + slope * self.variance)
+        top = float(each[np.cumsum(self.probability) <= REACHED].max(initial=each[0]))
+        if top <= 0.0:
+            return 0.0
+
+        def outside(half: float) -> float:
+            return float(2.0 * self.probability @ norm.cdf(-half / np.maximum(each, 1e-300)) - 0.05)
+
+        found: Any = brentq(outside, 0.0, FARTHEST * top)
+        return float(found / norm.ppf(0.975))
+
+
+def wander_posterior(rows: Array, output: Array, white: float, kernel: Array) -> Posterior:
+    """Probabilities of the variance of wander beside white noise, by restricted likelihood and the prior of Jeffreys.
+
+    A short record knows the variance to a third at best: what one value of it says of an interval is too little where it is
+    estimated low. Student's t is the case without white noise.
+
+    Parameters
+    ----------
+    rows : (n, terms); output : (n,), any unit
+    white : known variance of each value, square of the output's unit
+    kernel : (n, n), of the wander
+    """
+    free = null_space(rows.T)
+    share, turn = np.linalg.eigh(free.T @ kernel @ free)
+    square = (turn.T @ (free.T @ output)) ** 2
+    size = float(square.mean())
+    if size <= 0.0:
+        return Posterior(np.zeros(1), np.ones(1))
+    variance = np.geomspace(1e-5 * size, 1e4 * size, GRID)
+    whole = white + variance[:, None] * share
+    prior = np.log(variance) + 0.5 * np.log(np.sum((share / whole) ** 2, axis=1))  # over ln of the variance
+    log = prior - 0.5 * np.sum(np.log(whole) + square / whole, axis=1)
+    weight = np.exp(log - log.max())
+    return Posterior(variance, np.asarray(weight / weight.sum(), dtype=np.float64))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import norm
 
 from inertial.dynamics.stability import short_noise, warm_up_time
 from inertial.dynamics.wander import stated_error, variance_of_sum
@@ -20,16 +21,19 @@ SPANS = (1.0, 2.0, 4.0, 8.0)  # windows on either side of the entry that the par
 REACH = 3.0  # least span, in standard uncertainties of the time
 ROUNDS = 20
 SETTLED = 0.02  # of the span: a step of the crossing that ends the search
+WIDEST = 0.9  # error of the level over the band, at 95 %: beyond it the late end is open
 FEWEST = 5  # means under the parabola
 
 
 @dataclass(frozen=True)
 class WarmUpTime:
-    """Time from power-on, its standard uncertainty, both s, and the final value; the unit of the record."""
+    """Time from power-on with its standard uncertainty and the ends of its 95 % interval, s; final value, unit of the record."""
 
     value: float
     error: float
     final: float
+    low: float
+    high: float
 
 
 def entered(time: Array, record: Array, *, band: float, window_s: float) -> WarmUpTime:
@@ -54,29 +58,35 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
     """
     last, final = warm_up_time(time, record, band=band, window_s=window_s)
     if last <= time[0]:
-        return WarmUpTime(last, 0.0, final)  # within its band from the first mean on
+        return WarmUpTime(last, 0.0, final, last, last)  # within its band from the first mean on
     step, away = float(time[1] - time[0]), record - final
     noise = short_noise(record[len(record) // 2 :], 1.0 / step, trend=1)
     tail = np.zeros(len(record))
     tail[int(0.8 * len(record)) :] = 1.0
     tail /= tail.sum()
-    at, error, reach = last, 0.0, SPANS[-1] * window_s
-    for _ in range(2):  # the longest span first; then the shortest that holds the entry with its uncertainty
-        starts = (at, *(at - k * window_s for k in SPANS))  # noise has left the band late: the curve crosses before
-        found = next((one for start in starts if (one := _crossing(time, away, band, start, reach))), None)
+    best: WarmUpTime | None = None
+    starts, reaches = [last, *(last - k * window_s for k in SPANS)], [SPANS[-1] * window_s]
+    for _ in range(
+        2
+    ):  # the longest span first; then the shortest that holds the entry with its uncertainty, and settles
+        tries = (
+            (start, reach) for reach in reaches for start in starts
+        )  # noise has left the band late: it crosses before
+        found = next((one for start, reach in tries if (one := _crossing(time, away, band, start, reach))), None)
         if found is None:
             break
-        at, slope, weights = found
+        at, slope, weights, of_slope = found
         shares = weights - tail
         over = variance_of_sum(shares) / (2.0 * np.log(2.0))  # variance over F², h = F²/(2 ln 2)
         variance = noise.flicker * over + noise.white / step * float(np.sum(shares**2))
-        error = stated_error(variance, over, noise.flicker_error) / slope
-        shorter = min((k for k in SPANS if k * window_s >= REACH * error), default=SPANS[-1]) * window_s
-        if shorter >= reach:
-            return WarmUpTime(at, error, final)
-        reach = shorter
-    else:
-        return WarmUpTime(at, error, final)
+        steep = noise.flicker * variance_of_sum(of_slope) / (2.0 * np.log(2.0)) + noise.white / step * float(
+            of_slope @ of_slope
+        )
+        error = stated_error(variance, over, noise.flicker_error, float(np.sqrt(steep)) / slope) / slope
+        best = WarmUpTime(at, error, final, *_ends(at, error, band / slope, error * slope / band))
+        starts, reaches = [at], [k * window_s for k in SPANS[:-1] if k * window_s >= REACH * error]
+    if best is not None:
+        return best
     msg = (
         f"warm-up: noise of the output leaves open when it enters ± {band:.3g}, last seen outside at {last:.0f} s; lengthen "
         "window_s, or widen the band"
@@ -84,8 +94,22 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
     raise NotIdentified(msg)
 
 
-def _crossing(time: Array, away: Array, band: float, at: float, reach: float) -> tuple[float, float, Array] | None:
-    """Crossing of a parabola over ± reach about itself, its slope there, and weights (n,) of the record in its value there."""
+def _ends(at: float, error: float, constant: float, share: float) -> tuple[float, float]:
+    """Ends of the 95 % interval, s, of an entry whose curve settles with a local time constant ``constant``, s.
+
+    Noise moves the level at which the curve crosses, and a settling curve is steeper above that level than below: an interval
+    of equal arms is too short on the late side. The level errs by ``share`` of the band, one standard uncertainty.
+    """
+    wide = float(norm.ppf(0.975)) * share
+    if wide >= WIDEST:
+        return at - constant * float(np.log1p(wide)), at + float(norm.ppf(0.975)) * error / (1.0 - WIDEST)
+    return at - constant * float(np.log1p(wide)), at - constant * float(np.log1p(-wide))
+
+
+def _crossing(
+    time: Array, away: Array, band: float, at: float, reach: float
+) -> tuple[float, float, Array, Array] | None:
+    """Crossing of a parabola over ± reach about itself, its slope there, and weights (n,) of the record in value and slope."""
     for _ in range(ROUNDS):
         near = np.flatnonzero(np.abs(time - at) <= reach)
         if near.size < FEWEST:
@@ -100,7 +124,8 @@ def _crossing(time: Array, away: Array, band: float, at: float, reach: float) ->
             return None
         at += float(inside[0])
         if abs(inside[0]) < SETTLED * reach:
-            weights = np.zeros(len(time))
+            weights, of_slope = np.zeros((2, len(time)))
             weights[near] = np.vander(inside[:1], 3)[0] @ inverse
-            return at, float(abs(np.polyval(np.polyder(curve), inside[0]))), weights
+            of_slope[near] = np.array([2.0 * inside[0], 1.0, 0.0]) @ inverse
+            return at, float(abs(np.polyval(np.polyder(curve), inside[0]))), weights, of_slope
     return None

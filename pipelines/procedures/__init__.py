@@ -51,7 +51,7 @@ __all__ = [
 MULTI_POSITION = "multi_position"
 SHARED = (
     *("base", "columns", "noise_columns", "recorded", "shock_bias", "shock_waves", "sweep_plan", "sweep_points"),
-    *("transfer_figures", "transfer_plots"),
+    *("transfer_figures", "transfer_plots", "wording"),
 )
 
 

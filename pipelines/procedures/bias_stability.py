@@ -24,6 +24,7 @@ from pipelines.procedures.base import (
     worst,
 )
 from pipelines.procedures.columns import points
+from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import Positive
 from schemas.recipe import Pose
 from schemas.units import AXES, MICRO
@@ -105,7 +106,13 @@ class BiasStability(InG, Evaluated):
             figures[str(unit)] = [
                 worst(
                     [
-                        FigureValue(name, axis, getattr(one, key), getattr(one, f"{key}_error"))
+                        FigureValue(
+                            name,
+                            axis,
+                            getattr(one, key),
+                            getattr(one, f"{key}_error"),
+                            *getattr(one, f"{key}_interval"),
+                        )
                         for axis, one in by_axis.items()
                     ]
                 )
@@ -120,7 +127,7 @@ class BiasStability(InG, Evaluated):
                     f"axis {axis}, µg: standard deviation of 1 s means {one.sd_1s:.4g}, of 100 s "
                     f"means {one.sd_100s:.4g}; range of "
                     f"1 s means {one.range_1s:.4g}, of 100 s means {one.range_100s:.4g}; Allan deviation at 100 s "
-                    f"{one.allan_100s:.4g}; drift {one.drift_h:.4g} ± {2.0 * one.drift_h_error:.2g} µg/h (k = 2)"
+                    f"{one.allan_100s:.4g}; drift {with_uncertainty(one.drift_h, 2.0 * one.drift_h_error)} µg/h (k = 2)"
                 )
                 findings.append(Finding(str(unit), "definitions of bias stability", text))
         return Outcome(figures, findings)

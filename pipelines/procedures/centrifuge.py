@@ -31,6 +31,7 @@ from pipelines.procedures.base import (
     scale_of,
 )
 from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.wording import probability, with_uncertainty
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Pose
 from schemas.units import MICRO
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from schemas.recipe import Recipe
 
 INPUT = 2  # the input axis is z, radial
-NAMED_P = 1e-3
 
 
 class CentrifugePart(NominalScale):
@@ -219,16 +219,16 @@ def diagnosis_text(found: SpinDiagnosis) -> list[tuple[str, str]]:
     model = " + ".join(("bias", "scale", *found.fit.effects))
     if found.adequate is None:
         return [("diagnosis", f"{model} cannot be judged: {found.reason}")]
-    p = chi2.sf(found.fit.chi_square, found.fit.dof)
+    p = float(chi2.sf(found.fit.chi_square, found.fit.dof))
     verdict = "adequate" if found.adequate else "not adequate"
-    text = f"{model} is {verdict} (p = {p:.2g}), rms residual {MICRO * found.error_g:.3g} µg"
+    text = f"{model} is {verdict} ({probability(p)}), rms residual {MICRO * found.error_g:.3g} µg"
     out = [("diagnosis", text)]
     for one in found.classes:
         name = one.effects[0]
         value, error = found.extended.of(name)
         rivals = f"; the points do not separate it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
-        size = f"{value:.4g} ± {2.0 * error:.2g} {EFFECTS[name].unit} (k = 2)"
-        out.append(("missing effect", f"{name}: {size}, p = {one.p_value:.2g}{rivals}"))
+        size = f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
+        out.append(("missing effect", f"{name}: {size}, {probability(one.p_value)}{rivals}"))
     if found.classes:
         text = (
             f"rms residual {MICRO * found.error_g:.3g} → {MICRO * found.extended_g:.3g} µg; points left out, in standard "
@@ -264,15 +264,8 @@ def _figures(part: CentrifugePart, fit: Polynomial) -> list[FigureValue]:
 def _texts(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, str]]:
     p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
     verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
-    out = [
-        (
-            "model",
-            (
-                f"polynomial {' + '.join(fit.names)} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} "
-                f"degrees of freedom, p = {p:.2g}"
-            ),
-        )
-    ]
+    judged_by = f"χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, {probability(p)}"
+    out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: {judged_by}")]
     if not part.reversed:
         text = (
             "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
@@ -293,7 +286,9 @@ def _texts(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, str]]:
         if abs(value) > 4.0 * error:
             factor = 1e3 * part.radius_m if name.startswith("mass") else MICRO
             unit = "mm of offset" if name.startswith("mass") else "µg/g²"
-            out.append(("effect found", f"{text}: {factor * value:.4g} ± {2.0 * factor * error:.2g} {unit} (k = 2)"))
+            out.append(
+                ("effect found", f"{text}: {with_uncertainty(factor * value, 2.0 * factor * error)} {unit} (k = 2)")
+            )
     return out
 
 

@@ -24,6 +24,7 @@ from pipelines.procedures.base import (
 )
 from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
+from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Pose
@@ -255,7 +256,7 @@ def _text(part: RatiometryPart, one: Follows) -> str:
     what = "ratiometric output" if part.follows else "output independent of the supply"
     return (
         f"{what}: sensitivity {100.0 * one.sensitivity[int(np.argmax(np.abs(one.sensitivity)))]:+.3g} %, zero "
-        f"{MICRO * one.slope_g_V:+.3g} ± {2.0 * MICRO * one.slope_error_g_V:.2g} µg/V (k = 2), from "
+        f"{with_uncertainty(MICRO * one.slope_g_V, 2.0 * MICRO * one.slope_error_g_V)} µg/V (k = 2), from "
         f"{one.supply.min():.4g} to {one.supply.max():.4g} V as the reader measures them"
     )
 

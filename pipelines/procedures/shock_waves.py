@@ -13,6 +13,7 @@ from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
+from pipelines.procedures.wording import probability, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,16 +109,16 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
     model = " + ".join(("sensitivity", *found.fit.effects))
     if found.adequate is None:
         return [("comparison of the waveforms", f"{model} cannot be judged: {found.reason}")]
-    p = chi2.sf(found.fit.chi_square, found.fit.dof)
+    p = float(chi2.sf(found.fit.chi_square, found.fit.dof))
     verdict = "adequate" if found.adequate else "not adequate"
-    text = f"{model} is {verdict} (p = {p:.2g}), rms residual {found.error_percent:.2g} % of the peak"
+    text = f"{model} is {verdict} ({probability(p)}), rms residual {found.error_percent:.2g} % of the peak"
     if not found.adequate:
         text += f"; {100.0 * found.where[1]:.0f} % of χ² is in the samples of {found.where[0]}"
     out = [("comparison of the waveforms", text)]
     for one in found.classes:
         best, *others = one.effects
         rivals = f"; the shocks do not separate it from {', '.join(others)}" if others else ""
-        out.append(("missing effect", f"{best}: {_size(found, best, settings)}, p = {one.p_value:.2g}{rivals}"))
+        out.append(("missing effect", f"{best}: {_size(found, best, settings)}, {probability(one.p_value)}{rivals}"))
     if found.classes:
         text = (
             f"rms residual {found.error_percent:.2g} → {found.extended_percent:.2g} % of the peak; samples left out, in standard "
@@ -136,7 +137,7 @@ def _size(found: ShockDiagnosis, name: str, settings: WaveSettings) -> str:
     parameters = one.parameters(settings.duration_s)
     fit = found.extended
     value, error = fit.coefficients[name] if name in fit.coefficients else fit.parameters[parameters[0].name]
-    return f"{value:.4g} ± {2.0 * error:.2g} {one.unit()} (k = 2)"
+    return f"{with_uncertainty(value, 2.0 * error)} {one.unit()} (k = 2)"
 
 
 def curves(pair: Pair, duration: float, before_s: float) -> list[dict[str, Any]]:

@@ -157,7 +157,7 @@ class Sweep(OnEquipment, FromWaveforms):
             findings += condition_findings(name, kept)
             band = next(one for one in figures[name] if one.figure == "sweep_bandwidth_hz")
             if band.identified:
-                text = sampling_text(float(kept["rate_hz"].iloc[0]), band.value, part.bandwidth_order)
+                text = sampling_text(float(kept["rate_hz"].max()), band.value, part.bandwidth_order)
                 findings.append(Finding(name, "sampling", text))
         return Outcome(figures, findings)
 

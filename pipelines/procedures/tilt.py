@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.stats import norm
 
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from pipelines.procedures.base import (
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 FEWEST_ANGLES = 6
 MICRO, MILLI = 1e6, 1e3
+NORMAL = float(norm.ppf(0.975))
 
 
 class TiltPart(Part):
@@ -152,7 +154,7 @@ class Tilt(Evaluated):
             one = _fit(part, points[points["axis"] == axis], orders=1)
             order = np.argsort(one.angle)
             residual = MICRO * one.residuals / one.scale[0]
-            error = MICRO * points.loc[points["axis"] == axis, "uncertainty"].to_numpy() / one.scale[0]
+            error = 2.0 * MICRO * _fit(part, points[points["axis"] == axis]).spread / one.scale[0]
             place.errorbar(
                 np.degrees(one.angle)[order],
                 residual[order],
@@ -161,7 +163,7 @@ class Tilt(Evaluated):
                 ms=3,
                 lw=0.8,
                 c=colour,
-                label=f"axis {axis}",
+                label=f"axis {axis}, ± 2 σ",
             )
             if part.orders == 3:
                 turn = np.linspace(-np.pi, np.pi, 361)
@@ -195,8 +197,9 @@ def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltF
 def _linearity(axis: str, one: TiltFit) -> FigureValue:
     """By K2 and K3 where they are fitted: the largest of many residuals is noise, whatever the axis does."""
     if "second_order" in one.names:
-        value, error = one.departure
-        return FigureValue("tilt_linearity_ug", axis, MICRO * value / one.scale[0], MICRO * error / one.scale[0])
+        value, error = (MICRO * part / one.scale[0] for part in one.departure)
+        low, high = value - NORMAL * error, value + NORMAL * error
+        return FigureValue("tilt_linearity_ug", axis, value, error, max(0.0, low), high)
     residual = MICRO * one.residuals / one.scale[0]
     k = int(np.argmax(np.abs(residual)))
     spread = float(np.sqrt(np.mean(residual**2)))
@@ -215,9 +218,9 @@ def _orthogonality(part: TiltPart, fits: dict[str, TiltFit]) -> FigureValue:
     a, b = fits[first].phase, fits[second].phase
     apart = (a[0] - b[0] + np.pi) % (2.0 * np.pi) - np.pi
     departure = MILLI * (abs(apart) - 0.5 * np.pi)
-    return FigureValue(
-        "tilt_orthogonality_mrad", f"{first}{second}", float(departure), float(MILLI * np.hypot(a[1], b[1]))
-    )
+    common = fits[first].phase_covariance(fits[second], float(np.radians(part.angle_uncertainty_deg)))
+    error = MILLI * np.sqrt(max(0.0, a[1] ** 2 + b[1] ** 2 - 2.0 * common))
+    return FigureValue("tilt_orthogonality_mrad", f"{first}{second}", float(departure), float(error))
 
 
 def _second_order(axis: str, one: TiltFit) -> FigureValue:

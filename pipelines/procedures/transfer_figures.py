@@ -11,6 +11,7 @@ from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, TransferFit, best_of_exchange, factor
 from pipelines.procedures.base import FigureValue
+from pipelines.procedures.wording import probability
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -154,8 +155,8 @@ def diagnosis_text(found: TransferDiagnosis) -> list[tuple[str, str]]:
         return [("model", f"{model}: cannot be judged: {found.reason}")]
     verdict = "adequate" if found.adequate else "not adequate"
     text = (
-        f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, p = "
-        f"{fit.p_value:.2g}, rms residual {found.error_percent:.2g} %"
+        f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, "
+        f"{probability(fit.p_value)}, rms residual {found.error_percent:.2g} %"
     )
     out.append(("model", text))
     if found.where:
@@ -167,7 +168,7 @@ def diagnosis_text(found: TransferDiagnosis) -> list[tuple[str, str]]:
     for one in found.classes:
         first, *others = one.effects
         alike = f"; not separated from {', '.join(others)}" if others else ""
-        out.append(("missing effect", f"{first} (p = {one.p_value:.1g}){alike}"))
+        out.append(("missing effect", f"{first} ({probability(one.p_value)}){alike}"))
     if found.classes:
         before, after = found.left_out
         text = (

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from inertial.dynamics.transfer_effects import Conditions
+from pipelines.procedures.wording import with_uncertainty
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -87,9 +88,9 @@ def draw_bode(drawing: Drawing, points: Points, found: TransferDiagnosis, cohere
         one.yaxis.set_major_formatter(FuncFormatter(_plain))
     empty.axis("off")
     added = [f"missing: {name}" for name in found.recommended]
-    lines = [*added, *(f"{p.name}: {_text(found, p.name, p.unit)}" for p in found.extended.parameters)]
+    lines = [*added, *(_text(found, p.name, p.unit) for p in found.extended.parameters)]
     verdict = {True: "model adequate", False: "model not adequate", None: "model cannot be judged"}[found.adequate]
-    empty.text(0.0, 0.95, "\n".join([verdict, *lines]), va="top", fontsize=8.5)
+    empty.text(0.0, 0.95, "\n".join([verdict, *lines]), va="top", fontsize=8.5, linespacing=1.4)
 
 
 def _plain(value: float, _: int) -> str:
@@ -98,8 +99,15 @@ def _plain(value: float, _: int) -> str:
 
 
 def _text(found: TransferDiagnosis, name: str, unit: str) -> str:
+    """A parameter with U (k = 2); times in µs."""
     value, error, low, high = found.extended.of(name)
+    if unit == "s":
+        value, error, low, high, unit = 1e6 * value, 1e6 * error, 1e6 * low, 1e6 * high, "µs"
     unit = "" if unit == "1" else f" {unit}"
+    own = name.removesuffix("_hz").removesuffix("_s").replace("_", " ")
+    word = {"natural": "natural frequency", "two pole": "two-pole low-pass", "one pole": "one-pole low-pass"}.get(
+        own, own
+    )
     if not found.extended.identified(name):
-        return f"not identified, {low:.3g} … {high:.3g}{unit}"
-    return f"{value:.4g} ± {2.0 * error:.2g}{unit}"
+        return f"{word}: not identified, {low:.3g} … {high:.3g}{unit}"
+    return f"{word}: {with_uncertainty(value, 2.0 * error)}{unit}"

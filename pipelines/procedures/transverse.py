@@ -28,6 +28,7 @@ from pipelines.procedures.base import (
     scale_of,
 )
 from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.wording import probability
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Pose
 from schemas.units import AXES
@@ -268,7 +269,7 @@ def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
         ]
     verdict = "adequate" if found.p_value >= 0.005 else "not adequate"
     text = f"a sine over the angle is {verdict}: χ² {found.chi_square:.1f} for {found.dof} degrees of freedom"
-    text += f", p = {found.p_value:.2g}"
+    text += f", {probability(found.p_value)}"
     if verdict == "not adequate":
         text += "; check the angles of the fixture and its resonance, repeat at another frequency"
     return [*out, ("model", text)]

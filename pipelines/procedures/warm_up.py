@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
+from scipy.stats import norm
 
 from inertial.dynamics.stability import block_means, settled_error, short_noise
 from inertial.dynamics.warm_up import entered
@@ -137,7 +138,11 @@ def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
         found = entered(time, value, band=part.band_ug, window_s=part.window_s)
     except NotIdentified as problem:
         return FigureValue.not_determined("warm_up_s", axis, str(problem))
-    return FigureValue("warm_up_s", axis, found.value, float(np.hypot(1.0 / np.sqrt(12.0), found.error)))
+    # of the means of 1 s, in standard uncertainty and at 95 %
+    step, reach = 1.0 / np.sqrt(12.0), float(norm.ppf(0.975)) / np.sqrt(12.0)
+    low = found.value - float(np.hypot(found.value - found.low, reach))
+    high = found.value + float(np.hypot(found.high - found.value, reach))
+    return FigureValue("warm_up_s", axis, found.value, float(np.hypot(step, found.error)), low, high)
 
 
 PROCEDURE = WarmUp()

@@ -56,7 +56,7 @@ def with_uncertainty(value: float, expanded: float) -> tuple[str, str]:
 
 
 def _fixed(value: float, places: int) -> str:
-    return _signed(f"{round(value, places):,.{max(places, 0)}f}".replace(",", THIN))
+    return _signed(f"{round(value, places) + 0.0:,.{max(places, 0)}f}".replace(",", THIN))
 
 
 def _signed(text: str) -> str:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import Evaluated
-from pipelines.report.numbers import significant
+from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.plots import STYLE, WIDTH_IN, svg
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
@@ -80,12 +80,15 @@ def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> d
     limited = bool(np.isfinite(limit) or np.isfinite(least))
     decided = unit.tables["figures"]
     outcome = decided.loc[decided["figure"] == row["figure"], "outcome"].tolist()
-    interval = f"{row['low']:.5g} … {row['high']:.5g}" if np.isfinite([row["low"], row["high"]]).all() else ""
+    expanded = unit.report.coverage * row["uncertainty"]
+    value, spread = with_uncertainty(row["value"], expanded)
+    ends = [row["low"], row["high"]]
+    interval = " … ".join(with_uncertainty(one, expanded)[0] for one in ends) if np.isfinite(ends).all() else ""
     return {
         "meaning": meanings.get(row["figure"], row["figure"]),
         "axis": row["axis"],
-        "value": f"{row['value']:.5g}" if known else "not determined",
-        "spread": significant(unit.report.coverage * row["uncertainty"]) if known else "",
+        "value": value if known else "not determined",
+        "spread": spread if known else "",
         "interval": interval,
         "unit": row["unit_text"],
         "limit": significant(limit) if np.isfinite(limit) else f"≥ {significant(least)}" if limited else "",

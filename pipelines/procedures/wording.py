@@ -1,0 +1,24 @@
+"""Numbers in the findings of procedures: an expanded uncertainty to two digits, the value to the same place, probabilities."""
+
+from __future__ import annotations
+
+import math
+
+MINUS = "−"
+SMALLEST = 1e-99  # a smaller probability is below what a distribution's tail means
+
+
+def with_uncertainty(value: float, expanded: float) -> str:
+    """``value ± U``, U to two digits and the value to the same place (GUM 7.2.6)."""
+    if not math.isfinite(expanded) or expanded <= 0.0:
+        return f"{value:.4g}".replace("-", MINUS)
+    places = 1 - math.floor(math.log10(expanded))
+    if abs(places) > 6:
+        return f"{value:.3e} ± {expanded:.1e}".replace("-", MINUS)
+    shown = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, expanded))
+    return " ± ".join(shown).replace("-", MINUS)
+
+
+def probability(p: float) -> str:
+    """A probability with its sign: ``p = 0.68``, ``p < 1e−99``."""
+    return f"p < {SMALLEST:.0e}".replace("-", MINUS) if p < SMALLEST else f"p = {p:.2g}".replace("-", MINUS)
