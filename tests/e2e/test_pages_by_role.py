@@ -5,12 +5,10 @@ import shlex
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import finished_run
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
-from pipelines.chain.runner import Runner
 from pipelines.cli import app
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -61,7 +59,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("line")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(VARIABLE, "")
-        list(Runner(small_job(folder), Archive(folder / "archive"), measure=CaptureDouble()).all())
+        finished_run(folder)
     return folder
 
 
