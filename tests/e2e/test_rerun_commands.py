@@ -110,7 +110,9 @@ def test_two_processes_and_a_dask_cluster_give_the_same_bytes(archive: Path, tmp
     for number, way in enumerate(ways):
         own = tmp_path / str(number)
         shutil.copytree(archive, own)
-        document = json.loads(tumbleline("rerun", "all", "--effects", LARGER, "--archive", str(own), *way, "--json", alone=True))
+        document = json.loads(
+            tumbleline("rerun", "all", "--effects", LARGER, "--archive", str(own), *way, "--json", alone=True)
+        )
         assert document["rerun"] == 3
         made.append(tables(own))
     assert len(made[0]) == 6 * 17
