@@ -148,8 +148,8 @@ class _Work:
 
     def cost(self, theta: Array) -> Array:
         """Whitened sum of squares, (units,)."""
-        found = np.sum(self.white(self.left(theta)[..., None]) ** 2, axis=(-2, -1))
-        return np.where(np.isfinite(found), found, np.inf)
+        squares = np.sum(self.white(self.left(theta)[..., None]) ** 2, axis=(-2, -1))
+        return np.where(np.isfinite(squares), squares, np.inf)
 
     def rows(self, theta: Array) -> tuple[Array, Array]:
         """Derivatives of the residuals by the free coefficients, (units, n, k), and by the nonlinear parameters."""

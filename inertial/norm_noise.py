@@ -48,8 +48,8 @@ class SolvedNorms:
 
     def covariance(self, dof: int) -> Array:
         """Second moment (k, k) about the solution: of the noise, with Student's factor for k = 2, and the step to the fit."""
-        found = student(dof) ** 2 * self._level(dof) * self.inverse + np.outer(self.step, self.step)
-        return found / np.outer(self.size, self.size)
+        moment = student(dof) ** 2 * self._level(dof) * self.inverse + np.outer(self.step, self.step)
+        return moment / np.outer(self.size, self.size)
 
     def _level(self, dof: int) -> float:
         """Variance of the whitened residuals."""
@@ -81,7 +81,7 @@ class SolvedNorms:
         mean = float(share @ common)
         used = np.any(self.whiten != 0.0, axis=-1)
         root = self.whiten[np.ix_(used, used)]
-        found = np.zeros(3)
+        squares = np.zeros(3)
         for axis, place in enumerate(places):
             # the norm of a dwell shows the wander of an axis as far as the force points along it
             shown = -gain[place] @ (direction * common[:, None])
@@ -91,5 +91,5 @@ class SolvedNorms:
                 - 2.0 * float(response[axis] @ shown)
                 + mean * float(response[axis] @ response[axis])
             )
-            found[axis] = level * max(square, 0.0)
-        return found
+            squares[axis] = level * max(square, 0.0)
+        return squares

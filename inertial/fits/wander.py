@@ -148,7 +148,7 @@ def fit_lot_with_wander(
     wide = np.sqrt(solved.variance * stretch)[..., None] * level
     known = _known(series, shares, solved)
     left = _ResidualCovariance(columns.local, shared, solved, covariance, there)
-    found = replace(
+    weighted = replace(
         plain,
         coefficients=theta,
         covariance=_covariance(shared[..., there, :], solved) * (known * wide[..., None]) ** 2,
@@ -158,7 +158,7 @@ def fit_lot_with_wander(
         chi2=solved.squares / solved.variance,
     )
     return WanderFit(
-        fit=found,
+        fit=weighted,
         white=float(np.sqrt(solved.variance)),
         flicker_share=shares[0],
         walk_share=shares[1],

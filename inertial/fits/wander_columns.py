@@ -71,8 +71,8 @@ class LotColumns:
     def errors(self, solved: Solved) -> dict[str, dict[str, float]]:
         """Standard errors of the nonlinear parameters that were given; the largest where axes differ."""
         spread = np.sqrt(solved.variance * np.diagonal(solved.shared_inverse))[self.station :]
-        found: dict[str, dict[str, float]] = {}
+        largest: dict[str, dict[str, float]] = {}
         for (effect, name, _), one in zip(self._free, spread.tolist(), strict=True):
-            own = found.setdefault(effect, {})
+            own = largest.setdefault(effect, {})
             own[name] = max(own.get(name, 0.0), one)
-        return found
+        return largest

@@ -195,19 +195,19 @@ def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:
 
 def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
     """The command that judges the model with the suggested formula, without a model file."""
-    found = document["offer"]
-    formula = f"{found['id']}={'; '.join(found['columns'])}"
-    effects = ",".join([*document["effects"], found["id"]])
+    offer = document["offer"]
+    formula = f"{offer['id']}={'; '.join(offer['columns'])}"
+    effects = ",".join([*document["effects"], offer["id"]])
     return command_line("diagnose", data.source, "--effects", effects, "--formula", formula, *data.options)
 
 
 def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
-    found = document["unexplained"]
-    if not found:
+    unexplained = document["unexplained"]
+    if not unexplained:
         return
     out.print(
-        f"\nSignificant, but of unknown cause: the error follows {found['driver']} as a {found['shape']} "
-        f"(p {equal(found['p_value'])}).",
+        f"\nSignificant, but of unknown cause: the error follows {unexplained['driver']} as a {unexplained['shape']} "
+        f"(p {equal(unexplained['p_value'])}).",
         markup=False,
         soft_wrap=True,
     )
