@@ -8,6 +8,8 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
 export DO_NOT_TRACK = 1
+# empty: the tests start some hundred processes, whose modules and assertions are compiled once and kept
+export PYTHONDONTWRITEBYTECODE =
 
 .PHONY: run test help check lint types layers pytest test-slow debian clean locks bench release docs
 

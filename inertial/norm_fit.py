@@ -10,14 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from inertial import design
 from inertial.correction import correct
 from inertial.design import Values
 from inertial.errors import NotIdentified
 from inertial.fits.linear import LotFit, response_matrix
-from inertial.fits.wander import student
+from inertial.norm_noise import PlausibleNoise, SolvedNorms
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -26,19 +25,6 @@ _STEPS, _HALVINGS = 40, 12
 _SETTLED = 1e-10  # share of the cost that a step no longer takes off
 _SINGULAR = 1e-6  # smallest singular value of the whitened columns of unit length, over the largest
 _STEP = 1e-3  # relative, for the derivative by a nonlinear parameter
-
-
-@dataclass(frozen=True)
-class PlausibleNoise:
-    """A noise that the residuals of a norm fit do not rule out.
-
-    weight : of all of them, which add up to one
-    whiten : as in :func:`fit_norms`; slow : (units, n, n), covariance of the wander of one axis between the dwells, g²
-    """
-
-    weight: float
-    whiten: Array
-    slow: Array
 
 
 @dataclass(frozen=True)
@@ -162,8 +148,8 @@ class _Work:
 
     def cost(self, theta: Array) -> Array:
         """Whitened sum of squares, (units,)."""
-        found = np.sum(self.white(self.left(theta)[..., None]) ** 2, axis=(-2, -1))
-        return np.where(np.isfinite(found), found, np.inf)
+        squares = np.sum(self.white(self.left(theta)[..., None]) ** 2, axis=(-2, -1))
+        return np.where(np.isfinite(squares), squares, np.inf)
 
     def rows(self, theta: Array) -> tuple[Array, Array]:
         """Derivatives of the residuals by the free coefficients, (units, n, k), and by the nonlinear parameters."""
@@ -263,15 +249,15 @@ class _Work:
         direction = force / np.linalg.norm(force, axis=-1, keepdims=True)
         response = response_matrix(theta, self.names)
         for unit in range(len(theta)):
-            noises = [_Solved(every[unit], left[unit], one.weight, one.whiten[unit], 1.0) for one in plausible]
-            noises = noises or [_Solved(every[unit], left[unit], 1.0, self.whiten[unit])]
+            noises = [SolvedNorms(every[unit], left[unit], one.weight, one.whiten[unit], 1.0) for one in plausible]
+            noises = noises or [SolvedNorms(every[unit], left[unit], 1.0, self.whiten[unit])]
             whole = np.sum([one.weight * one.covariance(int(dof[unit])) for one in noises], axis=0)
             together[unit] = whole[:free, :free]
             if record is not None:
                 share = used[unit] * (1.0 if weights is None else np.nan_to_num(weights[unit]))
                 share = share if share.sum() > 0.0 else used[unit].astype(np.float64)
                 own = [self._bias_place(axis) for axis in range(3)]
-                gain = _Solved(every[unit], left[unit], 1.0, self.whiten[unit]).gain
+                gain = SolvedNorms(every[unit], left[unit], 1.0, self.whiten[unit]).gain
                 square = [
                     one.weight
                     * one.of_record(own, direction[unit], other.slow[unit], share, response[unit], int(dof[unit]), gain)
@@ -305,76 +291,6 @@ class _Work:
         """Place of the bias of an axis among the free coefficients."""
         column = [effect for effect, _ in self.names[axis]].index("bias")
         return int(np.flatnonzero((np.argwhere(self.free) == (axis, column)).all(axis=1))[0])
-
-
-class _Solved:
-    """The linear fit of one unit about its solution, under one noise.
-
-    Parameters
-    ----------
-    rows : (n, k), derivatives of the residuals; left : (n,), residuals
-    whiten : (n, n) or (n,), of the noise; least : smallest variance of the whitened residuals
-    """
-
-    def __init__(self, rows: Array, left: Array, weight: float, whiten: Array, least: float = 0.0) -> None:
-        self.weight, self.least, self.whiten = weight, least, whiten
-        white = whiten[:, None] * rows if whiten.ndim == 1 else whiten @ rows
-        rest = whiten * left if whiten.ndim == 1 else whiten @ left
-        size = np.linalg.norm(white, axis=0)
-        self.size = np.where(size > 0.0, size, 1.0)
-        unit = white / self.size
-        self.inverse = np.linalg.pinv(unit.T @ unit, rcond=1e-13)
-        self.step = self.inverse @ (unit.T @ rest)
-        self.chi2 = max(float(rest @ rest - self.step @ (unit.T @ rest)), 0.0)
-        self.gain = self.inverse @ (unit.T * whiten if whiten.ndim == 1 else unit.T @ whiten) / self.size[:, None]
-
-    def covariance(self, dof: int) -> Array:
-        """Second moment (k, k) about the solution: of the noise, with Student's factor for k = 2, and the step to the fit."""
-        found = student(dof) ** 2 * self._level(dof) * self.inverse + np.outer(self.step, self.step)
-        return found / np.outer(self.size, self.size)
-
-    def _level(self, dof: int) -> float:
-        """Variance of the whitened residuals."""
-        return max(self.chi2 / dof, self.least)
-
-    def of_record(
-        self,
-        places: Sequence[int],
-        direction: Array,
-        slow: Array,
-        share: Array,
-        response: Array,
-        dof: int,
-        gain: Array,
-    ) -> Array:
-        """Mean square error (3,), under this noise, of the bias of a fit as that of its record, the mean wander included.
-
-        The bias of one noise's own fit is another quantity than that of another's: at the first dwell, or about the mean. The
-        steps between them are no error of the record.
-
-        Parameters
-        ----------
-        places : of the bias of each axis among the coefficients; share : (n,), of each dwell in the mean
-        gain : (k, n), of the fit whose bias is stated
-        """
-        share = share / share.sum()
-        level = student(dof) ** 2 * self._level(dof)
-        common = slow @ share  # of the wander of an axis at each dwell with its mean
-        mean = float(share @ common)
-        used = np.any(self.whiten != 0.0, axis=-1)
-        root = self.whiten[np.ix_(used, used)]
-        found = np.zeros(3)
-        for axis, place in enumerate(places):
-            # the norm of a dwell shows the wander of an axis as far as the force points along it
-            shown = -gain[place] @ (direction * common[:, None])
-            noise = solve_triangular(root.T, gain[place, used])
-            square = (
-                float(noise @ noise)
-                - 2.0 * float(response[axis] @ shown)
-                + mean * float(response[axis] @ response[axis])
-            )
-            found[axis] = level * max(square, 0.0)
-        return found
 
 
 def is_free(axis: int, pair: tuple[str, str]) -> bool:

@@ -1,6 +1,10 @@
 """A capture without a station: physics of a lot in a few lines, deterministic per record, with faults on request."""
 
+import os
+import shutil
+import tempfile
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +13,7 @@ import pandas as pd
 
 from inertial.frames import force_from_angles
 from pipelines.archive import Archive, Records, Run
+from pipelines.archive.signatures import key_place
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job, Request
@@ -186,8 +191,41 @@ def small_job(folder: Path, *changes: tuple[str, str], **request: Any) -> Job:
 
 
 def small_run(folder: Path, faults: dict[str, str] | None = None, *changes: tuple[str, str]) -> Run:
-    """A run of the small recipe in an archive of its own, done but for its report."""
-    runner = Runner(small_job(folder, *changes), Archive(folder / "archive"), measure=CaptureDouble(faults or {}))
+    """A run of the small recipe in an archive of its own, done but for its report.
+
+    Each kind is made once per process and copied afterwards, which is ten times faster. A folder that has an archive already,
+    or a test with a signing key, gets a run that is made there.
+    """
+    faults, root = faults or {}, folder / "archive"
+    if root.exists() or key_place() is not None:
+        return _made(folder, faults, changes)
+    recipe_file(folder, *changes)  # it stands beside the archive
+    run = _kept(tuple(sorted(faults.items())), changes)
+    shutil.copytree(str(run.archive.root), root)
+    return Archive(root).run(run.id)
+
+
+def finished_run(folder: Path, *changes: tuple[str, str]) -> Run:
+    """A run of the small recipe in an archive of its own, with its report."""
+    run = small_run(folder, None, *changes)
+    Runner(small_job(folder, *changes), Archive(folder / "archive"), measure=CaptureDouble()).stage(ORDER[-1])
+    return run
+
+
+@cache
+def _kept(faults: tuple[tuple[str, str], ...], changes: tuple[tuple[str, str], ...]) -> Run:
+    """The run that others of its kind are copies of."""
+    return _made(Path(tempfile.mkdtemp(prefix="run-", dir=_kept_folder().name)), dict(faults), changes)
+
+
+@cache
+def _kept_folder() -> tempfile.TemporaryDirectory[str]:
+    """A folder that lasts as long as this process."""
+    return tempfile.TemporaryDirectory(prefix=f"tumbleline-{os.getpid()}-", ignore_cleanup_errors=True)
+
+
+def _made(folder: Path, faults: dict[str, str], changes: tuple[tuple[str, str], ...]) -> Run:
+    runner = Runner(small_job(folder, *changes), Archive(folder / "archive"), measure=CaptureDouble(faults))
     for stage in ORDER[:-1]:
         runner.stage(stage)
     return runner.run

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from pipelines.cli.evidence_text import print_evidence
 from pipelines.cli.next_commands import command_line, print_extension, print_next
 from pipelines.cli.options import console, print_table, short, short_values
-from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
+from pipelines.cli.verdict_text import STYLE_OF, chance, equal, verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from rich.console import Console
@@ -22,8 +22,6 @@ BAD_DWELL = "bad_dwell"
 HIDDEN, SHOWN = 3.0, 4
 """Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
 listed."""
-STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
-"""Style of a verdict; None: it cannot be judged."""
 
 
 def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: Path | None) -> None:
@@ -119,70 +117,6 @@ def symbol_of(name: str) -> str:
     return effects.get(name).symbol if name in effects.catalogue() or ":" in name else "a single dwell"
 
 
-def verdict(document: dict[str, Any]) -> str:
-    """The verdict in one sentence with its numbers."""
-    error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
-    if error["rms_ug"] is None:
-        return (
-            f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; correct the faults, then judge the model."
-        )
-    judged = {"adequate": document["adequate"], "reason": document.get("reason"), **error}
-    told = plain_verdict({**judged, "units": len(document["units"]) - len(faulty)})
-    if document["adequate"] is not False:
-        return f"{told}."
-    spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
-    named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
-    if spoilt:
-        rest = f"; also missing: {', and '.join(named)}" if named else ""
-        return f"{told}; the data: {'; '.join(spoilt)}{rest}."
-    if named:
-        return f"{told}; missing: {', and '.join(named)}."
-    driver = (document["unexplained"] or {}).get("driver")
-    rest = "no recorded quantity explains the residual"
-    if driver:
-        rest = f"the residual follows {driver}, and no effect of the catalogue explains it"
-    return f"{told}; {rest}."
-
-
-def plain_verdict(judged: Mapping[str, Any]) -> str:
-    """The verdict with residual, noise and probability, without a full stop.
-
-    Parameters
-    ----------
-    judged : ``adequate``, ``reason``, ``rms_ug``, ``floor_ug``, ``p_value`` and ``units``, the number of units that were judged
-    """
-    if judged["adequate"] is None:
-        return f"CANNOT BE JUDGED: {judged['reason']}"
-    units = judged["units"]
-    left = f"residual {short(judged['rms_ug'])} µg rms over {units} unit{'s' if units != 1 else ''}"
-    left += f"; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
-    if judged["adequate"]:
-        return f"ADEQUATE: {left}"
-    return f"NOT ADEQUATE: {left}{f'; {SMALL_MISFIT}' if is_small(judged) else ''}"
-
-
-def class_text(group: dict[str, Any]) -> str:
-    """A handling error with its unit and first dwell, and the effects that explain the data equally well."""
-    units, dwells = group.get("units") or [], group.get("dwells") or []
-    where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
-    return f"{' or '.join(group['effects'])} ({where})"
-
-
-def chance(p: float | None) -> str:
-    """A probability for people."""
-    if p is None:
-        return ""
-    if p <= 1e-299:
-        return "< 1e-299"
-    return short(p, 2) if p > 1e-3 else f"{p:.0e}"
-
-
-def equal(p: float) -> str:
-    """A probability with its sign: equal, or below the smallest value that is printed."""
-    text = chance(p)
-    return text if text.startswith("<") else f"= {text}"
-
-
 def _faults(faults: list[dict[str, Any]]) -> None:
     if faults:
         lines = [[f["fault"], ", ".join(f["units"]), _numbers(f["dwells"]), f["evidence"]] for f in faults]
@@ -261,19 +195,19 @@ def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:
 
 def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
     """The command that judges the model with the suggested formula, without a model file."""
-    found = document["offer"]
-    formula = f"{found['id']}={'; '.join(found['columns'])}"
-    effects = ",".join([*document["effects"], found["id"]])
+    offer = document["offer"]
+    formula = f"{offer['id']}={'; '.join(offer['columns'])}"
+    effects = ",".join([*document["effects"], offer["id"]])
     return command_line("diagnose", data.source, "--effects", effects, "--formula", formula, *data.options)
 
 
 def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, model: Path | None) -> None:
-    found = document["unexplained"]
-    if not found:
+    unexplained = document["unexplained"]
+    if not unexplained:
         return
     out.print(
-        f"\nSignificant, but of unknown cause: the error follows {found['driver']} as a {found['shape']} "
-        f"(p {equal(found['p_value'])}).",
+        f"\nSignificant, but of unknown cause: the error follows {unexplained['driver']} as a {unexplained['shape']} "
+        f"(p {equal(unexplained['p_value'])}).",
         markup=False,
         soft_wrap=True,
     )

@@ -28,7 +28,7 @@ def print_heading(text: str, *, quiet: bool) -> None:
 
 def print_verdict(document: dict[str, Any]) -> None:
     """Print the verdict of a diagnosis."""
-    from pipelines.cli.diagnosis_text import STYLE_OF, verdict
+    from pipelines.cli.verdict_text import STYLE_OF, verdict
 
     console().print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
 

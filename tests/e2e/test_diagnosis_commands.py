@@ -12,6 +12,8 @@ from pydantic import TypeAdapter
 from inertial import effects
 from pipelines.cli import main
 from pipelines.cli.documents.models import DemoDocument
+from pipelines.demo.measure import DemoLot, measure
+from pipelines.demo.scenes import scene
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
 
@@ -303,12 +305,22 @@ def test_the_report_is_one_file_that_needs_no_network(command, cubic, tmp_path):
     assert not re.search(r'(src|href)="(https?:)?//', outside)
 
 
-def test_the_demonstration_finds_what_it_hid(command, tmp_path):
+@pytest.fixture(scope="module")
+def measured() -> DemoLot:
+    """What the demonstration measures with a cubic transfer hidden, for the tests that play it."""
+    return measure(scene("cubic_transfer", 7), 7)
+
+
+@pytest.mark.usefixtures("no_pictures_here")  # those of a diagnosis are looked at above
+def test_the_demonstration_finds_what_it_hid(command, measured, monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr("pipelines.demo.measure.measure", lambda *which: asked.append(which[:2]) or measured)
     status, out, _ = command(
         "demo", "--effect", "cubic_transfer", "--seed", "7", "--json", "--folder", tmp_path / "game"
     )
     document = TypeAdapter(DemoDocument).validate_json(out, extra="forbid")
     assert status == 0
+    assert asked == [(scene("cubic_transfer", 7), 7)]
     assert document["hidden"]["effect"] == "third_order"
     assert document["found"] is True
     assert document["added"] == ["third_order"]
@@ -347,6 +359,7 @@ def test_a_run_of_the_archive_brings_its_own_history(command, tmp_path):
     assert (status, "no run is called 'no-such-run'" in err) == (2, True)
 
 
+@pytest.mark.usefixtures("no_pictures_here")
 def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(command, tmp_path):
     from capture_double import small_run
 
@@ -372,11 +385,13 @@ def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(command, tmp_pat
     assert "curl" in out
 
 
-def test_a_player_may_add_something_else(command, monkeypatch, tmp_path):
+@pytest.mark.usefixtures("no_pictures_here")
+def test_a_player_may_add_something_else(command, measured, monkeypatch, tmp_path):
     import io
 
+    monkeypatch.setattr("pipelines.demo.measure.measure", lambda *_: measured)
     monkeypatch.setattr(sys, "stdin", io.StringIO("\n\nfifth_order\n\n\n\n\n"))
-    status, out, err = command("demo", "--effect", "cubic_transfer", "--seed", "3", "--folder", tmp_path / "game")
+    status, out, err = command("demo", "--effect", "cubic_transfer", "--seed", "7", "--folder", tmp_path / "game")
     assert status == 0, err
     assert "a spring that hardens" in out
     assert "Found." in out

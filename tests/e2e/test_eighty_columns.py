@@ -10,14 +10,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import finished_run
 from test_next_lines import MODEL
 
-from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
-from pipelines.chain.runner import Runner
 from pipelines.cli import COMMANDS, main
 
+pytestmark = pytest.mark.usefixtures("no_pictures")  # what a command prints is looked at, not what it draws
 WIDE = 80
 OUTPUTS = {
     "list": ["list"],
@@ -85,7 +84,7 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "m.toml").write_text(MODEL, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(VARIABLE, "")
-        list(Runner(small_job(place), Archive(place / "archive"), measure=CaptureDouble()).all())
+        finished_run(place)
     return place
 
 

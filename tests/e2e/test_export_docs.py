@@ -5,12 +5,10 @@ import shlex
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import finished_run
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
-from pipelines.chain.runner import Runner
 from pipelines.cli import app
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -29,7 +27,7 @@ def test_the_guide_to_exports_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.setenv("TUMBLELINE_ARCHIVE", "archive")
-    list(Runner(small_job(tmp_path), Archive("archive"), measure=CaptureDouble()).all())
+    finished_run(tmp_path)
     assert len(EXAMPLES) == 4
     for command, _, printed in EXAMPLES:
         done = CliRunner().invoke(app, shlex.split(command)[1:])
@@ -45,7 +43,7 @@ def test_the_guide_to_exports_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_files_of_several_units_need_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(VARIABLE, "")
-    list(Runner(small_job(tmp_path), Archive("archive"), measure=CaptureDouble()).all())
+    finished_run(tmp_path)
     words = ["export", "latest", "--format", "ardupilot", "--nominal", "256000"]
     done = CliRunner().invoke(app, words)
     assert "3 units, each needs a file of its own" in str(done.exception)

@@ -2,14 +2,14 @@
 
 import hashlib
 import json
-import os
 import re
 import shlex
 import subprocess
-import sys
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
+from in_process import command
 
 from pipelines.importers.exchange import read_dwells
 
@@ -21,24 +21,18 @@ TUMBLE, CHAMBER = (
 )
 
 
-def run(command: str, data: Path, archive: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    words = shlex.split(command.replace("$DATA", str(data)))
+def run(line: str, data: Path, archive: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    words = shlex.split(line.replace("$DATA", str(data)))
     assert words[0] == "tumbleline"
     place = () if words[1] == "inspect" else ("--archive", str(archive))
-    return subprocess.run(
-        [sys.executable, "-m", "pipelines.cli", *words[1:], *place, *more],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        env={**os.environ, "COLUMNS": "200", "OMP_NUM_THREADS": "1"},
-        check=False,
-    )
+    with chdir(ROOT):
+        return command([*words[1:], *place, *more])
 
 
-@pytest.mark.parametrize(("command", "printed"), [(c, p) for c, _, p in EXAMPLES], ids=range(len(EXAMPLES)))
-def test_an_example_prints_what_the_guide_says(command: str, printed: str, shared_data: Path, tmp_path: Path) -> None:
-    pytest.importorskip("idelib" if ".ide " in command else "numpy")
-    done = run(command, shared_data, tmp_path / "archive")
+@pytest.mark.parametrize(("line", "printed"), [(c, p) for c, _, p in EXAMPLES], ids=range(len(EXAMPLES)))
+def test_an_example_prints_what_the_guide_says(line: str, printed: str, shared_data: Path, tmp_path: Path) -> None:
+    pytest.importorskip("idelib" if ".ide " in line else "numpy")
+    done = run(line, shared_data, tmp_path / "archive")
     assert done.stderr == ""
     assert done.returncode == (1 if "NOT ADEQUATE" in printed else 0)
     expected = re.escape(printed.strip()).replace("…", "[0-9a-f]+")
@@ -70,8 +64,8 @@ def test_the_mapping_file_of_the_guide_does_the_same(
     (content,) = (block for block in re.findall(r"```toml\n(.*?)```", GUIDE, flags=re.DOTALL) if "[columns]" in block)
     file = tmp_path / "mapping.toml"
     file.write_text(content, encoding="utf-8")
-    command = f"tumbleline import $DATA/xsens-tumble/xsens_acc.mat.gz --mapping {file} --fit norm --json"
-    document = json.loads(run(command, shared_data, tmp_path / "archive").stdout)
+    line = f"tumbleline import $DATA/xsens-tumble/xsens_acc.mat.gz --mapping {file} --fit norm --json"
+    document = json.loads(run(line, shared_data, tmp_path / "archive").stdout)
     by_options, _ = tumble
     assert document == by_options
 

@@ -5,13 +5,13 @@ import shlex
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import finished_run
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
-from pipelines.chain.runner import Runner
 from pipelines.cli import app
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SHEET = (DOCS / "tutorial" / "from-a-spreadsheet.md").read_text(encoding="utf-8")
@@ -61,7 +61,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("line")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(VARIABLE, "")
-        list(Runner(small_job(folder), Archive(folder / "archive"), measure=CaptureDouble()).all())
+        finished_run(folder)
     return folder
 
 

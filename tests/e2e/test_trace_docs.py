@@ -5,12 +5,10 @@ import shlex
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import finished_run
 from typer.testing import CliRunner
 
-from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
-from pipelines.chain.runner import Runner
 from pipelines.cli import app
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -31,9 +29,8 @@ def test_the_guide_tells_what_its_commands_print(tmp_path: Path, monkeypatch: py
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.setenv("TUMBLELINE_ARCHIVE", "archive")
-    runner = Runner(small_job(tmp_path), Archive("archive"), measure=CaptureDouble())
-    list(runner.all())
-    (tmp_path / "sent-by-mail.parquet").write_bytes((runner.run.path / "grades.parquet").read_bytes())
+    run = finished_run(tmp_path)
+    (tmp_path / "sent-by-mail.parquet").write_bytes((run.path / "grades.parquet").read_bytes())
     assert len(EXAMPLES) == 8
     for command, _, printed in EXAMPLES:
         done = CliRunner().invoke(app, shlex.split(command)[1:])
@@ -54,9 +51,7 @@ def test_the_guide_tells_what_its_commands_print(tmp_path: Path, monkeypatch: py
 def test_the_reference_names_every_place_and_key_of_an_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "")
     page = (ROOT / "docs" / "reference" / "archive.md").read_text(encoding="utf-8")
-    runner = Runner(small_job(tmp_path), Archive(tmp_path / "archive"), measure=CaptureDouble())
-    list(runner.all())
-    keys = runner.run.manifest("coefficients").keys() | {"signature", "taken_from"}
+    keys = finished_run(tmp_path).manifest("coefficients").keys() | {"signature", "taken_from"}
     assert {key for key in keys if f"`{key}`" not in page} == set()
     top = {path.name for path in (tmp_path / "archive").iterdir() if path.is_dir()}
     assert {name for name in top if f"`{name}/" not in page} == set()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, PulledPlug, small_job
+from capture_double import CaptureDouble, PulledPlug, finished_run, small_job
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run, files
@@ -19,17 +19,16 @@ from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.integrity import Report, seals, verify
 from schemas.errors import ArchiveUnusable, WrongUse
+from schemas.event import Event
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
 
 def make(folder: Path) -> Path:
     """An archive with a finished run, certified, one unit of it revoked."""
-    archive = Archive(folder / "archive")
-    runner = Runner(small_job(folder), archive, measure=CaptureDouble())
-    list(runner.all())
-    ledger = Ledger(archive)
-    certify(ledger, runner.run)
+    run = finished_run(folder)
+    ledger = Ledger(Archive(folder / "archive"))
+    certify(ledger, run)
     ledger.revoke("A2", "dropped")
     return folder / "archive"
 
@@ -323,15 +322,24 @@ def test_a_file_of_every_kind_that_was_changed_cut_or_taken_away_is_named(copy: 
     assert verified(copy).whole
 
 
-@pytest.mark.parametrize("change", ["edited", "removed", "added"])
-def test_the_journal_of_a_capture_is_held_against_its_end(tmp_path: Path, change: str) -> None:
-    from schemas.event import Event
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An archive whose capture has an event in its journal."""
+    folder = tmp_path_factory.mktemp("interrupted")
 
     def noting(job, records, progress) -> None:
         records.events.note(Event(1.0, "suspended", 3, "the door was open", "measured again"))
         CaptureDouble()(job, records, progress)
 
-    list(Runner(small_job(tmp_path), Archive(tmp_path / "archive"), measure=noting).all())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, "")
+        list(Runner(small_job(folder), Archive(folder / "archive"), measure=noting).all())
+    return folder / "archive"
+
+
+@pytest.mark.parametrize("change", ["edited", "removed", "added"])
+def test_the_journal_of_a_capture_is_held_against_its_end(interrupted: Path, tmp_path: Path, change: str) -> None:
+    shutil.copytree(interrupted, tmp_path / "archive")
     path = one(tmp_path / "archive", "captures/*/events/00000.json")
     if change == "edited":
         edit(path, lambda content: content.update(reason="nothing"))
@@ -365,14 +373,14 @@ def test_a_writer_that_is_at_work_is_not_accused(copy: Path) -> None:
 @pytest.mark.parametrize("marked", [True, False])
 def test_a_run_that_was_copied_here_is_named(copy: Path, tmp_path: Path, monkeypatch, *, marked: bool) -> None:
     monkeypatch.setattr(seals, "JUST_NOW", timedelta(0))
-    other = Runner(small_job(tmp_path, ("seed = 5", "seed = 6")), Archive(tmp_path / "b"), measure=CaptureDouble())
-    list(other.all())
-    shutil.copytree(other.run.path, copy / "runs" / other.run.id)
-    shutil.copytree(other.run.records.path, copy / "captures" / other.run.records.path.name)
+    (tmp_path / "b").mkdir()
+    other = finished_run(tmp_path / "b", ("seed = 5", "seed = 6"))
+    shutil.copytree(other.path, copy / "runs" / other.id)
+    shutil.copytree(other.records.path, copy / "captures" / other.records.path.name)
     if marked:
         assert [(f.kind, Path(f.path).name) for f in verified(copy).checked.findings] == [("edited", "sealed.json")]
         return
-    (copy / "runs" / other.run.id / "sealed.json").unlink()
+    (copy / "runs" / other.id / "sealed.json").unlink()
     assert [(f.kind, Path(f.path).name) for f in verified(copy).checked.findings] == [("unchained", "report.json")]
 
 
@@ -443,16 +451,21 @@ def test_who_did_not_sign_is_named(signed_copy: Path, tmp_path: Path, monkeypatc
     assert {("signature", "report.json"), ("signature", max(signed_copy.glob("chain/*/*.json")).name)} <= demanded
 
 
+@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["one of each", "each"])
 @pytest.mark.parametrize(
     "pattern",
     ["runs/*/dwells.json", "runs/*/sealed.json", "captures/*/00003/record.json", "captures/*/complete.json",
      "calibrations/*/*/000001.json", "chain/*/000000001.json"],
 )  # fmt: skip
-def test_an_entry_of_another_kind_in_a_manifest_is_found_and_stops_nothing(copy: Path, pattern: str) -> None:
+def test_an_entry_of_another_kind_in_a_manifest_is_found_and_stops_nothing(
+    copy: Path, pattern: str, *, every: bool
+) -> None:
+    """Every name with one of the kinds in turn; in the slow suite with each of them."""
     path = one(copy, pattern)
     data = path.read_bytes()
-    for name in json.loads(data):
-        for value in (5, None, "x", ["a"], {"a": 5}):
+    kinds = (5, None, "x", ["a"], {"a": 5})
+    for number, name in enumerate(json.loads(data)):
+        for value in kinds if every else kinds[number % len(kinds) :][:1]:
             path.write_bytes(files.json_bytes({**json.loads(data), name: value}))
             assert verified(copy).checked.findings, (name, value)
 

@@ -7,7 +7,7 @@ from benchmarks.recording_intervals import pulls
 from benchmarks.recordings import Recording, make
 from inertial.criticism.covariance import Shares
 from inertial.criticism.shares import plausible_shares
-from inertial.norm_fit import _Solved
+from inertial.norm_noise import SolvedNorms
 from pipelines.stages.norm_fit import bias_uncertainty, norms_fitted
 
 PLAIN = ("bias", "scale", "misalignment")
@@ -27,7 +27,7 @@ def test_the_average_over_one_noise_is_the_covariance_of_generalised_least_squar
     rows, left = rng.standard_normal((40, 3)), rng.standard_normal(40)
     root = np.linalg.cholesky(np.eye(40) + 0.5)
     whiten = np.linalg.inv(root)
-    own = _Solved(rows, left, 1.0, whiten)
+    own = SolvedNorms(rows, left, 1.0, whiten)
     inverse = np.linalg.inv(rows.T @ whiten.T @ whiten @ rows)
     step = inverse @ rows.T @ whiten.T @ whiten @ left
     rest = whiten @ (left - rows @ step)
@@ -48,7 +48,7 @@ def test_the_error_of_the_bias_of_a_record_is_that_of_a_simulation(rng: np.rando
     total = white**2 * np.eye(n) + slow * (direction @ direction.T)
     whiten = np.linalg.inv(np.linalg.cholesky(total))
     rows = np.column_stack([-direction, -(direction**2)])
-    own = _Solved(rows, whiten.T @ np.zeros(n), 1.0, whiten)
+    own = SolvedNorms(rows, whiten.T @ np.zeros(n), 1.0, whiten)
     own.chi2 = 1e9  # the variance is known
     stated = np.sqrt(own.of_record((0, 1, 2), direction, slow, np.ones(n), np.eye(3), 10**9, own.gain))
     root = np.linalg.cholesky(slow)

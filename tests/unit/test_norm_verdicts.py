@@ -9,7 +9,8 @@ from benchmarks.recordings import NOISES, Recording, make
 from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.norm_fit import fit_norms
 from inertial.probability import passes
-from pipelines.cli.diagnosis_text import _parameters_of, verdict
+from pipelines.cli.diagnosis_text import _parameters_of
+from pipelines.cli.verdict_text import verdict
 from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.stages.norm_fit import norms_fitted
