@@ -155,7 +155,7 @@ def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) 
             "hoverinfo": "skip",
         }  # fmt: skip
     if trace.style == "line":
-        line = {"color": colour, "width": 1.0 if not trace.name else 1.8, **({"dash": "dash"} if trace.dashed else {})}
+        line = {"color": colour, "width": trace.width or (1.0 if not trace.name else 1.8), **({"dash": "dash"} if trace.dashed else {})}
         return out | {"type": "scatter", "mode": "lines", "line": line, **({} if trace.name else {"hoverinfo": "skip"})}
     return out | _points(trace, colour)
 

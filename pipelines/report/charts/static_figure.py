@@ -117,7 +117,7 @@ def _points(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
 def _line(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
     del scale
     style = "--" if trace.dashed else "-"
-    width = 1.4 if trace.name else 0.7
+    width = trace.width or (1.4 if trace.name else 0.7)
     place.plot(trace.x, trace.y, style, color=ROLES[trace.role], linewidth=width, label=_label(trace), zorder=2)
 
 

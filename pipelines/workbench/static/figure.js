@@ -37,12 +37,31 @@ function dressed(layout, style) {
   return out;
 }
 
+// A figure that a click will need is requested with the page part that shows it, not after it.
+const comingFigures = new Map();
+const sameFigure = (address) => { const { pathname, searchParams } = new URL(address, location.href); searchParams.sort(); return `${pathname}?${searchParams}`; };
+const requested = (address) => fetch(address, { headers: { accept: "application/json" } });
+
+export function ahead(address) {
+  plotly().catch(() => {});
+  const answer = requested(address);
+  answer.catch(() => {});  // the figure asks again and says what is wrong
+  comingFigures.clear();
+  comingFigures.set(sameFigure(address), answer);
+}
+
+function answered(address) {
+  const key = sameFigure(address), coming = comingFigures.get(key);
+  comingFigures.delete(key);
+  return coming ? coming.catch(() => requested(address)) : requested(address);
+}
+
 export async function draw(place) {
   if (place.dataset.busy === place.dataset.figure) return;
   place.dataset.busy = place.dataset.figure;
   place.classList.add("waiting");
   try {
-    const [library, answer] = await Promise.all([plotly(), fetch(place.dataset.figure, { headers: { accept: "application/json" } })]);
+    const [library, answer] = await Promise.all([plotly(), answered(place.dataset.figure)]);
     const content = await answer.json();
     if (!answer.ok) throw new Error(content.problem || "the figure was not made");
     if (!place.isConnected) return;

@@ -103,9 +103,13 @@ def samples_chart(samples: pd.DataFrame, title: str, unit_text: str) -> Chart:
         values = samples[axis].to_numpy(float)
         mean = float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
         start = float(time[0]) if time.size else 0.0
+        shown = values[::step] - mean
+        # one line is drawn ten times as fast as a thousand points; beside a lost sample it would hide single ones
+        whole = bool(np.isfinite(shown).all())
         points = Trace(
-            f"axis {axis}", time[::step] - start, values[::step] - mean, role=cast("Role", axis), size=3, legend=False
-        )
+            f"axis {axis}", time[::step] - start, shown, "line" if whole else "points", cast("Role", axis), size=3,
+            width=0.8, legend=False,
+        )  # fmt: skip
         plots.append(
             Plot(
                 f"axis {axis}, mean {mean:.6g} {unit_text}",
