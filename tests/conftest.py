@@ -60,7 +60,5 @@ def no_error_of_a_server(request: pytest.FixtureRequest) -> Iterator[None]:
 def no_pictures() -> Iterator[None]:
     """Reports without drawn plots, for modules that make runs and look at no picture: plots are most of a run's time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pipelines.report.unit_panels.model.model_plots", lambda *_: "<svg/>")
-        patch.setattr("pipelines.report.unit_panels.model.check_plots", lambda *_: "<svg/>")
         patch.setattr("matplotlib.figure.Figure.savefig", lambda _, sink, **__: sink.write("<svg/>"))
         yield

@@ -16,11 +16,11 @@ from pipelines.report.charts import (
     Trace,
     csv_text,
     plotly_figure,
-    png_bytes,
     svg_text,
 )
 from pipelines.report.charts.chart import density
 from pipelines.report.charts.mollweide import project, sphere
+from pipelines.report.charts.static_figure import png_bytes
 
 
 def chart() -> Chart:
