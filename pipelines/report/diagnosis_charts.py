@@ -161,12 +161,9 @@ def _zero(x: Array) -> Trace:
 def _against(x: Array, y: Array, label: str, turned: NDArray[np.int64] | None, *, several: bool) -> Iterator[Trace]:
     """Points of one model, by the way the temperature was reached where that is known, and a smooth curve."""
     role = cast("Role", label)
-    whole: tuple[tuple[NDArray[np.bool_], Symbol, str], ...] = ((np.isfinite(y), "circle", ""),)
-    groups = (
-        whole
-        if turned is None
-        else tuple(((turned == sign) & np.isfinite(y), mark, name) for sign, mark, name in TURNS)
-    )
+    groups: list[tuple[NDArray[np.bool_], Symbol, str]] = [(np.isfinite(y), "circle", "")]
+    if turned is not None:
+        groups = [((turned == sign) & np.isfinite(y), mark, name) for sign, mark, name in TURNS]
     for rows, symbol, name in groups:
         words = [label] if several else []
         words += [name] if name else []

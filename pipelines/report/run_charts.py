@@ -154,9 +154,11 @@ def lot_chart(verification: pd.DataFrame, poses: pd.DataFrame, units: list[str],
     for position, unit in enumerate(units):
         own, dwells = poses[poses["unit"] == unit], verification[verification["unit"] == unit]
         names = own["pose"].tolist()
-        spread = dict(zip(names, np.linspace(-0.25, 0.25, len(names)) if len(names) > 1 else [0.0], strict=True))
-        single.append((position + dwells["pose"].map(spread).to_numpy(float), dwells["error_ug"].to_numpy(float)))
-        means.append((position + np.array([*spread.values()]), own["error_ug"].to_numpy(float)))
+        places = np.linspace(-0.25, 0.25, len(names)).tolist() if len(names) > 1 else [0.0]
+        spread = dict(zip(names, places, strict=True))
+        among = np.array([position + spread[pose] for pose in dwells["pose"]])
+        single.append((among, dwells["error_ug"].to_numpy(float)))
+        means.append((np.array([position + place for place in places]), own["error_ug"].to_numpy(float)))
         texts += [f"{unit}, pose {pose}: {value:.4g} µg" for pose, value in zip(names, own["error_ug"], strict=True)]
     x, y = _joined(means)
     beyond = np.abs(y) > limit_ug
