@@ -5,7 +5,7 @@ Written directly: a report has dozens of plots, and a drawing library takes a hu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -31,6 +31,7 @@ ROOM = 0.05  # of a range, on both sides of the values
 BAR = 84.0
 SPHERE_TOP = 26.0
 MOST_NAMES = 26
+LEGEND_MARK = 7.0  # as large for all, as Plotly has it
 GRID, FRAME, TEXT, QUIET = "#e4e4e4", "#8a8f98", "#1d1f23", "#55585f"
 
 
@@ -198,7 +199,7 @@ def _mark(trace: Trace) -> str:
         return f'<path d="M-9-5h18v10h-18z" fill="{colour}" fill-opacity=".25"/>'
     if trace.style == "bars":
         return f'<path d="M-5-5h10v10h-10z" fill="{colour}"/>'
-    return marks(np.zeros(1), np.zeros(1), trace, colour)
+    return marks(np.zeros(1), np.zeros(1), replace(trace, size=LEGEND_MARK), colour)
 
 
 def _legend_lines(names: list[tuple[str, str]]) -> list[list[tuple[float, str, str]]]:
