@@ -72,6 +72,4 @@ def no_pictures_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def leave_out_pictures(patch: pytest.MonkeyPatch) -> None:
     """Let every report be made without its plots until the patch is undone."""
-    patch.setattr("pipelines.report.unit_panels.model.model_plots", lambda *_: "<svg/>")
-    patch.setattr("pipelines.report.unit_panels.model.check_plots", lambda *_: "<svg/>")
     patch.setattr("matplotlib.figure.Figure.savefig", lambda _, sink, **__: sink.write("<svg/>"))

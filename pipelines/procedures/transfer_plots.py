@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter
 
 from inertial.dynamics.transfer_effects import Conditions
 from pipelines.procedures.wording import with_uncertainty
@@ -83,9 +82,9 @@ def draw_bode(drawing: Drawing, points: Points, found: TransferDiagnosis, cohere
     left.legend(frameon=False, loc="upper left", fontsize=8)
     for one in (size, phase, left, bond):
         one.minorticks_off()
-        one.xaxis.set_major_formatter(FuncFormatter(_plain))
+        one.xaxis.set_major_formatter(_plain)
     for one in (left, bond):
-        one.yaxis.set_major_formatter(FuncFormatter(_plain))
+        one.yaxis.set_major_formatter(_plain)
     empty.axis("off")
     added = [f"missing: {name}" for name in found.recommended]
     lines = [*added, *(_text(found, p.name, p.unit) for p in found.extended.parameters)]

@@ -8,7 +8,8 @@ import numpy as np
 
 from inertial import effects
 from inertial.criticism.handling import named as handled
-from pipelines.report.diagnosis_plots import driver_plots, model_plot, pose_maps
+from pipelines.report.diagnosis_charts import driver_chart, model_chart, pose_chart
+from pipelines.report.interactive import figure_of, interactive
 from pipelines.report.numbers import chance, equal, significant
 from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals
 from pipelines.report.templates import template
@@ -41,7 +42,7 @@ def render_diagnosis(
     """
     faulty = {unit for fault in document["blocked_by"] for unit in fault["units"]}
     sound = tuple(unit for unit in found.units if unit not in faulty)
-    return template("diagnosis.html").render(
+    page = template("diagnosis.html").render(
         source=source,
         document=document,
         coefficients=coefficients or [],
@@ -56,6 +57,7 @@ def render_diagnosis(
         chance=chance,
         equal=equal,
     )
+    return interactive(page)
 
 
 def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
@@ -99,9 +101,9 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
         "unit": left.unit,
         "several": len(units) > 1,
         "added": left.before is not left.after,
-        "model": model_plot(left, lot.state, lot.output, MICRO * diagnosis.floor),
-        "maps": pose_maps(left, lot.state) if _poses(lot.state.force) >= FEWEST_POSES else "",
-        "drivers": driver_plots(left, drivers, lot.state.temperature) if drivers else "",
+        "model": figure_of(model_chart(left, lot.state, lot.output, MICRO * diagnosis.floor)),
+        "maps": figure_of(pose_chart(left, lot.state)) if _poses(lot.state.force) >= FEWEST_POSES else "",
+        "drivers": figure_of(driver_chart(left, drivers, lot.state.temperature)) if drivers else "",
     }
 
 

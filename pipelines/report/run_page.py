@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.report.context import ReportContext
+from pipelines.report.interactive import interactive
 from pipelines.report.panel import rendered
 from pipelines.report.templates import template
 
@@ -25,4 +26,4 @@ def render(run: Run, certificates: Mapping[str, Stated] | None = None) -> str:
     certificates : of the run's units, in their present state in the ledger.
     """
     panels = rendered(PANELS, ReportContext(run, certificates or {}))
-    return template("page.html").render(run=run.id, panels=panels)
+    return interactive(template("page.html").render(run=run.id, panels=panels))

@@ -10,6 +10,7 @@ from typing import Any
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 
 from inertial import effects
+from pipelines.report.interactive import scripts_hash
 from pipelines.stages.figures import FIGURES
 
 
@@ -42,9 +43,10 @@ def template(name: str) -> Template:
 
 @cache
 def page_hash() -> str:
-    """SHA-256 of the template and the style of the page of a run."""
+    """SHA-256 of the template, the style and the scripts of the page of a run."""
     folder = files("pipelines.report")
-    return sha256(b"".join((folder / name).read_bytes() for name in ("page.html", "style.css"))).hexdigest()
+    parts = [(folder / name).read_bytes() for name in ("page.html", "style.css")]
+    return sha256(b"".join([*parts, scripts_hash().encode()])).hexdigest()
 
 
 def fill(text: str, **values: Any) -> str:

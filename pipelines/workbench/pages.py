@@ -17,7 +17,8 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from pipelines.archive import Archive
-from pipelines.report.charts import csv_text, plotly_figure, png_bytes
+from pipelines.report.charts import csv_text, plotly_figure
+from pipelines.report.charts.static_figure import png_bytes
 from pipelines.report.numbers import significant
 from pipelines.report.reasons import plain_reason
 from pipelines.workbench.services.index import RecentIndex
@@ -163,7 +164,8 @@ def _table(archive: str, run: str, name: str, when: int) -> pd.DataFrame:
 def static_version() -> str:
     """Part of the addresses of scripts and styles that changes with their content, so that browsers can cache them."""
     digest = hashlib.sha256()
-    for place in sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda one: one.name):
+    shared = files("pipelines.report.charts") / "paint.js"
+    for place in (*sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda one: one.name), shared):
         if place.is_file():
             digest.update(place.name.encode() + place.read_bytes())
     return digest.hexdigest()[:12]

@@ -55,6 +55,7 @@ def test_the_recipe_that_is_written_is_what_was_told(found):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # a whole run of the recipe that was found
 def test_the_line_after_a_search_measures_the_new_recipe(tmp_path):
     target = tmp_path / "my new recipe.toml"
     base = ["plan", "optimise", "--device", "analogue", "--effects", THERMAL, "--factor", "4", "-o", str(target)]

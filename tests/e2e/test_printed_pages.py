@@ -4,6 +4,7 @@ import contextlib
 import io
 import re
 import shlex
+import shutil
 import sys
 from pathlib import Path
 
@@ -104,24 +105,44 @@ def test_the_main_job_prints_what_the_readme_shows(tmp_path: Path, monkeypatch) 
     words = " ".join(re.sub(r"[─\s]+", " ", re.sub(r"production-\w+", "RUN", out)).split())
     wanted = pattern(re.sub(r"production-\w+", "RUN", block[1]))
     assert re.search(wanted, words), words
-    shown = dict(outputs(ROOT / "README.md"))
-    compared("tumbleline diagnose latest", shown["tumbleline diagnose latest"])
+    verdict = re.search(r"^model +(.*)$", block[1], flags=re.MULTILINE)
+    assert verdict is not None
+    compared("tumbleline diagnose latest", verdict[1])  # the command that the run names says the same
 
 
 @pytest.mark.slow
 def test_a_certificate_is_told_as_its_guide_shows(tmp_path: Path, monkeypatch) -> None:
     pytest.importorskip("typst")
     from capture_double import finished_run
+    from cryptography.hazmat.primitives.asymmetric import ec
+    from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, Encoding
+    from cryptography.hazmat.primitives.serialization.pkcs12 import serialize_key_and_certificates
+    from signing_keys import made_key
 
     from pipelines.archive.signatures import VARIABLE
 
     page = ROOT / "docs" / "how-to" / "issue-a-certificate.md"
-    (command, printed), (checked, _) = outputs(page)
-    assert checked.startswith("tumbleline verify ")  # its file is signed, which this one is not
+    shown = outputs(page)
+    assert [command.split()[1] for command, _ in shown] == ["certificate", "verify"]
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(VARIABLE, "")
     finished_run(tmp_path)
     laboratory = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)[0]
     Path("laboratory.toml").write_text(laboratory, encoding="utf-8")
     assert given("tumbleline certify latest")[0] == 0
-    compared(command, printed)
+    compared(*shown[0])
+    (signed,) = re.findall(
+        r"^\$ (tumbleline certificate .*--sign-with.*)$", page.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    key = made_key(ec.generate_private_key(ec.SECP256R1()))
+    locked = serialize_key_and_certificates(b"key", key.key, key.certificate, None, BestAvailableEncryption(b"secret"))
+    Path("laboratory.p12").write_bytes(locked)
+    Path("password").write_text("secret\n", encoding="utf-8")
+    Path("laboratory.pem").write_bytes(key.certificate.public_bytes(Encoding.PEM))
+    status, _, err = given(signed)
+    assert status == 0, err
+    Path("received").mkdir()
+    for name in ("A1_1.pdf", "laboratory.pem"):
+        shutil.copy(name, "received")
+    monkeypatch.chdir("received")  # where no archive is
+    compared(*shown[1])

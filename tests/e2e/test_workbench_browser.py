@@ -241,11 +241,16 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
     run = next(path.name for path in (bench.archive / "runs").iterdir() if path.name.startswith("small-"))
     with tab(browser, bench.address) as one:
         one.open(f"/unit?run={run}&unit=A1&against=force")  # the latest run is that of another test
+        asked: list[str] = []
+        one.page.on("request", lambda request: asked.append(request.url))
         with one.page.expect_response(lambda answer: "/unit?" in answer.url) as part:
             one.click_point("residuals", 0, 3)
         assert 0 < len(part.value.body()) < 3000  # the samples alone, not the page with its tables
         until(lambda: "dwell=A1" in one.page.evaluate("() => location.href"), "the dwell is in the address")
         one.sees("[data-name='samples'][data-drawn]")
+        assert (
+            len([url for url in asked if "/figure/samples.json" in url]) == 1
+        )  # with the part, and not again after it
         drawn = one.page.evaluate("() => document.querySelector('[data-name=samples]')._fullData[0].x.length")
         assert drawn >= 100  # a dwell of 1 s at 100 Hz
         for word in ("hare", "loud", "Send"):  # "Share chart…" would send the data to the maker of the library

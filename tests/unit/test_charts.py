@@ -6,6 +6,7 @@ import io
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pipelines.report.charts import (
@@ -16,11 +17,11 @@ from pipelines.report.charts import (
     Trace,
     csv_text,
     plotly_figure,
-    png_bytes,
     svg_text,
 )
 from pipelines.report.charts.chart import density
 from pipelines.report.charts.mollweide import project, sphere
+from pipelines.report.charts.static_figure import png_bytes
 
 
 def chart() -> Chart:
@@ -109,3 +110,19 @@ def test_mollweide_solves_its_equation_at_every_latitude(latitude: float) -> Non
         low, high = (middle, high) if short else (low, middle)
     direction = np.array([[np.cos(np.radians(latitude)), 0.0, np.sin(np.radians(latitude))]])
     assert project(direction)[1][0] == pytest.approx(np.sin(low), abs=1e-6)
+
+
+@pytest.mark.parametrize(("lost", "style"), [(False, "line"), (True, "points")])
+def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(
+    rng: np.random.Generator, *, lost: bool, style: str
+) -> None:
+    from pipelines.workbench.views.unit_charts import samples_chart
+
+    values = rng.normal(size=(100, 3))
+    if lost:
+        values[40:60:2] = np.nan
+    table = pd.DataFrame(values, columns=["x", "y", "z"]).assign(time_s=np.arange(100) / 100.0)
+    chart = samples_chart(table, "a dwell", "g")
+    assert [trace.style for plot in chart.plots for trace in plot.traces] == [style] * 3
+    shown = chart.plots[0].traces[0].y
+    assert np.allclose(shown, values[:, 0] - np.nanmean(values[:, 0]), equal_nan=True)

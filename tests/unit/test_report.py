@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from pipelines.archive import Run
 from pipelines.report import make_report, render
+from pipelines.report.charts import svg_text
 from pipelines.report.numbers import significant, with_uncertainty
-from pipelines.report.plots import lot_plot
+from pipelines.report.run_charts import lot_chart
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +58,11 @@ def test_the_limit_is_for_the_mean_of_a_pose_not_for_a_dwell_that_wandered(mean:
         {"unit": "A1", "pose": ["v01", "v01", "v02"], "error_ug": [1400.0, 2.0 * mean - 1400.0, 10.0]}
     )
     poses = pd.DataFrame({"unit": "A1", "pose": ["v01", "v02"], "error_ug": [mean, 10.0]})
-    drawn = lot_plot(dwells, poses, ["A1"], 1000.0)
-    assert ("fill: #c62828" in drawn) is red
-    assert "fill: #b4b4b4" in drawn
+    chart = lot_chart(dwells, poses, ["A1"], 1000.0)
+    shown = {trace.name: trace.y.tolist() for trace in chart.plots[0].traces if trace.style == "points"}
+    assert shown.get("mean of a pose, beyond the limit", []) == ([mean] if red else [])
+    assert shown["single dwell"] == [1400.0, 2.0 * mean - 1400.0, 10.0]
+    assert ("beyond the limit" in svg_text(chart)) is red
 
 
 def test_is_made_once(run: Run) -> None:

@@ -268,3 +268,32 @@ def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_
     monkeypatch.setattr(shared, "USABLE_S", 0.0)  # old
     recent.ask(question)
     assert len(looked) == before + 1
+
+
+def test_a_search_in_memory_gives_what_the_files_of_the_archive_give(tmp_path: Path) -> None:
+    from benchmarks.generated_archive import write_archive
+    from pipelines.audit.sql import ask
+    from pipelines.workbench.questions import history_question, newest_question, units_question, yield_question
+    from pipelines.workbench.services.index import RecentIndex
+    from pipelines.workbench.state import UnitsPage
+
+    archive = tmp_path / "archive"
+    write_archive(archive, 6, years=2.0, seed=3, workers=1)
+    recent = RecentIndex(str(archive))
+    pages = [
+        UnitsPage(),
+        UnitsPage(search="3", order="unit"),
+        UnitsPage(outcome="fail", order="station", page=2),
+        UnitsPage(station="line-1", since="2022-01-01", order="outcome"),
+        UnitsPage(search="no'such"),
+    ]
+    questions = [question(page) for page in pages for question in (units_question, yield_question)]
+    unit = str(recent.ask(units_question(UnitsPage())).rows[0][0])
+    for question in (*questions, newest_question(12), history_question(unit)):
+        found, wanted = recent.ask(question), ask(Archive(str(archive)), question)
+        assert found.columns == wanted.columns
+        assert found.rows == wanted.rows if "ORDER BY" in question else sorted(found.rows) == sorted(wanted.rows)
+    with pytest.raises(WrongUse):
+        recent.ask("DELETE FROM units")
+    assert recent.ask("SELECT count(*) FROM units").rows[0][0] > 0
+    assert recent.ask(history_question(unit)).rows

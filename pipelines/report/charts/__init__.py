@@ -1,8 +1,8 @@
-"""Charts as plain descriptions, drawn by Plotly in a page, by matplotlib as SVG or PNG, and written as CSV."""
+"""Charts as plain descriptions, drawn by Plotly in a page, as SVG or PNG without a browser, and written as CSV."""
 
 from pipelines.report.charts.chart import Chart, ColourScale, Plot, PlotAxis, Trace
 from pipelines.report.charts.csv_rows import csv_text
 from pipelines.report.charts.plotly_figure import plotly_figure
-from pipelines.report.charts.static_figure import png_bytes, svg_text
+from pipelines.report.charts.vector import svg_text
 
-__all__ = ["Chart", "ColourScale", "Plot", "PlotAxis", "Trace", "csv_text", "plotly_figure", "png_bytes", "svg_text"]
+__all__ = ["Chart", "ColourScale", "Plot", "PlotAxis", "Trace", "csv_text", "plotly_figure", "svg_text"]

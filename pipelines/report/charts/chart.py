@@ -71,6 +71,7 @@ class Trace:
     x, y : (n,) · high : (n,), upper edge of a band · error : (n,), half length of an error bar
     colour : (n,), values on the chart's colour scale; the role's colour where None
     counts : (rows, columns), of a density; x and y are then the middles of columns and rows
+    width : of a line, in pixels; 0 for the usual one
     texts : (n,), shown beside a label or at the pointer
     picks : (n,), selection by a click on a point; empty for none
     """
@@ -83,6 +84,7 @@ class Trace:
     symbol: Symbol = "circle"
     size: float = 6.0
     dashed: bool = False
+    width: float = 0.0
     high: Array | None = None
     error: Array | None = None
     colour: Array | None = None

@@ -36,14 +36,23 @@ CONFIG = {
 """Options that keep the figure on the page: by default Plotly's toolbar offers to send it to a server."""
 
 
-def plotly_figure(chart: Chart) -> dict[str, Any]:
-    """Data, layout and configuration of a figure; colours by role."""
+def plotly_figure(chart: Chart, *, webgl: bool = True) -> dict[str, Any]:
+    """Data, layout and configuration of a figure; colours by role.
+
+    webgl : whether many points are drawn by WebGL, which the small bundle of reports cannot do
+    """
     data: list[dict[str, Any]] = []
     layout: dict[str, Any] = {
         "height": chart.height * chart.rows + 40,
         "margin": {"l": 62, "r": 16, "t": 44, "b": 52},
         "showlegend": any(t.legend and t.name for p in chart.plots for t in p.traces),
-        "legend": {"orientation": "h", "x": 0, "y": 1.0 + 30.0 / (chart.height * chart.rows), "yanchor": "bottom"},
+        "legend": {
+            "orientation": "h",
+            "itemsizing": "constant",
+            "x": 0,
+            "y": 1.0 + 30.0 / (chart.height * chart.rows),
+            "yanchor": "bottom",
+        },
         "hovermode": "closest",
         "annotations": [],
         "barmode": "group",
@@ -54,6 +63,8 @@ def plotly_figure(chart: Chart) -> dict[str, Any]:
         names = _axis_names(number)
         for trace in plot.traces:
             data.append(_trace(trace, names, chart, shown))
+            if not webgl and data[-1]["type"] == "scattergl":
+                data[-1]["type"] = "scatter"
             shown.add(trace.name)
         _place(layout, plot, number, chart)
     if chart.scale is not None:
@@ -155,7 +166,11 @@ def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) 
             "hoverinfo": "skip",
         }  # fmt: skip
     if trace.style == "line":
-        line = {"color": colour, "width": 1.0 if not trace.name else 1.8, **({"dash": "dash"} if trace.dashed else {})}
+        line = {
+            "color": colour,
+            "width": trace.width or (1.0 if not trace.name else 1.8),
+            **({"dash": "dash"} if trace.dashed else {}),
+        }
         return out | {"type": "scatter", "mode": "lines", "line": line, **({} if trace.name else {"hoverinfo": "skip"})}
     return out | _points(trace, colour)
 

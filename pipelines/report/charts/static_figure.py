@@ -1,4 +1,4 @@
-"""A chart drawn without a browser, by matplotlib: SVG for print, PNG to be sent."""
+"""A chart drawn without a browser as PNG, to be sent."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
 from pipelines.report.charts.chart import DIVERGING, ROLES, SEQUENTIAL
-from pipelines.report.plots import STYLE, WIDTH_IN, svg
+from pipelines.report.plots import STYLE, WIDTH_IN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,12 +23,6 @@ if TYPE_CHECKING:
 PIXELS_PER_IN = 100.0
 MOST_NAMES = 30
 SYMBOLS = {"circle": "o", "triangle-up": "^", "triangle-down": "v", "square": "s", "diamond": "D"}
-
-
-def svg_text(chart: Chart) -> str:
-    """The chart as SVG text that stands inside a page."""
-    with mpl.rc_context(STYLE):
-        return svg(_drawn(chart))
 
 
 def png_bytes(chart: Chart, *, dots_per_inch: int = 130) -> bytes:
@@ -117,7 +111,7 @@ def _points(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
 def _line(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
     del scale
     style = "--" if trace.dashed else "-"
-    width = 1.4 if trace.name else 0.7
+    width = trace.width or (1.4 if trace.name else 0.7)
     place.plot(trace.x, trace.y, style, color=ROLES[trace.role], linewidth=width, label=_label(trace), zorder=2)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pipelines.report.plots import lot_plot
+from pipelines.report.interactive import figure_of
+from pipelines.report.run_charts import lot_chart
 from pipelines.report.templates import fill
 
 if TYPE_CHECKING:
@@ -24,5 +25,6 @@ def render(report: ReportContext) -> str | None:
         return None
     units, limit = [unit.unit for unit in report.calibrated], report.limit("verification_norm_ug")
     return fill(
-        TEMPLATE, plot=lot_plot(report.tables["verification"], report.tables["verification_poses"], units, limit)
+        TEMPLATE,
+        plot=figure_of(lot_chart(report.tables["verification"], report.tables["verification_poses"], units, limit)),
     )

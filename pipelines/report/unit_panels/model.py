@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pipelines.report.plots import check_plots, model_plots
+from pipelines.report.interactive import figure_of
+from pipelines.report.run_charts import check_chart, model_chart
 from pipelines.report.templates import fill
 
 if TYPE_CHECKING:
@@ -14,12 +15,11 @@ ORDER = 10
 TITLE = "Model and measurement"
 TEMPLATE = """\
 {{ model | safe }}
-{% if soaks > 1 %}<p class="note">Colours: temperature of the soak, from blue (cold) to red (warm).</p>{% endif %}
 {{ checks | safe }}
 {% if notes %}<p class="note">{{ notes | join(" ") }}</p>{% endif %}
 """
 VERIFIED = "Grey band: error expected from the covariance of the coefficients and the wander of a dwell."
-NOISE = "Allan deviation: band 68 % interval, line fitted terms where they explain the curve; dotted: slopes −½ and +½."
+NOISE = "Allan deviation: band 68 % interval, line fitted terms where they explain the curve; dashed: slopes −½ and +½."
 
 
 def render(unit: UnitContext) -> str | None:
@@ -31,8 +31,7 @@ def render(unit: UnitContext) -> str | None:
     notes = [text for name, text in (("verification", VERIFIED), ("allan", NOISE)) if len(tables[name])]
     return fill(
         TEMPLATE,
-        soaks=fitted["soak"].nunique(),
         notes=notes,
-        model=model_plots(fitted, tables["residuals"]),
-        checks=check_plots(tables["residuals"], tables["verification"], tables["allan"]),
+        model=figure_of(model_chart(fitted, tables["residuals"])),
+        checks=figure_of(check_chart(tables["residuals"], tables["verification"], tables["allan"])),
     )

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import Evaluated
 from pipelines.report.numbers import significant, with_uncertainty
-from pipelines.report.plots import STYLE, WIDTH_IN, svg
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
 
@@ -68,6 +65,11 @@ def _procedure(unit: UnitContext, number: int, content: dict[str, Any]) -> dict[
 
 def picture(procedure: Evaluated, content: dict[str, Any], points: pd.DataFrame) -> str:
     """The procedure's picture of one unit as SVG."""
+    import matplotlib as mpl  # slow to import, and most runs have no procedures
+    from matplotlib.figure import Figure
+
+    from pipelines.report.plots import STYLE, WIDTH_IN, svg
+
     with mpl.rc_context(STYLE):
         drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN * procedure.rows), layout="constrained")
         procedure.draw(drawing, procedure.part.model_validate(content), points)

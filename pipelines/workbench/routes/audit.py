@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Audit", 70, "/audit"
 DUE, FINDINGS = 60, 40
+COMPARED = ("station", "slot")
 
 
 @router.get("/audit")
@@ -36,7 +37,7 @@ def audit(request: Request) -> Response:
         problems = [*problems, str(problem)]
     return page(
         request, "audit.html", state, problems, empty=not bench.archive.run_ids(), found=found, job=job, who=WHO, most_due=DUE,
-        most_findings=FINDINGS, chance=chance, labels={name: kind.label for name, kind in FIGURES.items()},
+        most_findings=FINDINGS, compared=COMPARED, chance=chance, labels={name: kind.label for name, kind in FIGURES.items()},
     )  # fmt: skip
 
 
@@ -66,6 +67,21 @@ def capability(request: Request) -> Response:
     """Capability of every figure with a limit, by kind of device."""
     rows = _found(workbench_of(request), request)["document"]["population"]["capability"]
     return table_csv([_flat(row) for row in rows], "capability")
+
+
+@router.get("/audit/yield.csv")
+def yields(request: Request) -> Response:
+    """The yield of all calibrations, and by station, device, lot and month."""
+    rows = _found(workbench_of(request), request)["document"]["population"]["yield"]
+    return table_csv([_flat(row) for row in rows], "yield")
+
+
+@router.get("/audit/differences.csv")
+def differences(request: Request) -> Response:
+    """Every figure compared between stations and between slots, by kind of device."""
+    rows = _found(workbench_of(request), request)["document"]["population"]["differences"]
+    told = sorted((row for row in rows if row["by"] in COMPARED), key=lambda row: row["p"])
+    return table_csv([_flat(row) for row in told], "differences")
 
 
 @router.get("/audit/findings.csv")

@@ -14,6 +14,7 @@ router = APIRouter()
 KINDS = {"js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8", "svg": "image/svg+xml"}
 FOREVER = "public, max-age=31536000, immutable"
 PLOTLY = "plotly-strict-4.1.1.min.js"
+PAINT = "paint.js"  # shared with reports
 PLOTLY_SHA256 = "4ac841837b31c1bfd2ab140e3a248ddcc6c2106978fbf2c1c18a7aada930a37a"
 
 
@@ -48,4 +49,5 @@ def _bundle() -> bytes:
 def _file(name: str) -> bytes | None:
     """The content of a file; None if it does not exist."""
     known = {place.name: place for place in (files("pipelines.workbench") / "static").iterdir() if place.is_file()}
+    known[PAINT] = files("pipelines.report.charts") / PAINT
     return known[name].read_bytes() if name in known and name.rpartition(".")[2] in KINDS else None

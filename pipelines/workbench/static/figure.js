@@ -1,4 +1,6 @@
 // Figures: fetched when they come into sight, drawn in the colours of the theme, a click on a point changes the address.
+import { dressed, themed } from "./paint.js";
+
 const PLOTLY = "plotly-strict-4.1.1.min.js";
 let library = null;
 
@@ -13,28 +15,23 @@ function plotly() {
   return library;
 }
 
-// "role:before" and "role:before:0.2" (with its opacity) in the colours of the theme
-function themed(value, style) {
-  if (typeof value === "string" && value.startsWith("role:")) {
-    const [, role, opacity] = value.split(":");
-    const colour = style.getPropertyValue(`--role-${role}`).trim();
-    return opacity ? colour + Math.round(255 * Number(opacity)).toString(16).padStart(2, "0") : colour;
-  }
-  if (Array.isArray(value)) return value.map((one) => themed(one, style));
-  if (value && typeof value === "object" && !ArrayBuffer.isView(value)) {
-    return Object.fromEntries(Object.entries(value).map(([key, one]) => [key, key === "bdata" ? one : themed(one, style)]));
-  }
-  return value;
+// A figure that a click will need is requested with the page part that shows it, not after it.
+const comingFigures = new Map();
+const sameFigure = (address) => { const { pathname, searchParams } = new URL(address, location.href); searchParams.sort(); return `${pathname}?${searchParams}`; };
+const requested = (address) => fetch(address, { headers: { accept: "application/json" } });
+
+export function ahead(address) {
+  plotly().catch(() => {});
+  const answer = requested(address);
+  answer.catch(() => {});  // the figure asks again and says what is wrong
+  comingFigures.clear();
+  comingFigures.set(sameFigure(address), answer);
 }
 
-function dressed(layout, style) {
-  const grid = style.getPropertyValue("--grid").trim(), text = style.getPropertyValue("--text").trim();
-  const out = { ...themed(layout, style), paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", uirevision: "kept",
-    font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: text },
-    hoverlabel: { bgcolor: style.getPropertyValue("--panel").trim(), bordercolor: style.getPropertyValue("--line").trim(), font: { color: text } },
-    modebar: { bgcolor: "rgba(0,0,0,0)", color: style.getPropertyValue("--quiet").trim(), activecolor: text, orientation: "h" } };
-  for (const [name, axis] of Object.entries(out)) if (/^[xy]axis\d*$/.test(name)) out[name] = { ...axis, gridcolor: grid, linecolor: grid, tickcolor: grid };
-  return out;
+function answered(address) {
+  const key = sameFigure(address), coming = comingFigures.get(key);
+  comingFigures.delete(key);
+  return coming ? coming.catch(() => requested(address)) : requested(address);
 }
 
 export async function draw(place) {
@@ -42,7 +39,7 @@ export async function draw(place) {
   place.dataset.busy = place.dataset.figure;
   place.classList.add("waiting");
   try {
-    const [library, answer] = await Promise.all([plotly(), fetch(place.dataset.figure, { headers: { accept: "application/json" } })]);
+    const [library, answer] = await Promise.all([plotly(), answered(place.dataset.figure)]);
     const content = await answer.json();
     if (!answer.ok) throw new Error(content.problem || "the figure was not made");
     if (!place.isConnected) return;

@@ -1,5 +1,5 @@
 // What every page does: addresses without a reload, figures, work with its progress, forms, and the line to the server.
-import { draw, drawAll, forget, repaint } from "./figure.js";
+import { ahead, draw, drawAll, forget, repaint } from "./figure.js";
 import { listen, start } from "./events.js";
 
 const main = () => document.getElementById("main");
@@ -236,6 +236,7 @@ document.addEventListener("keydown", (event) => {
 document.addEventListener("pick", (event) => {
   const address = new URL(location.href);
   address.searchParams.set(event.detail.name, event.detail.value);
+  if (event.detail.part) ahead(`${address.pathname}/figure/${event.detail.part}.json${address.search}`);
   go(address.pathname + address.search, { part: event.detail.part });
 });
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipelines.report.charts import Chart, Plot, PlotAxis, Trace
 from pipelines.report.residuals import band
+from pipelines.report.run_charts import allan_plot
 from schemas.units import AXES
 
 if TYPE_CHECKING:
@@ -80,18 +81,7 @@ def response_chart(page: UnitPage, residuals: pd.DataFrame, dwells: pd.DataFrame
 
 def allan_chart(allan: pd.DataFrame) -> Chart:
     """Allan deviation with its 68 % band, and the fitted noise terms."""
-    traces: list[Trace] = []
-    for axis in AXES:
-        own = allan[allan["axis"] == axis].sort_values("tau_s")
-        role, tau = cast("Role", axis), own["tau_s"].to_numpy(float)
-        low, high = own["low_ug"].to_numpy(float), own["high_ug"].to_numpy(float)
-        traces.append(Trace(f"{axis}: 68 % interval", tau, low, "band", role, high=high, legend=False))
-        traces.append(Trace(f"axis {axis}", tau, own["deviation_ug"].to_numpy(float), role=role, size=5))
-        fitted = own["fitted_ug"].to_numpy(float)
-        if np.isfinite(fitted).any():
-            traces.append(Trace(f"{axis}: fitted terms", tau, fitted, "line", role, legend=False))
-    plot = Plot("", PlotAxis("averaging time / s", log=True), PlotAxis("Allan deviation / µg", log=True), tuple(traces))
-    return Chart("Allan deviation", (plot,), height=340)
+    return Chart("Allan deviation", (allan_plot(allan),), height=340)
 
 
 def samples_chart(samples: pd.DataFrame, title: str, unit_text: str) -> Chart:
@@ -103,9 +93,13 @@ def samples_chart(samples: pd.DataFrame, title: str, unit_text: str) -> Chart:
         values = samples[axis].to_numpy(float)
         mean = float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
         start = float(time[0]) if time.size else 0.0
+        shown = values[::step] - mean
+        # one line is drawn ten times as fast as a thousand points; beside a lost sample it would hide single ones
+        whole = bool(np.isfinite(shown).all())
         points = Trace(
-            f"axis {axis}", time[::step] - start, values[::step] - mean, role=cast("Role", axis), size=3, legend=False
-        )
+            f"axis {axis}", time[::step] - start, shown, "line" if whole else "points", cast("Role", axis), size=3,
+            width=0.8, legend=False,
+        )  # fmt: skip
         plots.append(
             Plot(
                 f"axis {axis}, mean {mean:.6g} {unit_text}",

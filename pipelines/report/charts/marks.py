@@ -1,0 +1,176 @@
+"""The marks of a chart as parts of SVG text: points, lines, bands, bars, cells and labels at their places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.report.charts.chart import DIVERGING, ROLES, SEQUENTIAL
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from pipelines.report.charts.chart import ColourScale, Trace
+
+    Array = NDArray[np.float64]
+
+OUTLINE = "#555555"
+INSIDE = 1e-6
+BAR_SHARE = 0.7  # of the distance of two bars
+
+
+@dataclass(frozen=True)
+class Place:
+    """A rectangle of the picture, in its pixels, and the shares of both axes that values lie at."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    across: Callable[[Array], Array]
+    along: Callable[[Array], Array]
+
+    def x(self, values: Array) -> Array:
+        """Horizontal places of values."""
+        return self.left + self.width * self.across(values)
+
+    def y(self, values: Array) -> Array:
+        """Vertical places of values, not outside of the rectangle."""
+        return self.top + self.height * (1.0 - np.clip(self.along(values), 0.0, 1.0))
+
+    def holds(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Which points lie inside."""
+        across, along = self.across(x), self.along(y)
+        return (
+            np.isfinite(across + along) & (np.abs(across - 0.5) <= 0.5 + INSIDE) & (np.abs(along - 0.5) <= 0.5 + INSIDE)
+        )
+
+
+def shade(values: Array, scale: ColourScale) -> list[str]:
+    """The colours of values on a scale; grey where a value is missing."""
+    anchors = DIVERGING if scale.diverging else SEQUENTIAL
+    where = np.array([place for place, _ in anchors])
+    colours = np.array([[int(text[k : k + 2], 16) for k in (1, 3, 5)] for _, text in anchors], dtype=float)
+    share = np.clip((values - scale.low) / ((scale.high - scale.low) or 1.0), 0.0, 1.0)
+    channels = [np.interp(np.nan_to_num(share), where, colours[:, k]).round().astype(int) for k in range(3)]
+    found = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in zip(*channels, strict=True)]
+    return [colour if np.isfinite(value) else "#999999" for colour, value in zip(found, values, strict=True)]
+
+
+def _points(trace: Trace, place: Place, scale: ColourScale | None) -> str:
+    there = place.holds(trace.x, trace.y)
+    x, y = place.x(trace.x[there]), place.y(trace.y[there])
+    role = ROLES[trace.role]
+    parts: list[str] = []
+    if trace.error is not None:
+        low, high = (place.y((trace.y + sign * trace.error)[there]) for sign in (-1.0, 1.0))
+        bars = "".join(f"M{a:.1f} {b:.1f}V{c:.1f}" for a, b, c in zip(x, low, high, strict=True))
+        parts.append(f'<path d="{bars}" stroke="{role}"/>')
+    if trace.colour is None or scale is None:
+        return "".join(parts) + marks(x, y, trace, role)
+    colours = np.array(shade(trace.colour[there], scale))
+    parts.append(marks(x, y, trace, OUTLINE, 1.0))
+    for colour in dict.fromkeys(colours.tolist()):
+        own = colours == colour
+        parts.append(marks(x[own], y[own], trace, colour))
+    return "".join(parts)
+
+
+def marks(x: Array, y: Array, trace: Trace, colour: str, wider: float = 0.0) -> str:
+    """All points of one colour as one path: a round end of a line without length is a dot."""
+    if not x.size:
+        return ""
+    size = trace.size + wider
+    if trace.symbol == "circle":
+        dots = "".join(f"M{a:.1f} {b:.1f}h.01" for a, b in zip(x, y, strict=True))
+        return f'<path d="{dots}" stroke="{colour}" stroke-width="{size:g}" stroke-linecap="round"/>'
+    half = 0.5 * size
+    shape = {
+        "triangle-up": (0.0, -half, f"l{half:.1f} {size:.1f}h{-size:.1f}z"),
+        "triangle-down": (0.0, half, f"l{half:.1f} {-size:.1f}h{-size:.1f}z"),
+        "square": (-half, -half, f"h{size:.1f}v{size:.1f}h{-size:.1f}z"),
+        "diamond": (0.0, -half, f"l{half:.1f} {half:.1f}l{-half:.1f} {half:.1f}l{-half:.1f} {-half:.1f}z"),
+    }[trace.symbol]
+    path = "".join(f"M{a + shape[0]:.1f} {b + shape[1]:.1f}{shape[2]}" for a, b in zip(x, y, strict=True))
+    return f'<path d="{path}" fill="{colour}"/>'
+
+
+def _line(trace: Trace, place: Place, scale: ColourScale | None) -> str:
+    del scale
+    x, y = place.x(trace.x), place.y(trace.y)
+    whole = np.isfinite(x + y)
+    path, pen = "", "M"
+    for a, b, there in zip(x, y, whole, strict=True):
+        path += f"{pen}{a:.1f} {b:.1f}" if there else ""
+        pen = "L" if there else "M"
+    dash = ' stroke-dasharray="6 4"' if trace.dashed else ""
+    width = trace.width or (1.6 if trace.name else 0.8)
+    return f'<path d="{path}" stroke="{ROLES[trace.role]}" stroke-width="{width:g}" fill="none"{dash}/>' if path else ""
+
+
+def _band(trace: Trace, place: Place, scale: ColourScale | None) -> str:
+    del scale
+    high = np.asarray(trace.high)
+    there = np.isfinite(trace.x + trace.y + high)
+    x = place.x(trace.x[there])
+    edge = [*zip(x, place.y(trace.y[there]), strict=True), *zip(x[::-1], place.y(high[there])[::-1], strict=True)]
+    path = "L".join(f"{a:.1f} {b:.1f}" for a, b in edge)
+    return f'<path d="M{path}z" fill="{ROLES[trace.role]}" fill-opacity=".18"/>' if edge else ""
+
+
+def _bars(trace: Trace, place: Place, scale: ColourScale | None) -> str:
+    del scale
+    there = np.isfinite(trace.x + trace.y)
+    at, value = trace.x[there], trace.y[there]
+    apart = float(np.min(np.diff(np.sort(at)))) if at.size > 1 else 1.0
+    left, right = (place.x(at + sign * 0.5 * BAR_SHARE * apart) for sign in (-1.0, 1.0))
+    base, top = place.y(np.zeros_like(value)), place.y(value)
+    path = "".join(
+        f"M{a:.1f} {z:.1f}V{t:.1f}H{b:.1f}V{z:.1f}z" for a, b, z, t in zip(left, right, base, top, strict=True)
+    )
+    return f'<path d="{path}" fill="{ROLES[trace.role]}"/>'
+
+
+def _density(trace: Trace, place: Place, scale: ColourScale | None) -> str:
+    """Cells in four shades of grey by the logarithm of their count."""
+    del scale
+    counts = np.asarray(trace.counts, dtype=float)
+    if not counts.any():
+        return ""
+    level = np.ceil(4.0 * np.log10(1.0 + counts) / np.log10(1.0 + counts.max())).astype(int)
+    wide, tall = (float(np.ptp(v)) / max(v.size - 1, 1) for v in (trace.x, trace.y))
+    parts: list[str] = []
+    for number, colour in enumerate(("#dfe3e7", "#c3c9cf", "#a7afb7", "#8a939c"), start=1):
+        rows, columns = np.nonzero(level == number)
+        left, right = (place.x(trace.x[columns] + sign * 0.5 * wide) for sign in (-1.0, 1.0))
+        low, high = (place.y(trace.y[rows] + sign * 0.5 * tall) for sign in (-1.0, 1.0))
+        path = "".join(
+            f"M{a:.1f} {z:.1f}V{t:.1f}H{b:.1f}V{z:.1f}z" for a, b, z, t in zip(left, right, low, high, strict=True)
+        )
+        parts.append(f'<path d="{path}" fill="{colour}"/>' if path else "")
+    return "".join(parts)
+
+
+def _labels(trace: Trace, place: Place, scale: ColourScale | None) -> str:
+    del scale
+    x, y = place.x(trace.x), place.y(trace.y)
+    look = f'text-anchor="middle" font-size="11" fill="{ROLES[trace.role]}"'
+    return "".join(
+        f'<text x="{a:.1f}" y="{b + 4.0:.1f}" {look}>{escape(text, quote=False)}</text>'
+        for a, b, text in zip(x, y, trace.texts, strict=True)
+    )
+
+
+DRAW: dict[str, Callable[[Trace, Place, ColourScale | None], str]] = {
+    "points": _points,
+    "line": _line,
+    "band": _band,
+    "bars": _bars,
+    "density": _density,
+    "labels": _labels,
+}
