@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
+from inertial.distributions import chi2_quantile
 from inertial.noise.gauss_markov import BiasModel
 
 Array = NDArray[np.float64]
@@ -121,7 +121,7 @@ def consistency(innovations: list[tuple[int, float]]) -> Consistency:
     if n < _FEWEST:
         return Consistency(n, np.nan, np.nan, np.nan, np.nan, np.nan, None)
     values = np.array([value for _, value in innovations])
-    low, high = (float(chi2.ppf(p, n)) / n for p in (0.025, 0.975))
+    low, high = (float(chi2_quantile(p, n)) / n for p in (0.025, 0.975))
     channels = np.array([channel for channel, _ in innovations])
     products = [values[channels == c][1:] * values[channels == c][:-1] for c in np.unique(channels)]
     pairs = np.concatenate(products)
