@@ -50,7 +50,7 @@ def one_sided(x: ArrayLike, rate_hz: float, *, segment: int | None = None) -> Sp
     density[..., 1 : (length + 1) // 2] *= (
         2.0  # the mean, and the highest line of an even segment, have no negative twin
     )
-    return Spectrum(frequency=np.fft.rfftfreq(length, 1.0 / rate_hz), density=density)
+    return Spectrum(frequency=np.arange(length // 2 + 1, dtype=np.float64) * rate_hz / length, density=density)
 
 
 def allan_variance(frequency: Array, density: Array, tau: Array) -> Array:
