@@ -65,6 +65,15 @@ def test_counts_printed_in_g_with_few_digits_keep_their_lattice_and_torn_words()
     assert hits == runs
 
 
+def test_single_precision_is_no_lattice_of_a_converter(rng: np.random.Generator) -> None:
+    values = (9.7 + 5e-3 * rng.normal(size=4000)).astype(np.float32)
+    printed = np.array([float(f"{value:.8g}") for value in values])
+    assert resolution(printed) is None
+    assert resolution(values.astype(np.float64)) is None
+    counts = np.round(1.2e7 + 500.0 * rng.normal(size=4000))  # of 24 bits, where single precision has steps of one
+    assert resolution(counts) == 1.0
+
+
 @pytest.mark.parametrize("count", COUNTS)
 def test_sound_recordings_have_neither(count: int) -> None:
     false = 0
