@@ -25,23 +25,24 @@ import numpy as np  # noqa: E402
 from inertial.noise import generate  # noqa: E402
 from inertial.noise.allan import overlapping  # noqa: E402
 from inertial.noise.bias_filter import Track, track  # noqa: E402
-from inertial.noise.gauss_markov import AT_MAXIMUM, BiasModel, bias_model, flicker_terms  # noqa: E402
-from inertial.noise.terms import fit_terms  # noqa: E402
-from pipelines.stages.noise import limits_where_unexplained  # noqa: E402
+from inertial.noise.gauss_markov import AT_MAXIMUM, BiasModel, bias_model, flicker_of_steps  # noqa: E402
+from inertial.noise.likely_terms import likely_terms  # noqa: E402
 from stations.plant.preset import Preset, load_preset  # noqa: E402
 
 Array = np.ndarray
 PRESETS = ("adxl355", "sf1500", "qa700")
 RATE = 100
+FINE = 4  # values of the flicker in a sample, which is their mean: point values have white noise of their own at the end of 1/f
 PAST, RECORD, UPDATES = 600, 1800, 600
 GAPS = (0, 60, 600, 3600)
 
 
-def simulated(preset: Preset, rng: np.random.Generator) -> tuple[Array, Array]:
+def simulated(preset: Preset, rng: np.random.Generator, walk: float) -> tuple[Array, Array]:
     """Bias and output of one run, (3, n), g, from the beginning of the static record."""
-    n = RATE * (PAST + RECORD + UPDATES + max(GAPS) + 1)
-    bias = generate.flicker(rng, (3, n), 1e-6 * preset.bias_instability_ug)[:, RATE * PAST :]
-    bias = bias + generate.random_walk(rng, bias.shape, 1e-6 * preset.rate_random_walk_ug, RATE)
+    n = FINE * RATE * (PAST + RECORD + UPDATES + max(GAPS) + 1)
+    bias = generate.flicker(rng, (3, n), 1e-6 * preset.bias_instability_ug).reshape(3, -1, FINE).mean(axis=-1)
+    bias = bias[:, RATE * PAST :]
+    bias = bias + generate.random_walk(rng, bias.shape, 1e-6 * walk * preset.rate_random_walk_ug, RATE)
     return bias, bias + generate.white(rng, bias.shape, 1e-6 * preset.noise_density_ug, RATE)
 
 
@@ -53,14 +54,14 @@ def means(samples: Array) -> Array:
 def models(record: Array, turn_on: Array) -> tuple[BiasModel, BiasModel]:
     """The model of the Allan fit of a static record, as the product makes it, and the textbook's."""
     curve = overlapping(record, RATE)
-    terms = limits_where_unexplained(curve, fit_terms(curve))
-    at = [
-        terms.symbols.index(symbol) for symbol in "NBK"
-    ]  # an upper limit where a term is not identified, as in an export
-    value = dict(zip("NBK", np.where(np.isnan(terms.value), terms.high, terms.value)[:, at].T, strict=True))
-    own = bias_model(value["N"], value["B"], value["K"], turn_on, flicker_terms(1.0, float(UPDATES + max(GAPS))))
+    terms = likely_terms(curve.deviation, curve.m, curve.n, curve.rate_hz)
+    own = bias_model(
+        terms.white, terms.instability, terms.walk, turn_on, flicker_of_steps(1.0, float(UPDATES + max(GAPS)))
+    )
     lowest = curve.tau[np.argmin(np.median(curve.deviation, axis=0))]
-    plain = BiasModel(value["N"], value["B"][:, None], np.array([lowest / AT_MAXIMUM]), np.zeros(3), np.zeros(3))
+    plain = BiasModel(
+        terms.white, terms.instability[:, None], np.array([lowest / AT_MAXIMUM]), np.zeros(3), np.zeros(3)
+    )
     return own, plain
 
 
@@ -76,6 +77,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=16)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--walk", type=float, default=1.0, help="multiple of the preset's random walk")
     parser.add_argument("--preset", action="append", choices=PRESETS)
     options = parser.parse_args()
     print(
@@ -87,7 +89,7 @@ def main() -> int:
         preset, rng = load_preset(name), np.random.default_rng([options.seed, PRESETS.index(name)])
         errors, stated, nis = ([], []), ([], []), []
         for _ in range(options.runs):
-            bias, samples = simulated(preset, rng)
+            bias, samples = simulated(preset, rng, options.walk)
             record = samples[:, : RATE * RECORD]
             bias, output = means(bias), means(samples)
             truth = bias[:, RECORD:].T - bias[:, :RECORD].mean(

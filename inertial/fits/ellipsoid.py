@@ -104,7 +104,7 @@ def fit_ellipsoid(
     free = 6 if shape == "six" else 9
     free_heat = 0 if temperature is None else 3
     if n <= free + free_heat:
-        msg = f"sphere fit: {n} dwells, more than {free + free_heat} are needed; add poses"
+        msg = f"sphere fit: {n} dwell{'s' * (n != 1)}, more than {free + free_heat} are needed; add poses"
         raise NotIdentified(msg)
     if not (np.all(np.isfinite(a)) and np.all(np.isfinite(heat))):
         where = np.argwhere(~np.isfinite(a) if not np.all(np.isfinite(a)) else ~np.isfinite(heat))[0].tolist()

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
+from inertial.distributions import chi2_tail
 from inertial.errors import NotIdentified
 from inertial.probability import passes
 from inertial.state import T_REFERENCE
@@ -157,4 +157,4 @@ def _slow(residuals: Array, noise: Array, degree: int) -> Array:
     usable = residuals.shape[0] // _BLOCKS * _BLOCKS
     blocks = residuals[:usable].reshape(_BLOCKS, -1, residuals.shape[1])
     statistic = np.sum(blocks.mean(axis=1) ** 2, axis=0) / (noise**2 / blocks.shape[1])
-    return np.asarray(chi2.sf(statistic, _BLOCKS - degree - 1))
+    return chi2_tail(statistic, _BLOCKS - degree - 1)

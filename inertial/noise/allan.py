@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
+from inertial.distributions import chi2_quantile
 from inertial.noise import mixture
 
 Array = NDArray[np.float64]
@@ -76,8 +76,8 @@ def overlapping(
         tau=spacings / rate_hz,
         deviation=np.sqrt(variance),
         edf=edf,
-        low=np.sqrt(variance * edf / chi2.ppf(1.0 - tail, edf)),
-        high=np.sqrt(variance * edf / chi2.ppf(tail, edf)),
+        low=np.sqrt(variance * edf / chi2_quantile(1.0 - tail, edf)),
+        high=np.sqrt(variance * edf / chi2_quantile(tail, edf)),
         confidence=confidence,
         n=n,
         rate_hz=rate_hz,

@@ -2,6 +2,10 @@
 
 Specific force and bias add in the output, so the bias can be estimated only where the force is known. Between updates the bias
 drifts, and its standard deviation grows according to the noise model.
+
+What is measured is the mean of the output over a step, so the state of an axis contains the mean of its bias over the step
+beside the values of its parts at the end of the step. Taken for the value at one time, the part of flicker noise that changes
+within a step would count in full, and the stated variance of an update of flicker would be 1.6 times the true one.
 """
 
 from dataclasses import dataclass, field
@@ -9,23 +13,31 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.linalg import block_diag
 
-from inertial.noise.gauss_markov import BiasModel
+from inertial.distributions import chi2_quantile
+from inertial.noise.gauss_markov import BiasModel, StepOfProcess, step_of_process, step_of_walk
 
 Array = NDArray[np.float64]
 
 AXES = 3
 GATE_SIGMA = 5.0
+_MOST_STEPS = 64  # of different lengths whose transitions are kept
 _FEWEST = 8  # updates that are needed to judge their consistency
 
 
 @dataclass
 class BiasFilter:
-    """Bias of three axes as processes db/dt = −b/T + w and a walk; the state of an axis is its k processes and the walk.
+    """Bias of three axes as processes db/dt = −b/T + w and a walk.
 
-    A step of Δt multiplies a process by φ = e^(−Δt/T) and adds the variance s²(1 − φ²); it adds K²Δt to the walk. The constant
-    part of the bias, that of the last switch-on, is the walk's value at the beginning.
+    The state of an axis is its k processes and the walk at the end of the last step, and the mean m of their sum over that step.
+    A step of Δt takes a process x and its share of m to (:class:`inertial.noise.gauss_markov.StepOfProcess`)
+
+        x' = φ·x + e,  m' = Σ (a·x + ē),  φ = e^(−Δt/T),  a = (1 − φ)·T/Δt
+
+    with Var e = s²(1 − φ²), Var ē = s²(v − a²), Cov(e, ē) = s²·a·(1 − φ), v the variance of a mean over Δt. Of the walk they are
+    K²Δt, K²Δt/3 and K²Δt/2, φ = a = 1. An update sees m and white noise of variance N²/Δt. The constant part of the bias, that of
+    the last switch-on, is the walk's value at the beginning.
     """
 
     model: BiasModel
@@ -34,41 +46,75 @@ class BiasFilter:
     """Channel and innovation over its standard deviation, of every update that was accepted; channel 3 is the magnitude."""
     _x: Array = field(init=False, repr=False)
     _p: Array = field(init=False, repr=False)
-    _sum: Array = field(init=False, repr=False)
+    _mean: Array = field(init=False, repr=False)
+    _steps: dict[tuple[float, float], tuple[Array, Array]] = field(
+        init=False, repr=False, default_factory=dict[tuple[float, float], tuple[Array, Array]]
+    )
 
     def __post_init__(self) -> None:
         model = self.model
-        width = model.sd.shape[1] + 1
+        parts = model.sd.shape[1] + 1
+        width = parts + 1
         first = np.concatenate([model.sd**2, model.turn_on[:, None] ** 2], axis=1)
+        into = np.vstack([np.eye(parts), np.ones(parts)])  # before the first step the mean is the value at that time
         self._x = np.zeros(AXES * width)
-        self._p = np.diag(first.ravel())
-        self._sum = np.kron(np.eye(AXES), np.ones(width)).astype(np.float64)
+        self._p = _blocks([into @ np.diag(own) @ into.T for own in first])
+        self._mean = np.kron(np.eye(AXES), np.arange(width) == parts).astype(np.float64)
 
     @property
     def bias(self) -> Array:
-        """Bias (3,), g."""
-        return self._sum @ self._x
+        """Bias (3,), g, its mean over the last step."""
+        return self._mean @ self._x
 
     @property
     def covariance(self) -> Array:
         """Covariance (3, 3) of the error of the bias, g²."""
-        return self._sum @ self._p @ self._sum.T
+        return self._mean @ self._p @ self._mean.T
 
-    def predict(self, seconds: float) -> None:
-        """Propagates state and covariance over a time step; exact for a step of any length."""
+    def predict(self, seconds: float, averaged_s: float = 0.0) -> None:
+        """Propagates state and covariance; exact for a time of any length.
+
+        Parameters
+        ----------
+        seconds : from the end of the last step to the end of this one
+        averaged_s : length of this step, over which the bias is a mean; 0: its value at the end
+        """
         if seconds <= 0.0:
             return
+        averaged = min(averaged_s, seconds)
+        if seconds > averaged:
+            self._propagate(seconds - averaged, 0.0)
+        if averaged > 0.0:
+            self._propagate(averaged, averaged)
+
+    def _propagate(self, seconds: float, averaged_s: float) -> None:
+        key = (seconds, averaged_s)
+        if key not in self._steps:
+            if len(self._steps) >= _MOST_STEPS:
+                self._steps.clear()
+            self._steps[key] = self._transition(seconds, mean=averaged_s > 0.0)
+        phi, grown = self._steps[key]
+        self._x = phi @ self._x
+        self._p = phi @ self._p @ phi.T + grown
+
+    def _transition(self, seconds: float, *, mean: bool) -> tuple[Array, Array]:
+        """Transition and added covariance, both (3w, 3w), of a time, whose mean or whose end is the bias."""
         model = self.model
-        keep = np.exp(-seconds / model.correlation_s)
-        grown = np.concatenate([model.sd**2 * (1.0 - keep**2), model.walk[:, None] ** 2 * seconds], axis=1)
-        phi = np.tile(np.append(keep, 1.0), AXES)
-        self._x = phi * self._x
-        self._p = phi[:, None] * self._p * phi + np.diag(grown.ravel())
+        transitions, added = list[Array](), list[Array]()
+        for axis in range(AXES):
+            parts = [
+                *(step_of_process(s, t, seconds) for s, t in zip(model.sd[axis], model.correlation_s, strict=True)),
+                step_of_walk(model.walk[axis], seconds),
+            ]
+            own = _axis_step(parts if mean else [part.at_end() for part in parts])
+            transitions.append(own[0])
+            added.append(own[1])
+        return _blocks(transitions), _blocks(added)
 
     def known_force(self, difference: Array, seconds: float) -> None:
         """Updates with corrected output minus true force (3,), g, each a mean over ``seconds``."""
         for axis in range(AXES):
-            self._update(self._sum[axis], float(difference[axis]), float(self.model.white[axis] ** 2) / seconds, axis)
+            self._update(self._mean[axis], float(difference[axis]), float(self.model.white[axis] ** 2) / seconds, axis)
 
     def known_magnitude(self, force: Array, magnitude: float, seconds: float) -> None:
         """Updates with the magnitude of the force alone: a unit at rest in any pose, its corrected output ``force`` (3,), g.
@@ -79,7 +125,7 @@ class BiasFilter:
         along = force / length
         variance = float(along**2 @ self.model.white**2) / seconds
         # force still contains the bias: its length minus the magnitude is the bias along it
-        self._update(along @ self._sum, length - magnitude, variance, AXES)
+        self._update(along @ self._mean, length - magnitude, variance, AXES)
 
     def _update(self, row: Array, measured: float, variance: float, channel: int) -> None:
         """One scalar update in Joseph's form; an innovation beyond the gate is counted and not used."""
@@ -95,6 +141,22 @@ class BiasFilter:
         self._x = self._x + gain * innovation
         left = np.eye(len(row)) - np.outer(gain, row)
         self._p = left @ self._p @ left.T + variance * np.outer(gain, gain)
+
+
+def _axis_step(parts: list[StepOfProcess]) -> tuple[Array, Array]:
+    """Transition (w, w) and added covariance (w, w) of the state of one axis: its parts, then their common mean."""
+    k = len(parts)
+    phi, grown = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
+    for place, part in enumerate(parts):
+        phi[place, place], phi[k, place] = part.keep, part.weight
+        grown[place, place] = part.end_variance
+        grown[place, k] = grown[k, place] = part.covariance
+    grown[k, k] = sum(part.mean_variance for part in parts)
+    return phi, grown
+
+
+def _blocks(parts: list[Array]) -> Array:
+    return np.asarray(block_diag(*parts), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -121,7 +183,7 @@ def consistency(innovations: list[tuple[int, float]]) -> Consistency:
     if n < _FEWEST:
         return Consistency(n, np.nan, np.nan, np.nan, np.nan, np.nan, None)
     values = np.array([value for _, value in innovations])
-    low, high = (float(chi2.ppf(p, n)) / n for p in (0.025, 0.975))
+    low, high = (float(chi2_quantile(p, n)) / n for p in (0.025, 0.975))
     channels = np.array([channel for channel, _ in innovations])
     products = [values[channels == c][1:] * values[channels == c][:-1] for c in np.unique(channels)]
     pairs = np.concatenate(products)
@@ -137,7 +199,7 @@ def consistency(innovations: list[tuple[int, float]]) -> Consistency:
 
 @dataclass(frozen=True)
 class Track:
-    """Bias (n, 3) in g after each step, its covariance (n, 3, 3) in g², and which steps updated it (n,).
+    """Bias (n, 3) in g after each step, a mean over the step, its covariance (n, 3, 3) in g², and which steps updated it (n,).
 
     expected, expected_covariance : the same before the update of the step, as known to a filter in real time
     """
@@ -167,7 +229,7 @@ def track(model: BiasModel, time: Array, force: Array, known: Array, magnitude: 
     expected, before = np.empty_like(bias), np.empty_like(covariance)
     for k in range(n):
         accepted = len(tracker.innovations)
-        tracker.predict(float(time[k] - time[k - 1]) if k else 0.0)
+        tracker.predict(float(time[k] - time[k - 1]) if k else seconds, seconds)
         expected[k], before[k] = tracker.bias, tracker.covariance
         if np.all(np.isfinite(known[k])):
             tracker.known_force(force[k] - known[k], seconds)

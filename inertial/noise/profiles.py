@@ -6,8 +6,8 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import chi2
 
+from inertial.distributions import chi2_quantile
 from inertial.noise import mixture
 from inertial.noise.covariance import Sums
 from inertial.noise.mixture import MixtureFit
@@ -87,7 +87,7 @@ def _walk_limit(variance: Array, moments: Sums, fitted: Array) -> float:
     alone = np.where(np.arange(model.shape[1]) == k, 1.0, 0.0)
     spread = np.diagonal(moments.covariance(alone[:4], alone[4]))
     edf = np.maximum(2.0 * model[:, k] ** 2 / spread, 1.0)
-    rise = edf / chi2.ppf(0.05, edf) / model[:, k]
+    rise = edf / chi2_quantile(0.05, edf) / model[:, k]
     place = int(np.argmin((model @ fitted) * rise))
     return float(variance[place] * rise[place])
 

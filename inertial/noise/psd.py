@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import welch
 
 Array = NDArray[np.float64]
 
@@ -40,8 +39,18 @@ def one_sided(x: ArrayLike, rate_hz: float, *, segment: int | None = None) -> Sp
     if not 8 <= length <= data.shape[-1]:
         msg = f"psd: segment of {length} samples in a record of {data.shape[-1]}, 8 or more must fit; record longer"
         raise ValueError(msg)
-    frequency, density = welch(data, fs=rate_hz, nperseg=length, detrend="constant", scaling="density")
-    return Spectrum(frequency=np.asarray(frequency), density=np.asarray(density))
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+    density = np.zeros((*data.shape[:-1], length // 2 + 1))
+    starts = range(0, data.shape[-1] - length + 1, length - length // 2)
+    for start in starts:
+        part = data[..., start : start + length]
+        lines = np.fft.rfft(window * (part - part.mean(axis=-1, keepdims=True)))
+        density += lines.real**2 + lines.imag**2
+    density /= len(starts) * rate_hz * float(window @ window)
+    density[..., 1 : (length + 1) // 2] *= (
+        2.0  # the mean, and the highest line of an even segment, have no negative twin
+    )
+    return Spectrum(frequency=np.arange(length // 2 + 1, dtype=np.float64) * rate_hz / length, density=density)
 
 
 def allan_variance(frequency: Array, density: Array, tau: Array) -> Array:

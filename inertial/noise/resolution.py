@@ -2,7 +2,8 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+
+from inertial.distributions import normal_upper
 
 Array = NDArray[np.float64]
 
@@ -52,4 +53,4 @@ def most(step: float, outside: float, count: int) -> float:
     count : samples
     """
     bound = outside + 1.645 * float(np.sqrt(outside * (1.0 - outside) / count)) + 3.0 / count
-    return step / (2.0 * float(norm.isf(0.5 * bound))) if bound < 1.0 else np.inf
+    return step / (2.0 * float(normal_upper(0.5 * bound))) if bound < 1.0 else np.inf

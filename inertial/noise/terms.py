@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
+from inertial.distributions import chi2_quantile, chi2_tail
 from inertial.noise import mixture, profiles
 from inertial.noise.allan import AllanCurve
 from inertial.noise.covariance import sums
@@ -92,7 +92,7 @@ class NoiseTerms:
     @property
     def p_value(self) -> Array:
         """Probability (...,) of a worse agreement if these terms were the whole truth."""
-        return np.asarray(chi2.sf(self.chi2, self.dof))
+        return chi2_tail(self.chi2, self.dof)
 
     def one(self, *index: int) -> dict[str, NoiseTerm]:
         """Terms of one channel by symbol."""
@@ -140,7 +140,7 @@ def fit_terms(curve: AllanCurve, *, confidence: float = 0.95) -> NoiseTerms:
         raise ValueError(msg)
     moments = sums(curve.n, tuple(curve.m.tolist()))
     variances = (curve.deviation**2).reshape(-1, curve.m.size)
-    rows = [profiles.fit_terms(variance, moments, float(chi2.ppf(confidence, 1))) for variance in variances]
+    rows = [profiles.fit_terms(variance, moments, float(chi2_quantile(confidence, 1))) for variance in variances]
     lead = curve.deviation.shape[:-1]
     scale = np.sqrt(_per_sample(curve.rate_hz))
 

@@ -12,6 +12,7 @@ from pipelines.certificate_document.laboratory import LaboratoryFile
 from pipelines.certificate_document.signature_check import parsed
 from pipelines.certificate_document.xml_facts import facts_of
 from pipelines.certificates import Ledger
+from pipelines.certificates.days import today
 from schemas.errors import ArchiveUnusable, TumblelineError
 
 if TYPE_CHECKING:
@@ -35,12 +36,14 @@ class Compared:
     """What the archive says of a certificate.
 
     known : whether the ledger has its number; ended : why it is not valid any more, empty where it is
+    until : until when it is valid and what comes then, where that is known already
     different : sentences about what differs; count : numbers that were compared
     reason : why the numbers could not be compared, empty where they were
     """
 
     known: bool
     ended: str = ""
+    until: str = ""
     different: tuple[str, ...] = ()
     reason: str = ""
     count: int = 0
@@ -64,9 +67,9 @@ def compare(facts: CertificateFacts, archive: Archive) -> Compared:
         valid = replace(own, ended_by=None)  # its numbers are those of the day of issue, also after a revocation
         content = compose(Run(archive, own.run), valid, known, NOBODY)
     except ArchiveUnusable as problem:
-        return Compared(True, _ended(own), (*different, str(problem)))
+        return Compared(True, *_ended(own), (*different, str(problem)))
     except TumblelineError as problem:
-        return Compared(True, _ended(own), tuple(different), reason=str(problem))
+        return Compared(True, *_ended(own), tuple(different), reason=str(problem))
     there = facts_of(parsed(dcc(content)))
     if facts.measured != there.measured:
         different.append(
@@ -77,7 +80,7 @@ def compare(facts: CertificateFacts, archive: Archive) -> Compared:
         here, needed = (one.conformity.get(text, "nothing") for one in (facts, there))
         if here != needed:
             different.append(f"decision '{text}': the file says {here}, the archive {needed}")
-    return Compared(True, _ended(own), tuple(different), count=len(there.numbers))
+    return Compared(True, *_ended(own), tuple(different), count=len(there.numbers))
 
 
 def _numbers(here: CertificateFacts, there: CertificateFacts) -> list[str]:
@@ -100,12 +103,14 @@ def _text(number: tuple[str, ...] | None) -> str:
     return f"{value} ± {expanded} {unit}" if expanded else f"{value} {unit}"
 
 
-def _ended(one: Calibration) -> str:
+def _ended(one: Calibration) -> tuple[str, str]:
+    """Why a calibration is not valid any more, and until when it still is where its end is known; each may be empty."""
     by = one.ended_by
     if by is None:
-        return ""
+        return "", ""
     reason = f": {by.reason}" if by.reason else ""
     if by.action == "revoke":
-        return f"revoked on {by.when[:10]} by {by.who}, not valid from {one.until} on{reason}"
+        return f"revoked on {by.when[:10]} by {by.who}, not valid from {one.until} on{reason}", ""
     amended = "amended and replaced" if by.run == one.run else "superseded"
-    return f"{amended} by certificate {by.certificate} on {by.when[:10]}, not valid from {one.until} on{reason}"
+    text = f"{amended} by certificate {by.certificate} on {by.when[:10]}, not valid from {one.until} on{reason}"
+    return ("", text) if today() < one.until else (text, "")

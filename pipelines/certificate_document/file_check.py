@@ -223,7 +223,7 @@ def _archive(done: CheckedFile, against: Against) -> None:
     if found.ended:
         done.add("state", "bad", found.ended)
     else:
-        done.add("state", "good", "neither revoked nor replaced, by the ledger of the archive")
+        done.add("state", "good", found.until or "neither revoked nor replaced, by the ledger of the archive")
     if found.reason:
         done.add("archive", "not checked", f"the numbers were not compared: {found.reason}")
     elif not found.different:

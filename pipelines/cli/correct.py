@@ -200,6 +200,9 @@ def _document(recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, 
     document["bias"] = {
         "last_ug": dict(zip(AXES, (MICRO * track.bias[-1]).tolist(), strict=True)),
         "u_last_ug": dict(zip(AXES, (MICRO * end).tolist(), strict=True)),
+        "u_last_at_limits_ug": None
+        if done.at_limits is None
+        else dict(zip(AXES, (MICRO * np.sqrt(np.diagonal(done.at_limits.covariance[-1]))).tolist(), strict=True)),
         "updates": int(track.updated.sum()),
         "steps": len(track.updated),
         "rejected": track.rejected,
@@ -240,6 +243,9 @@ def _print(document: dict[str, Any]) -> None:
     bias = document["bias"]
     if bias is not None:
         line(f"bias at the end, µg: {axes(bias['last_ug'])}; standard uncertainty: {axes(bias['u_last_ug'])}")
+        limits = bias["u_last_at_limits_ug"]
+        if limits is not None and any(limits[axis] > 1.2 * bias["u_last_ug"][axis] for axis in limits):
+            line(f"with the upper limits of noise terms that the static record does not identify: {axes(limits)}")
         low, high = bias["nis_bounds"]
         line(f"updates: {bias['updates']} of {bias['steps']} steps, {bias['rejected']} beyond 5 σ rejected")
         verdict = {

@@ -80,7 +80,7 @@ def command(
         without_dwells,
     )
     from pipelines.diagnosis.inputs import history_beside
-    from pipelines.importers.exchange import is_file
+    from pipelines.importers.files import is_file
 
     add_effect_files(effect_file)
     add_formulas(formula, "diagnose")
@@ -112,7 +112,7 @@ def command(
 def _kept_name(dwells: str, archive: str | None) -> str:
     """The name of the data for a page that is kept: what 'latest' means changes."""
     from pipelines.archive import Archive
-    from pipelines.importers.exchange import is_file
+    from pipelines.importers.files import is_file
 
     return dwells if is_file(dwells) else Archive(archive).run(dwells).id
 
@@ -151,7 +151,7 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
         Neither a file of dwells nor an import states its recipe, and none is named.
     """
     from pipelines.archive import Archive
-    from pipelines.importers.exchange import is_file
+    from pipelines.importers.files import is_file
     from pipelines.jobs.job import job_of_run
     from pipelines.jobs.recipes import load_recipe
     from schemas.errors import WrongUse

@@ -20,6 +20,7 @@ from pipelines.cli.options import (
     short,
     short_values,
 )
+from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 from schemas.foreign import shown
 
@@ -282,6 +283,7 @@ def _import_one(
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
     from pipelines.importers.dwell_list import dwell_rows
+    from pipelines.importers.pose_check import CHECK_AXIS
 
     name = " + ".join(path.name for path in paths)
     columns, units = keys.get("columns"), keys.get("units")
@@ -301,6 +303,7 @@ def _import_one(
         with error_console().status("fitting and judging"):
             judged = judge(fit, data, how)
     run = keep.keep(data, source, how, judged, archive, stated)
+    turned = fit == "plane" and judged is not None and judged.adequate is not False  # its one axis is meant to be still
     return {
         "run": run.id,
         "source": source.as_dict(),
@@ -308,7 +311,7 @@ def _import_one(
         "out_unit": data.out_unit,
         "samples": 0 if data.samples is None else len(data.samples),
         "dwells": 0 if data.dwells is None else len(data.dwells),
-        "remarks": [*data.remarks, *_slips(how)],
+        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *_slips(how)],
         "faults": list(data.faults),
         "fit": fit or None,
         "adequate": None if judged is None else judged.adequate,
@@ -329,7 +332,8 @@ def _slips(how: Mapping) -> list[str]:
 def _print(one: dict[str, Any], archive: str | None, *, list_dwells: bool) -> None:
     """An import for people."""
     out = console()
-    rows = f"{one['samples']} samples, {one['dwells']} dwells" if one["samples"] else f"{one['dwells']} dwells"
+    dwells = number_of(one["dwells"], "dwell")
+    rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
     out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}", markup=False)
     for remark in [*one["remarks"], *one["lines"]]:
         out.print(f"  {remark}", markup=False, soft_wrap=True)

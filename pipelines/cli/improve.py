@@ -88,7 +88,7 @@ def command(
     """
     from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
     from pipelines.diagnosis.inputs import history_beside
-    from pipelines.importers.exchange import is_file
+    from pipelines.importers.files import is_file
     from pipelines.tables.leave_out import leave_out as without_dwells
     from pipelines.tables.leave_out import named_dwells
 

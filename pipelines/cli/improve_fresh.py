@@ -22,7 +22,7 @@ def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
     measure : whether the station measures one where the archive has none; None: ask at the terminal, else not
     """
     from pipelines.archive import Archive
-    from pipelines.importers.exchange import is_file
+    from pipelines.importers.files import is_file
     from pipelines.jobs.fresh_run import fresh_run_of, repeatable
 
     if is_file(source):

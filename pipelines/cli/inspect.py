@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.options import GroupOption, JoinOption, JsonOption, console, error_console, print_json, print_table
+from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
@@ -62,6 +63,12 @@ def command(
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"inspections": documents})
     else:
+        if len(documents) > 1:
+            console().print(
+                f"{len(documents)} recordings; if they are parts of one, add --join rows (one after the other) or --join "
+                "columns (side by side)",
+                soft_wrap=True,
+            )
         for document in documents:
             _print(document)
     raise typer.Exit(PART_FAILED if any(document["open"] for document in documents) else DONE)
@@ -93,7 +100,7 @@ def _print(one: InspectDocument) -> None:
     if one["time_unit"]:
         out.print(f"  time in {one['time_unit']}: {one['time_reason']}", soft_wrap=True)
     if one["gaps"]:
-        out.print(f"  {one['gaps']} gaps in time longer than five samples", soft_wrap=True)
+        out.print(f"  {number_of(one['gaps'], 'gap')} in time longer than five samples", soft_wrap=True)
     for fault in one["faults"][:MOST_FAULTS]:
         what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
         out.print(

@@ -66,7 +66,7 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     history : the file of temperatures against time that was read; empty where there was none
     """
     from pipelines.diagnosis.inputs import fresh_beside, history_beside
-    from pipelines.importers.exchange import is_file
+    from pipelines.importers.files import is_file
 
     if is_file(source):
         fresh = fresh_beside(source)

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive
-from pipelines.importers.exchange import is_file, read_dwells, read_history
+from pipelines.importers.exchange import read_dwells, read_history
+from pipelines.importers.files import is_file
 from pipelines.jobs.model_files import chosen_effects, use_formulas, use_formulas_of
 from schemas.errors import WrongUse
 from schemas.foreign import shown

@@ -12,9 +12,10 @@ from scipy.linalg import block_diag
 from inertial import static_intervals
 from inertial.correction import correct, output_covariance, remaining_step
 from inertial.noise.bias_filter import Track, track
-from inertial.noise.gauss_markov import bias_model, flicker_terms
+from inertial.noise.gauss_markov import bias_model, flicker_of_steps
+from inertial.noise.likely_terms import LikelyTerms, likely_terms
 from pipelines.export.polynomials import unit_calibrations
-from pipelines.export.unit_noise import required_noise
+from pipelines.export.unit_noise import curve_of_unit, required_noise
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.units import AXES, MICRO
@@ -29,12 +30,15 @@ if TYPE_CHECKING:
     from pipelines.archive import Run
     from pipelines.export.polynomials import UnitCalibration
     from pipelines.export.recording import CorrectableRecording
+    from pipelines.export.unit_noise import UnitCurve
 
     Array = NDArray[np.float64]
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 CONVERGED_G = 1e-6
 """Largest further step of a correction that has converged, g."""
+HIDDEN = float(np.sqrt(np.sqrt(2.0 / np.pi) / 1.96))
+"""Expected B over its upper limit (95 %) where none shows: B² is a half of a normal distribution, mean √(2/π), limit 1.96 sd."""
 LONGEST_STEPS = 200_000
 GAP = 3.0
 """Multiple of the usual interval of samples above which an interval is a gap in the recording."""
@@ -45,6 +49,7 @@ class FitOfUnit:
     """Coefficients of one unit.
 
     coefficients : (3, p); covariance : (3p, 3p), x before y before z; budget : whether it includes the stated references
+    curve : Allan deviation of its static record; None where there is none that noise terms explain
     """
 
     run: str
@@ -54,6 +59,7 @@ class FitOfUnit:
     covariance: Array
     nonlinear: Mapping[str, Mapping[str, Any]]
     budget: bool
+    curve: UnitCurve | None = None
 
 
 @dataclass(frozen=True)
@@ -78,6 +84,7 @@ class Corrected:
 
     force : (n, 3), g; covariance : (n, 3, 3), g², of the calibration; with a track also of the bias and of noise
     track : of the steps, and of the samples after the last whole step as one step without update
+    at_limits : the same with the upper limits (95 %) of the terms that the static record does not identify
     bias, bias_covariance : at the samples; None without tracking
     outside : samples beyond the temperatures that were measured
     """
@@ -90,6 +97,7 @@ class Corrected:
     updated: NDArray[np.bool_] | None
     outside: int
     flicker: FlickerTerms | None = None
+    at_limits: Track | None = None
 
 
 def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUnit:
@@ -124,6 +132,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
         covariance if budget is None else budget,
         calibration.nonlinear,
         budget is not None,
+        curve_of_unit(run, serial),
     )
 
 
@@ -201,18 +210,38 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
         middle = np.append(middle, time[-1])
         force, known = (np.vstack([values, np.full((1, 3), np.nan)]) for values in (force, known))
         magnitude = np.append(magnitude, np.nan)
-    flicker = flicker_terms(per / rate, max(1000.0 * per / rate, float(time[-1] - time[0])))
-    terms = {symbol: values / MICRO for symbol, values in noise.value.items()}
-    model = bias_model(terms["N"], terms["B"], terms["K"], tracking.turn_on_ug / MICRO, flicker)
-    found = track(model, middle, force, known, magnitude, per / rate)
+    flicker = flicker_of_steps(per / rate, max(1000.0 * per / rate, float(time[-1] - time[0])))
+    limits = LikelyTerms(*(noise.value[symbol] / MICRO for symbol in ("N", "B", "K")))
+    terms = limits if fit.curve is None else _likely(fit.curve, limits, noise.identified["B"])
+    found, at_limits = (
+        track(
+            bias_model(one.white, one.instability, one.walk, tracking.turn_on_ug / MICRO, flicker),
+            middle, force, known, magnitude, per / rate,
+        )
+        for one in (terms, limits)
+    )  # fmt: skip
     last = np.arange(len(time)) // per
     bias, own = found.expected[last], found.expected_covariance[last]
-    white = np.diag(model.white**2 * rate)
-    covariance = plain.covariance + own + white
+    covariance = plain.covariance + own + np.diag(_within_a_step(terms, per, rate))
     return replace(
         plain, force=plain.force - bias, covariance=covariance, track=found, bias=bias, bias_covariance=own,
-        updated=found.updated[last], flicker=flicker,
+        updated=found.updated[last], flicker=flicker, at_limits=at_limits,
     )  # fmt: skip
+
+
+def _likely(curve: UnitCurve, limits: LikelyTerms, identified: NDArray[np.bool_]) -> LikelyTerms:
+    """The likeliest terms in g; where white noise hides B, what is to be expected below its limit, as no bias is constant."""
+    found = likely_terms(curve.deviation / MICRO, curve.m, curve.n, curve.rate_hz)
+    return replace(found, instability=np.where(identified, found.instability, HIDDEN * limits.instability))
+
+
+def _within_a_step(terms: LikelyTerms, per: int, rate: float) -> Array:
+    """Variance (3,), g², of a sample about the mean of its step of ``per`` samples: N²·rate + B²·ln(per)/π + K²·Δt/6.
+
+    The flicker term is the variance of 1/f noise with the Allan variance 2 ln2/π·B² in a record of ``per`` samples: D. W. Allan,
+    Proc. IEEE 54 (1966) 221; NIST SP 1065, B₁ = N·ln N/(2(N − 1)·ln 2). It does not depend on what the filter knows.
+    """
+    return terms.white**2 * rate + terms.instability**2 * np.log(per) / np.pi + terms.walk**2 * per / rate / 6.0
 
 
 def _rate_and_gaps(time: Array) -> tuple[float, NDArray[np.bool_]]:

@@ -12,6 +12,10 @@ class TrackedBiasDocument(TypedDict):
 
     last_ug: Annotated[dict[str, float], "bias at the end, by axis"]
     u_last_ug: Annotated[dict[str, float], "its standard uncertainty, by axis"]
+    u_last_at_limits_ug: Annotated[
+        dict[str, float] | None,
+        "the same with the upper limits (95 %) of the noise terms that the static record does not identify",
+    ]
     updates: Annotated[int, "steps in which the force was known"]
     steps: int
     rejected: Annotated[int, "innovations beyond 5 standard deviations"]

@@ -58,6 +58,34 @@ def noise_of_units(run: Run) -> dict[str, UnitNoise]:
     return found
 
 
+@dataclass(frozen=True)
+class UnitCurve:
+    """Allan deviation (3, t) of x, y and z in µg, at ``m`` (t,) samples, of ``n`` at ``rate_hz``."""
+
+    deviation: NDArray[np.float64]
+    m: NDArray[np.int64]
+    n: int
+    rate_hz: float
+
+
+def curve_of_unit(run: Run, unit: str) -> UnitCurve | None:
+    """The Allan curves of a unit's static record; None where an axis has none or no mixture of noise terms explains it."""
+    if not {"allan", "readings"} <= set(run.tables()):
+        return None
+    own = run.table("allan")
+    own = own[own["unit"] == unit]
+    axes = [own[own["axis"] == axis] for axis in AXES]
+    readings = run.table("readings")
+    readings = readings[(readings["kind"] == "allan") & (readings["unit"] == unit) & (readings["status"] == "ok")]
+    if readings.empty or len({len(rows) for rows in axes}) > 1 or axes[0].empty or own["fitted_ug"].isna().any():
+        return None
+    tau = axes[0]["tau_s"].to_numpy(dtype=np.float64)
+    rate = 1.0 / float(tau[0])  # of the means that the curve begins with
+    n = int(readings["n"].iloc[0]) // max(1, round(float(readings["rate_hz"].iloc[0]) / rate))
+    deviation = np.stack([rows["deviation_ug"].to_numpy(dtype=np.float64) for rows in axes])
+    return UnitCurve(deviation, np.rint(tau * rate).astype(np.int64), n, rate)
+
+
 def required_noise(noise: UnitNoise | None, unit: str, run: str, form: str) -> UnitNoise:
     """The noise of a unit; refused where the run does not state it."""
     if noise is None or not all(np.all(np.isfinite(noise.value[s])) for s in ("N", "K")):

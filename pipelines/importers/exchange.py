@@ -13,7 +13,6 @@ from pipelines.importers import files, values
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, did_you_mean
-from schemas.foreign import is_file as is_there
 from schemas.foreign import shown
 from schemas.serials import refuse_unusable_serials
 
@@ -47,7 +46,7 @@ def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.
     WrongUse
         There is no such file and no such run.
     """
-    if is_file(source):
+    if files.is_file(source):
         frame, _ = files.read(Path(source))
         return checked(frame, where=Path(source).name, foreign=True)
     return dwells_of(_run(source, archive))
@@ -61,7 +60,7 @@ def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd
     source : a file, or the name of a run in the archive
     archive : the archive's folder where `source` is a run
     """
-    if is_file(source):
+    if files.is_file(source):
         frame, _ = files.read(Path(source))
         return _checked_history(frame, Path(source).name, foreign=True)
     return history_of(_run(source, archive))
@@ -99,17 +98,6 @@ def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.Dat
     _plausible(frame, where)
     frame = table_check.check("dwells", frame, where=where)
     return frame.sort_values(["unit", "dwell"], kind="stable").reset_index(drop=True)
-
-
-def is_file(source: str | Path) -> bool:
-    """Whether a source is a file, not a run of the archive."""
-    path = Path(source)
-    looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
-    return is_there(path) or (looks_like_one and not _is_run_like(source))
-
-
-def _is_run_like(source: str | Path) -> bool:
-    return isinstance(source, str) and "/" not in source and not Path(source).suffix
 
 
 def _run(source: str | Path, archive: str | Path | None) -> Run:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.importers.readers import reader_of
 from pipelines.importers.unpacking import gunzipped
 from schemas.errors import DataRejected, WrongUse
+from schemas.foreign import is_file as is_there
 from schemas.foreign import shown
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import pandas as pd
 
     from pipelines.importers.content import Content
@@ -36,6 +36,17 @@ class SourceFile:
     def as_dict(self) -> dict[str, Any]:
         """JSON-able."""
         return {"path": self.path, "sha256": self.sha256, "bytes": self.size, "form": self.form}
+
+
+def is_file(source: str | Path) -> bool:
+    """Whether a source is a file, not a run of the archive."""
+    path = Path(source)
+    looks_like_one = isinstance(source, Path) or "/" in str(source) or path.suffix != ""
+    return is_there(path) or (looks_like_one and not _is_run_like(source))
+
+
+def _is_run_like(source: str | Path) -> bool:
+    return isinstance(source, str) and "/" not in source and not Path(source).suffix
 
 
 def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:

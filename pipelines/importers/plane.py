@@ -11,6 +11,7 @@ from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm,
 from inertial.probability import passes
 from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
 from pipelines.tables.dwells import measured
+from schemas.counts import number_of
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
@@ -155,8 +156,8 @@ def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
         )
     if found.dof < FEWEST_DOF:
         return None, (
-            f"cannot be judged: {found.dof} degrees of freedom, {FEWEST_DOF} are needed; measure "
-            f"{FEWEST_DOF - found.dof} more poses"
+            f"cannot be judged: {number_of(found.dof, 'degree')} of freedom, {FEWEST_DOF} are needed; measure "
+            f"{number_of(FEWEST_DOF - found.dof, 'more pose')}"
         )
     passed = passes(found.p_value, UNLIKELY)
     if passed is None:

@@ -20,12 +20,17 @@ _DEAD = 0.2
 _CLEAR = 0.6
 _MISFIT = 0.1
 """Largest unexplained part of gravity for a response of exchanged axes."""
+CHECK_AXIS = "CHECK AXIS"
+ONE_POSE = (
+    "one pose whose force is not known: its noise by 'tumbleline allan'; for the bias and what drives it give the face that is "
+    "up (--face +x … -z) and --blocks S, with the output in g; scale and misalignment need more poses"
+)
 OUT = ["out_x", "out_y", "out_z"]
 FORCE = ["force_x", "force_y", "force_z"]
 
 
 def silent_axis(dwells: pd.DataFrame) -> str:
-    """A sentence on an axis, with its letter first, that stays constant while another turns through gravity; else empty."""
+    """A sentence on an axis, its letter first, that stays constant while another turns through gravity; else empty."""
     means = dwells[OUT].to_numpy(dtype=np.float64)
     weak = quiet_axis(means)
     if weak is None:
@@ -46,9 +51,11 @@ def refuse_or_remark(dwells: pd.DataFrame, mapping: Mapping, where: str) -> tupl
     DataRejected
         The outputs belong to other faces than those named, or an axis does not respond to gravity.
     """
+    if FORCE[0] not in dwells.columns and len(dwells) == 1:
+        return (ONE_POSE,)
     if not mapping.poses or FORCE[0] not in dwells.columns:
         silent = silent_axis(dwells)
-        return (f"CHECK AXIS {silent[0]}: {silent}",) if silent else ()
+        return (f"{CHECK_AXIS} {silent[0]}: {silent}",) if silent else ()
     force, output = dwells[FORCE].to_numpy(dtype=np.float64), dwells[OUT].to_numpy(dtype=np.float64)
     design = np.column_stack([np.ones(len(force)), force])
     if np.linalg.matrix_rank(design, tol=0.1) < 4:

@@ -10,6 +10,7 @@ import pandas as pd
 from pipelines.importers import clocks, values
 from pipelines.importers.clocks import RecordingClock
 from pipelines.importers.mapping import TIME_UNITS, Mapping
+from schemas.counts import number_of
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
 
@@ -166,7 +167,8 @@ def gaps_of(
     if not wide.size:
         return list(breaks), ()
     first, longest = int(wide[0]), float(np.max(steps[wide - 1]))
-    found = f"{wide.size} gaps in time longer than {GAP:g} samples, the first before row {first + 1}, the longest {longest:.4g} s"
+    gaps = number_of(wide.size, "gap")
+    found = f"{gaps} in time longer than {GAP:g} samples, the first before row {first + 1}, the longest {longest:.4g} s"
     if mapping.gaps == "refuse":
         raise DataRejected(
             f"{where}: {found}; samples without gaps are needed; record again, or add --gaps split to use what lies between"

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers import files
-from pipelines.importers.exchange import is_file
+from pipelines.importers.files import is_file
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.units import AXES

@@ -1,8 +1,7 @@
 """The layout of a text of numbers: divider, decimal sign, where the table begins, and which line names its columns.
 
 Nothing is assumed about the beginning of a file, which often has settings of the device. The layout is read from the lines
-further
-down, which are uniform, and the table begins with the first line of the same form.
+further down, which are uniform, and the table begins with the first line of the same form.
 """
 
 from __future__ import annotations
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
 
 COMMENTS = ("#", "%")
 BLANKS = r"\s+"
+_OF_NUMBERS = frozenset("0123456789+-.")
+"""First characters of a line that is plainly neither empty nor a comment."""
 _SAMPLE = 300
 _TAIL = 40
 _LONGEST = 64
@@ -65,9 +66,9 @@ def is_comment(line: str) -> bool:
     return not stripped or stripped.startswith(COMMENTS)
 
 
-def filled_lines(lines: Sequence[str], first: int = 0) -> list[int]:
-    """Indices, from one on, of the lines that are neither empty nor comments; without a call per line, for long records."""
-    return [k for k in range(first, len(lines)) if (words := lines[k].lstrip()) and words[0] not in COMMENTS]
+def filled_lines(lines: Sequence[str]) -> list[int]:
+    """Indices of the lines that are neither empty nor comments; without a call per line of numbers, for long records."""
+    return [k for k, line in enumerate(lines) if line[:1] in _OF_NUMBERS or not is_comment(line)]
 
 
 def fields_of(line: str, divider: str) -> list[str]:
@@ -88,9 +89,8 @@ def is_number(word: str, decimal: str = ".") -> bool:
     return len(word) <= _LONGEST and (_POINT if decimal == "." else _COMMA).fullmatch(word) is not None
 
 
-def layout(lines: Sequence[str]) -> Layout | None:
-    """The layout of a text's lines; None if all lines are comments."""
-    filled = filled_lines(lines)
+def layout(lines: Sequence[str], filled: list[int]) -> Layout | None:
+    """The layout of a text's lines, those of ``filled_lines`` its rows; None if all lines are comments."""
     if not filled:
         return None
     sample = _sampled([lines[k] for k in filled])

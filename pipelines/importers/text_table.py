@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from bisect import bisect_left
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,11 +63,12 @@ def _wide(data: bytes) -> tuple[str, ...]:
 def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     """The columns of a text, named as there ("1", "2", … without a header), and its detected layout."""
     lines, grouped = without_thousands(logical_lines(text))
-    found = layout(lines)
+    filled = filled_lines(lines)
+    found = layout(lines, filled)
     if found is None:
         raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
     labels = _labels(found, where)
-    body = [lines[k] for k in filled_lines(lines, found.first)]
+    body = [lines[k] for k in filled[bisect_left(filled, found.first) :]]
     table = _parsed(body, found, labels, where)
     units = {label: unit for label, unit in zip(labels, found.units, strict=False) if unit} or {
         label: unit for label in labels if (unit := unit_in(label))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+
+from inertial.distributions import chi2_upper
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,5 +33,5 @@ def bias_stability(record: Array, rate_hz: float) -> tuple[float, float, float] 
         return None
     means = record[-count * length :].reshape(count, length).mean(axis=1)
     value, dof = float(np.std(means, ddof=1)), count - 1
-    low, high = (value * float(np.sqrt(dof / stats.chi2.isf(p, dof))) for p in (_TAIL, 1.0 - _TAIL))
+    low, high = (value * float(np.sqrt(dof / chi2_upper(p, dof))) for p in (_TAIL, 1.0 - _TAIL))
     return value, low, high

@@ -138,7 +138,7 @@ def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_
     assert not (tmp_path / "b").exists()
     path.write_text(recordings.table(record).drop(index=range(1500, 1560)).to_csv(index=False), encoding="utf-8")
     _, _, err = told(monkeypatch, capsys, "import", path, *MAPPED, "--archive", tmp_path / "b")
-    assert "1 gaps in time longer than 5 samples, the first before row 1501, the longest 0.61 s" in err
+    assert "1 gap in time longer than 5 samples, the first before row 1501, the longest 0.61 s" in err
     path.write_text(gapped_file(record), encoding="utf-8")
     document = imported(path, tmp_path, *MAPPED, "--gaps", "split")
     assert "2 of " in document["remarks"][0]
@@ -277,3 +277,31 @@ def test_a_dead_axis_is_named_instead_of_asking_for_more_poses(record, monkeypat
     assert status == 2
     assert "axis y changes by" in err
     assert "add poses" not in err
+
+
+def test_one_pose_says_what_it_shows(monkeypatch, capsys, tmp_path: Path, rng: np.random.Generator) -> None:
+    n = 3000
+    frame = pd.DataFrame(
+        np.round(16384 * np.array([0.0, 0.0, 1.0]) + 5.0 * rng.normal(size=(n, 3))), columns=["ax", "ay", "az"]
+    )
+    (tmp_path / "a.csv").write_text(frame.assign(t=np.arange(n) / 100.0).to_csv(index=False), encoding="utf-8")
+    status, out, _ = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
+    assert status == 0
+    assert "3000 samples, 1 dwell in LSB" in out
+    assert "one pose whose force is not known: its noise by 'tumbleline allan'" in out
+    assert "--face +x … -z" in out
+    stated = ("--face", "+z", "--blocks", "5", "--local-g", "9.81")
+    _, out, err = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, *stated, "--archive", tmp_path / "b")
+    assert "6 dwells in LSB" in out, err
+    assert "one pose whose" not in out
+
+
+def test_several_recordings_are_offered_as_one(record, monkeypatch, capsys, tmp_path: Path) -> None:
+    table, half = recordings.table(record), len(record.time) // 2
+    for name, part in (("p1.csv", table[:half]), ("p2.csv", table[half:])):
+        (tmp_path / name).write_text(part.to_csv(index=False), encoding="utf-8")
+    _, out, _ = told(monkeypatch, capsys, "inspect", tmp_path / "p1.csv", tmp_path / "p2.csv")
+    assert "add --join rows (one after the other) or --join" in out
+    assert out.rstrip().splitlines()[-1].startswith("tumbleline import ")
+    _, out, _ = told(monkeypatch, capsys, "inspect", tmp_path / "p1.csv", tmp_path / "p2.csv", "--join", "rows")
+    assert "--join rows (one" not in out

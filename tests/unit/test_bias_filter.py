@@ -97,7 +97,8 @@ def test_nis_and_nees_of_its_own_model_lie_in_their_bounds(rng: np.random.Genera
     terms = flicker_terms(1.0, 1000.0)
     model = bias_model([2e-5] * 3, [1e-5] * 3, [1e-7] * 3, [3e-4] * 3, terms)
     runs, n = 30, 200
-    truth = processes(rng, model, runs, n, 1.0)
+    # a step of the filter is a mean: here over forty values of the process
+    truth = processes(rng, model, runs, 40 * n, 1.0 / 40.0).reshape(runs, n, 40, 3).mean(axis=2)
     output = truth + 2e-5 * rng.standard_normal(truth.shape)
     known = np.zeros((n, 3))
     known[80:150] = np.nan  # nothing is known for 70 s

@@ -366,6 +366,27 @@ def test_revoked_amended_and_unknown_certificates_are_told_by_the_archive(issued
     )
 
 
+def test_a_certificate_superseded_by_a_later_run_is_told_by_the_archive(
+    issued: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(str(issued.run.archive.root), tmp_path / "archive")
+    later = small_run(tmp_path, None, ("seed = 5", "seed = 6"))
+    later.seal()
+    assert later.id != issued.run.id
+    now = datetime.now(tz=UTC).date()
+    begins = (now + timedelta(days=40)).isoformat()
+    number = certify(Ledger(later.archive), later, ["A1"], begins, months=6).events[0].certificate
+    words = ("--trust", issued.trust, "--archive", tmp_path / "archive")
+    for name in ("A1_1.pdf", "A1_1.xml"):
+        told = f"superseded by certificate {number} on {now}, not valid from {begins} on"
+        with_it = checked(issued.folder / name, *words, status=0)  # until that day it is valid
+        assert told in [one["message"] for one in with_it["files"][0]["checks"] if one["check"] == "state"]
+        with monkeypatch.context() as later_day:
+            later_day.setattr("pipelines.certificate_document.archive_comparison.today", lambda: begins)
+            assert wrong(checked(issued.folder / name, *words, status=1)) == {"state": told}
+    assert checked(issued.folder / "A2_1.xml", *words)["accepted"]  # the other unit's certificate stands
+
+
 def test_an_archive_that_is_only_there_by_chance_is_not_demanded(issued: Issued, tmp_path: Path) -> None:
     """The usual place of the archive holds that of somebody else, who receives the certificate."""
     Archive(tmp_path / "archive").prepare()
