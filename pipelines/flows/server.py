@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipelines.flows.new_database import make_database
 from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_database, use_key
 from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
@@ -60,6 +61,7 @@ def serve(
     folder = os.environ.get("PREFECT_HOME")
     if folder:
         private_folder(Path(folder))
+        make_database(Path(folder))
     import uvicorn
 
     from pipelines.flows.application import application  # Prefect reads its settings when it is imported
