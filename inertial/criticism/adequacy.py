@@ -102,9 +102,9 @@ class _Draws:
         covariance = self.model.problem.covariance
         shape = (self.model.problem.blocks, self.model.problem.n, count)
         # a few draws at a time: each step makes several arrays of their size
-        series = np.empty(shape)
+        series = self._white(shape)
         for some in self._pieces(count):
-            series[..., some] = covariance.coloured(self.model.noise, self._white(series[..., some].shape))
+            series[..., some] = covariance.coloured(self.model.noise, series[..., some])
         chosen = self._estimated(series)
         spaces = {k: _At(self.model, self._shares(k), series[:, :, chosen == k]) for k in np.unique(chosen).tolist()}
         worst = np.zeros(count)

@@ -173,6 +173,7 @@ def test_the_samples_of_a_run_are_decoded_once(tmp_path: Path, monkeypatch: pyte
     asked: list[object] = []
     plain = Records.samples
     monkeypatch.setattr(Records, "samples", lambda own, records=None: asked.append(records) or plain(own, records))
+    (tmp_path / "archive").mkdir()  # so the run is made here, not copied
     run = small_run(tmp_path)
     static = set(run.table("readings").query("kind == 'allan'")["record"])
     assert asked == [None, static]
