@@ -103,7 +103,7 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
     order: ClassVar[int] = 130
     states: ClassVar[str] = (
         "linearity in % of full scale, K2, K3, sensitivity by the radius; at two radii also the offset of the proof mass, "
-        "parted from K1', and arm stretch, parted from Koq"
+        "parted from K1′, and arm stretch, parted from Koq"
     )
     source: ClassVar[str] = "IEEE Std 836 (centrifuge), IEEE Std 1293"
     roles: ClassVar[tuple[str, ...]] = ("centrifuge",)
