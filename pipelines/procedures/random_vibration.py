@@ -269,8 +269,8 @@ def _tolerance(part: RandomVibrationPart, points: pd.DataFrame) -> list[Finding]
     beyond = float(np.mean(np.abs(apart) > LINE_DB))
     text = (
         f"overall level {signed(100.0 * (ratio.min() - 1.0), 1)} to {signed(100.0 * (ratio.max() - 1.0), 1)} % from the order "
-        f"(± {100.0 * OVERALL:.0f} % allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of the lines of a right level lie within "
-        f"{signed(low, 1)} to {signed(high, 1)} dB"
+        f"(± {100.0 * OVERALL:.0f} % allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of the lines of "
+        f"a right level lie within {signed(low, 1)} to {signed(high, 1)} dB"
     )
     return [Finding("", "level of the reference", text)]
 
