@@ -131,7 +131,7 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
         ),
     )
 
-    def check(self, part: CentrifugePart, recipe: Recipe, station: StationConfig) -> None:
+    def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
         """Refuse several radii on a centrifuge that cannot be told the radius, and a part without a scale."""
         super().check(part, recipe, station)
         if part.radii_m is not None and not profile_of(station.fitted()["centrifuge"]).has("radius"):
@@ -243,7 +243,8 @@ def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
 def _of_radius(part: CentrifugePart, rows: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
     """Figures and texts of a unit at one radius."""
     fit = fitted(part, rows)
-    return figures_of_radius(part, fit), texts_of_radius(part, fit)
+    figures = figures_of_radius(fit, part.full_scale_g, part.radius_m, 1e-6 * part.radius_um)
+    return figures, texts_of_radius(fit, part.radius_m, both=part.reversed)
 
 
 def _of_radii(part: CentrifugePart, rows: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:

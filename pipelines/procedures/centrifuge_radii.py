@@ -50,7 +50,8 @@ def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
     name = "centrifuge_radius_consistency_ppm"
     if fit.consistency is None:
         return [*found, FigureValue.not_determined(name, "z", ONE_MOUNTING)]
-    return [*found, FigureValue(name, "z", *(MICRO * one for one in fit.consistency))]
+    value, error = fit.consistency
+    return [*found, FigureValue(name, "z", MICRO * value, MICRO * error)]
 
 
 def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str]]:

@@ -16,15 +16,16 @@ from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from inertial.dynamics.centrifuge_diagnosis import SpinDiagnosis
-    from pipelines.procedures.centrifuge import CentrifugePart
 
 
-def figures_of_radius(part: CentrifugePart, fit: Polynomial) -> list[FigureValue]:
+def figures_of_radius(
+    fit: Polynomial, full_scale_g: float, radius_m: float, radius_error_m: float
+) -> list[FigureValue]:
     """Figures of a unit at one radius; those that need two are not determined."""
-    linearity = linearity_percent(fit, part.full_scale_g)
-    spread = linearity_error(fit, part.full_scale_g)
+    linearity = linearity_percent(fit, full_scale_g)
+    spread = linearity_error(fit, full_scale_g)
     k2, k3, k1 = fit.of("second_order"), fit.of("third_order"), fit.of("scale")
-    radius = 1e-4 * part.radius_um / part.radius_m  # %
+    radius = 100.0 * radius_error_m / radius_m  # %
     return [
         FigureValue("centrifuge_linearity_percent", "z", linearity, spread),
         FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
@@ -36,13 +37,13 @@ def figures_of_radius(part: CentrifugePart, fit: Polynomial) -> list[FigureValue
     ]
 
 
-def texts_of_radius(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, str]]:
+def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tuple[str, str]]:
     """Verdict on the polynomial at one radius, and the classes of effects that it holds: subject and text."""
     p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
     verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
     judged_by = f"χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, {probability(p)}"
     out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: {judged_by}")]
-    if not part.reversed:
+    if not both:
         text = (
             "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
             "measure with the units reversed"
@@ -51,16 +52,16 @@ def texts_of_radius(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, st
     for name, text in (
         (
             "arm_stretch_or_odd_quadratic",
-            "arm stretch or Koq, one class: separate them by the optical radius at speed",
+            "arm stretch or Koq, one class: two radii (radii_m) or the optical radius at speed separate them",
         ),
         (
             "mass_offset_or_asymmetry",
-            "offset of the proof mass from the turning centre, or a scale that differs by sign, one class",
+            "offset of the proof mass from the turning centre, or a scale that differs by sign, one class: two radii (radii_m) separate them",
         ),
     ):
         value, error = fit.of(name)
         if abs(value) > 4.0 * error:
-            factor = 1e3 * part.radius_m if name.startswith("mass") else MICRO
+            factor = 1e3 * radius_m if name.startswith("mass") else MICRO
             unit = "mm of offset" if name.startswith("mass") else "µg/g²"
             out.append(
                 ("effect found", f"{text}: {with_uncertainty(factor * value, 2.0 * factor * error)} {unit} (k = 2)")

@@ -21,7 +21,7 @@ TRUE = {
 }  # fmt: skip
 
 
-def spins(signs=(1.0, -1.0), radii=(0.5, 0.3)) -> Spins:
+def spins(signs: tuple[float, ...] = (1.0, -1.0), radii: tuple[float, ...] = (0.5, 0.3)) -> Spins:
     a = np.array([s * f for _ in radii for s in signs for f in WAY])
     slow = np.tile(np.arange(WAY.size) > WAY.size // 2, len(signs) * len(radii)).astype(float)
     radius = np.repeat(radii, len(signs) * WAY.size)
