@@ -56,7 +56,7 @@ def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tup
         ),
         (
             "mass_offset_or_asymmetry",
-            "offset of the proof mass from the turning centre, or a scale that differs by sign, one class: two radii (radii_m) separate them",
+            "offset of the proof mass from the turning centre, or K1′, one class: two radii (radii_m) separate them",
         ),
     ):
         value, error = fit.of(name)
