@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from scipy import signal
 
+from stations.plant.families.acutrol_3000 import radius_error
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
@@ -19,6 +21,7 @@ WARM_G, WARM_S, BAND_UG = 1e-2, 120.0, 1000.0
 CYCLES, CYCLE_S, WINDOW_S = 10, 74.0, 10.0  # power cycles: off, on, the record, and the orders between
 FLAT_HZ = 500.0
 RADIUS_M = 0.5
+TWO_RADII_M = (0.5, 0.3)
 FULL_SCALE_G = 30.0
 
 
@@ -162,6 +165,27 @@ def _centrifuge(plant: Plant, k: int) -> dict[str, float]:
         "centrifuge_second_order_ug_g2": 1e6 * gain * k2,
         "centrifuge_third_order_ug_g3": 1e6 * gain * k3,
         "centrifuge_sensitivity_percent": 100.0 * (gain - 1.0),
+        "centrifuge_mass_offset_um": np.nan,  # one radius does not determine them
+        "centrifuge_radius_consistency_ppm": np.nan,
+    }
+
+
+def _centrifuge_radii(plant: Plant, k: int) -> dict[str, float]:
+    """At two radii: the unit's own curve; the arm gives only the radii."""
+    own, static, bench = plant.bench.units[k], plant.truth(plant.serials[k]), plant.bench
+    gain, k2, k3 = 1.0 + 1e-6 * static.scale_ppm[2], own.quadratic[2], static.cubic[2]
+    x = np.linspace(-FULL_SCALE_G, FULL_SCALE_G, 20_001)
+    y = gain * (x + k2 * x**2 + k3 * x**3)
+    design = np.vander(x, 2)
+    line = design @ np.linalg.lstsq(design, y, rcond=None)[0]
+    first, second = (1.0 + radius_error(bench, r) / r for r in TWO_RADII_M)
+    return {
+        "centrifuge_linearity_percent": 100.0 * float(np.max(np.abs(y - line))) / (gain * FULL_SCALE_G),
+        "centrifuge_second_order_ug_g2": 1e6 * gain * k2,
+        "centrifuge_third_order_ug_g3": 1e6 * gain * k3,
+        "centrifuge_sensitivity_percent": 100.0 * (gain - 1.0),
+        "centrifuge_mass_offset_um": 1e6 * own.mass_offset_m,
+        "centrifuge_radius_consistency_ppm": 1e6 * (second / first - 1.0),
     }
 
 
@@ -215,6 +239,7 @@ TRUTHS: Mapping[str, Callable[[Plant, int], dict[str, float]]] = {
     "step_response": _step,
     "shock": _shock,
     "centrifuge": _centrifuge,
+    "centrifuge_radii": _centrifuge_radii,
 }
 
 

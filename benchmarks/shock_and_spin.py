@@ -1,8 +1,9 @@
-"""``python -m benchmarks.shock_and_spin [shock|centrifuge|all] [n] [seed]``: hidden effects of shocks and centrifuges, and none.
+"""``python -m benchmarks.shock_and_spin [shock|centrifuge|two_radii|all] [n] [seed]``: hidden effects named.
 
 Of each kind n waveforms (or runs of a centrifuge) have a hidden effect that leaves twice the floor in the judged model, and n
-have none. Printed is in how many the effect is in a named class, and in how many of the others something is named. The truth is
-made by scipy at 200 kHz and by mechanics, not by the product's effects.
+have none. Printed is in how many the effect is in a named class, and in how many of the others something is named; at two radii,
+whose errors are drawn, also how often the effect is alone in its class. The truth is made by scipy at 200 kHz and by mechanics,
+not by the product's effects.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ FINE = 200e3
 DURATION, RATE, BEFORE, AFTER = 0.011, 40 / 0.011, 0.015, 0.08
 WAVE_FLOOR, PEAK = 0.02, 30.0  # g
 SPIN_FLOOR = 2e-5  # g
+RADIUS_ERROR = 20e-6  # m
+TWO_RADII = (0.5, 0.3)  # m
 G = 9.80665
 LATE = 120e-6  # delay of the unit's channel
 
@@ -93,19 +96,25 @@ def _changed(kind: str, knob: float, true: Array, time: Array, length: float) ->
     return true, true
 
 
-def spin_points() -> Spins:
-    """Speeds up and down again, with the units mounted one way and reversed."""
+def spin_points(radii: tuple[float, ...] = (0.5,)) -> Spins:
+    """Speeds up and down again, with the units mounted one way and reversed, at each radius."""
     forces = (1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
     way = np.array([*forces, *forces[-2::-1]])
-    a = np.concatenate([way, -way])
-    slow = np.tile(np.arange(way.size) >= len(forces), 2).astype(float)
-    return Spins(a, np.full(a.size, 0.5), np.linspace(0.0, 1.0, a.size), slow)
+    a = np.tile(np.concatenate([way, -way]), len(radii))
+    slow = np.tile(np.arange(way.size) >= len(forces), 2 * len(radii)).astype(float)
+    radius = np.repeat(np.array(radii), 2 * way.size)
+    return Spins(a, radius, np.linspace(0.0, 1.0, a.size), slow, RADIUS_ERROR)
 
 
-def spun(points: Spins, kind: str, knob: float) -> Array:
-    """Output in g by mechanics: the rate is set for the nominal radius, the proof mass sits elsewhere, the spring bends."""
+def spun(points: Spins, kind: str, knob: float, holes: dict[float, float] | None = None) -> Array:
+    """Output in g by mechanics: the rate is set for the nominal radius, the proof mass sits elsewhere, the spring bends.
+
+    Parameters
+    ----------
+    holes : error of each radius, m; 0 where not given
+    """
     sign, rate2 = np.sign(points.acceleration), np.abs(points.acceleration) * G / points.radius_m
-    radius = points.radius_m.copy()
+    radius = points.radius_m + np.array([(holes or {}).get(float(r), 0.0) for r in points.radius_m])
     if kind == "arm_stretch":
         radius = radius * (1.0 + 1e-8 * knob * rate2)
     if kind == "mass_offset":
@@ -166,10 +175,15 @@ def shock(n: int, seed: int) -> None:
     print(f"shock: something is named in {named} of {n} without a hidden effect", flush=True)
 
 
-def centrifuge(n: int, seed: int) -> None:
+def centrifuge(n: int, seed: int, radii: tuple[float, ...] = (0.5,)) -> None:
     """Runs of a centrifuge with a hidden effect, and without."""
-    points = spin_points()
+    points, test = spin_points(radii), "centrifuge" if len(radii) == 1 else "two radii"
     error, hits = np.full(points.order.size, SPIN_FLOOR), {kind: list[bool]() for kind in SPINS}
+    alone = dict.fromkeys(SPINS, 0)
+
+    def drawn(rng: np.random.Generator) -> dict[float, float]:
+        return {r: RADIUS_ERROR * float(rng.normal()) for r in radii} if len(radii) > 1 else {}
+
     for k in range(n):
         kind, rng = SPINS[k % len(SPINS)], np.random.default_rng([seed, 3, k])
         model = tuple(name for name in SPIN_MODEL if name != kind)
@@ -178,16 +192,23 @@ def centrifuge(n: int, seed: int) -> None:
             fit = fit_spins(points, spun(points, kind, knob), error, model)
             return float(np.sqrt(np.mean((fit.residuals / error) ** 2)))
 
-        output = spun(points, kind, twice_the_floor(left)) + SPIN_FLOOR * rng.normal(size=error.size)
-        found = diagnose_spins(points, output, error, model)
-        _count(hits, kind, [one.effects for one in found.classes], k, n)
-    _print("centrifuge", hits, n)
+        output = spun(points, kind, twice_the_floor(left), drawn(rng)) + SPIN_FLOOR * rng.normal(size=error.size)
+        found = [one.effects for one in diagnose_spins(points, output, error, model).classes]
+        _count(hits, kind, found, k, n)
+        alone[kind] += (kind,) in found
+    _print(test, hits, n)
+    print(f"{test}: alone in its class: {', '.join(f'{kind} {count}' for kind, count in alone.items())}", flush=True)
     named = 0
     for k in range(n):
         rng = np.random.default_rng([seed, 4, k])
-        output = spun(points, "none", 0.0) + SPIN_FLOOR * rng.normal(size=error.size)
+        output = spun(points, "none", 0.0, drawn(rng)) + SPIN_FLOOR * rng.normal(size=error.size)
         named += bool(diagnose_spins(points, output, error).classes)
-    print(f"centrifuge: something is named in {named} of {n} without a hidden effect", flush=True)
+    print(f"{test}: something is named in {named} of {n} without a hidden effect", flush=True)
+
+
+def two_radii(n: int, seed: int) -> None:
+    """Runs at two radii."""
+    centrifuge(n, seed, TWO_RADII)
 
 
 def _count(hits: dict[str, list[bool]], kind: str, classes: list[tuple[str, ...]], k: int, n: int) -> None:
@@ -203,10 +224,10 @@ def _print(test: str, hits: dict[str, list[bool]], n: int) -> None:
 
 
 def main() -> None:
-    """Both, or the one that is named."""
+    """All, or the one that is named."""
     what = sys.argv[1] if len(sys.argv) > 1 else "all"
     n, seed = (int(sys.argv[k]) if len(sys.argv) > k else other for k, other in ((2, 100), (3, 2026)))
-    for name, run in (("shock", shock), ("centrifuge", centrifuge)):
+    for name, run in (("shock", shock), ("centrifuge", centrifuge), ("two_radii", two_radii)):
         if what in {"all", name}:
             run(n, seed)
 

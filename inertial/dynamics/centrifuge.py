@@ -73,9 +73,9 @@ TERMS = ("bias", "scale", "second_order", "third_order", "arm_stretch_or_odd_qua
 class Polynomial:
     """Coefficients of a centrifuge test in g of indicated acceleration, with their covariance.
 
-    The indicated acceleration is the output over the sensitivity; terms are named in :data:`TERMS`. Arm stretch and Koq·a|a| are
-    one parameter of such a test, and so are the offset of the proof mass from the turning centre and a scale that differs by
-    sign.
+    The indicated acceleration is the output over the sensitivity; terms are named in :data:`TERMS`. At one radius arm stretch
+    and Koq·a|a| are one parameter of such a test, and so are the offset of the proof mass from the turning centre and a scale
+    that differs by sign; :mod:`inertial.dynamics.centrifuge_radii` separates them.
     """
 
     names: tuple[str, ...]
@@ -101,6 +101,8 @@ def columns(acceleration: Array, names: tuple[str, ...]) -> Array:
         "third_order": a**3,
         "arm_stretch_or_odd_quadratic": a * np.abs(a),
         "mass_offset_or_asymmetry": np.abs(a),
+        "odd_quadratic": a * np.abs(a),
+        "asymmetry": np.abs(a),
     }
     return np.column_stack([known[name] for name in names])
 

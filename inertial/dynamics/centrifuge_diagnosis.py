@@ -25,7 +25,10 @@ DEFAULT = ("second_order", "third_order")
 
 @dataclass(frozen=True)
 class SpinFit:
-    """Bias, scale and the effects of a model: values and errors (2 + effects,) in that order; residuals (n,) in g."""
+    """Bias, scale and the effects of a model: values and errors (2 + effects + radii,) in that order; residuals (n,) in g.
+
+    The last values are the errors of several radii in m, where their uncertainty is stated; else there are none.
+    """
 
     effects: tuple[str, ...]
     value: Array
@@ -68,6 +71,8 @@ class SpinDiagnosis:
 def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> SpinFit:
     """Weighted least squares of bias, scale and effects; effects with one column share it (least norm).
 
+    Several radii have errors of their own, each an unknown and, by its stated uncertainty, an observation of 0.
+
     Parameters
     ----------
     output, error : (n,), indicated acceleration and its standard uncertainty, g
@@ -81,10 +86,12 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
         msg = f"centrifuge: {len(output)} points for {2 + len(effects)} coefficients; add speeds"
         raise NotIdentified(msg)
     rows = _rows(points, effects)
-    size = np.linalg.norm(rows / error[:, None], axis=0)
-    design = rows / error[:, None] / size
+    known = _radii_as_observed(points, rows.shape[1])
+    weighted = np.vstack([rows / error[:, None], known])
+    size = np.linalg.norm(weighted, axis=0)
+    design, target = weighted / size, np.append(output / error, np.zeros(len(known)))
     inverse = np.linalg.pinv(design.T @ design, rcond=1e-12)
-    value = inverse @ (design.T @ (output / error)) / size
+    value = inverse @ (design.T @ target) / size
     residuals = output - rows @ value
     rank = int(np.linalg.matrix_rank(design, tol=1e-8))
     spread = np.sqrt(np.maximum(np.diag(inverse), 0.0)) / size
@@ -93,8 +100,8 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
         value,
         spread,
         residuals,
-        float(np.sum((residuals / error) ** 2)),
-        len(output) - rank,
+        float(np.sum((target - weighted @ value) ** 2)),
+        len(target) - rank,
         inverse / np.outer(size, size),
     )
 
@@ -115,7 +122,20 @@ def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence
 
 def _rows(points: Spins, effects: Sequence[str]) -> Array:
     terms = [EFFECTS[name].column(points) for name in effects]
-    return np.column_stack([np.ones_like(points.acceleration), points.acceleration, *terms])
+    radii = [np.where(points.radius_m == r, points.acceleration / r, 0.0) for r in _uncertain_radii(points)]
+    return np.column_stack([np.ones_like(points.acceleration), points.acceleration, *terms, *radii])
+
+
+def _uncertain_radii(points: Spins) -> list[float]:
+    """The radii whose errors are unknowns: those of several; the error of a single one is in the scale."""
+    found = np.unique(points.radius_m).tolist()
+    return found if len(found) > 1 and points.radius_error_m > 0.0 else []
+
+
+def _radii_as_observed(points: Spins, unknowns: int) -> Array:
+    """Weighted rows (radii, unknowns) of the stated radii: each error is 0 with its uncertainty."""
+    count = len(_uncertain_radii(points))
+    return np.eye(count, unknowns, unknowns - count) / (points.radius_error_m or 1.0)
 
 
 def _verdict(

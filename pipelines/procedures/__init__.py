@@ -50,7 +50,18 @@ __all__ = [
 
 MULTI_POSITION = "multi_position"
 SHARED = (
-    *("base", "columns", "noise_columns", "recorded", "shock_bias", "shock_waves", "sweep_plan", "sweep_points"),
+    *(
+        "base",
+        "centrifuge_radii",
+        "centrifuge_radius",
+        "columns",
+        "noise_columns",
+        "recorded",
+        "shock_bias",
+        "shock_waves",
+        "sweep_plan",
+        "sweep_points",
+    ),
     *("transfer_figures", "transfer_plots", "wording"),
 )
 

@@ -1,15 +1,15 @@
-"""Centrifuge: linearity in % of full scale, K2 and K3 over a = rω²/g, with the input reversed."""
+"""Centrifuge: linearity in % of full scale, K2 and K3 over a = rω²/g, with the input reversed, at one radius or several."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.stats import chi2
 
-from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial
 from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
@@ -30,11 +30,13 @@ from pipelines.procedures.base import (
     refuse_unknown_effects,
     scale_of,
 )
+from pipelines.procedures.centrifuge_radii import drawn_radii, figures_of_radii, fitted_radii, texts_of_radii
+from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_radius, texts_of_radius
 from pipelines.procedures.columns import points as point_table
-from pipelines.procedures.wording import probability, with_uncertainty
 from schemas.bounds import NotNegative, Positive
+from schemas.errors import RecipeInvalid
 from schemas.recipe import Pose
-from schemas.units import MICRO
+from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,8 +45,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
+    from schemas.station import StationConfig
 
 INPUT = 2  # the input axis is z, radial
+CLOSEST = 1.02  # ratio of two radii
 
 
 class CentrifugePart(NominalScale):
@@ -62,6 +66,7 @@ class CentrifugePart(NominalScale):
     down_again: bool = True
     reversed: bool = True
     radius_m: Positive = 0.5
+    radii_m: Annotated[list[Positive], Field(min_length=2, max_length=4)] | None = None
     radius_um: NotNegative = 20.0
     point_ppm: NotNegative = 2.0
     record_s: Annotated[Positive, Field(le=600.0)] = 5.0
@@ -72,7 +77,22 @@ class CentrifugePart(NominalScale):
     @model_validator(mode="after")
     def _known(self) -> CentrifugePart:
         refuse_unknown_effects(self.effects, EFFECTS, "centrifuges")
+        if self.radii_m is None:
+            return self
+        if "radius_m" in self.model_fields_set:
+            raise ValueError("radius_m and radii_m are both given, one of them is needed; leave radius_m out")
+        if min(b / a for a, b in pairwise(sorted(self.radii_m))) < CLOSEST:
+            raise ValueError(
+                f"radii_m: radii closer than {100.0 * (CLOSEST - 1.0):g} % separate nothing; choose them further apart"
+            )
+        if self.radius_um <= 0.0:
+            raise ValueError("radius_um: 0 µm for several radii, their uncertainty is needed; state radius_um")
         return self
+
+    @property
+    def radii(self) -> tuple[float, ...]:
+        """The radii of the test in order, m."""
+        return (self.radius_m,) if self.radii_m is None else tuple(self.radii_m)
 
 
 class CentrifugeTest(InG, OnEquipment, Evaluated):
@@ -82,7 +102,8 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
     title: ClassVar[str] = "Centrifuge"
     order: ClassVar[int] = 130
     states: ClassVar[str] = (
-        "linearity in % of full scale, K2, K3, sensitivity by the radius; arm stretch against Koq as one class"
+        "linearity in % of full scale, K2, K3, sensitivity by the radius; at two radii also the offset of the proof mass, "
+        "parted from K1′, and arm stretch, parted from Koq"
     )
     source: ClassVar[str] = "IEEE Std 836 (centrifuge), IEEE Std 1293"
     roles: ClassVar[tuple[str, ...]] = ("centrifuge",)
@@ -100,22 +121,41 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
             "%",
             "departure of the sensitivity from the static or nominal scale; the radius' uncertainty is its own",
         ),
+        FigureSpec(
+            "centrifuge_mass_offset_um", "µm", "offset of the proof mass from the turning centre, outwards; two radii"
+        ),
+        FigureSpec(
+            "centrifuge_radius_consistency_ppm",
+            "ppm",
+            "sensitivity by a further radius over that by the first, minus 1; two radii and both mountings",
+        ),
     )
 
+    def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
+        """Refuse several radii on a centrifuge that cannot be told the radius, and a part without a scale."""
+        super().check(part, recipe, station)
+        if part.radii_m is not None and not profile_of(station.fitted()["centrifuge"]).has("radius"):
+            raise RecipeInvalid(
+                f"recipe: procedure centrifuge: radii_m has {len(part.radii)} radii, the centrifuge of station {station.name} "
+                "has no command 'radius' in its profile; add it, or give radius_m",
+                key="radii_m",
+            )
+
     def steps(self, part: CentrifugePart, recipe: Recipe) -> list[ProcedureStep]:
-        """One record at each speed: up, down again, then the same with the units reversed."""
+        """One record at each speed: up, down again, then the same with the units reversed, and all at the next radius."""
         del recipe
         way = [*part.forces_g, *(part.forces_g[-2::-1] if part.down_again else ())]
         pose = Pose(name="centrifuge", outer_deg=0.0, inner_deg=0.0)
         return [
             ProcedureStep(
-                f"{'+' if sign > 0 else '−'}{force:g} g",
+                f"{'+' if sign > 0 else '−'}{force:g} g" + (f" at {radius:g} m" if part.radii_m else ""),
                 pose,
                 part.temperature_C,
                 lasting_s=part.record_s + 10.0,
                 role="centrifuge",
-                setting={"force_g": force, "direction": sign, "radius_m": part.radius_m, "record_s": part.record_s},
+                setting={"force_g": force, "direction": sign, "radius_m": radius, "record_s": part.record_s},
             )
+            for radius in part.radii
             for sign in ((1.0, -1.0) if part.reversed else (1.0,))
             for force in way
         ]
@@ -124,14 +164,15 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
         """One constant speed."""
         one = step.setting
         rate = math.degrees(math.sqrt(one["force_g"] * 9.80665 / one["radius_m"]))
-        return equipment.spin(rate, int(one["direction"]), one["record_s"], slots)
+        return equipment.spin(rate, int(one["direction"]), one["record_s"], slots, one["radius_m"])
 
     def reduce(self, part: CentrifugePart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Mean output in g over the acceleration by the measured rate."""
         rows: list[dict[str, Any]] = []
         for k, record in enumerate(records):
             rate = np.radians(record.samples[REFERENCE].output[:, 0].mean())
-            force = record.step.setting["direction"] * part.radius_m * rate**2 / 9.80665
+            radius = record.step.setting["radius_m"]
+            force = record.step.setting["direction"] * radius * rate**2 / 9.80665
             for unit, _, own in record.by_unit():
                 raw = own.output[:, INPUT]
                 output = raw / scale_of(part, device, unit)[INPUT]
@@ -141,7 +182,7 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
                     {
                         "unit": unit, "axis": "z", "series": "output", "point": k, "setting": float(force),
                         "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
-                        "spread": float(output.std(ddof=1)),
+                        "spread": float(output.std(ddof=1)), "radius_m": radius,
                     }
                 )  # fmt: skip
         return point_table(rows)
@@ -167,35 +208,28 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
                 figures[name] = [FigureValue.not_determined(f.name, "z", note) for f in self.figures]
                 continue
             try:
-                fit = fitted(part, rows)
+                figures[name], own = _of_radii(part, rows) if part.radii_m else _of_radius(part, rows)
             except NotIdentified as problem:
                 figures[name] = [FigureValue.not_determined(f.name, "z", str(problem)) for f in self.figures]
                 continue
-            figures[name] = _figures(part, fit)
-            texts = [*_texts(part, fit), *diagnosis_text(judged(part, rows))]
+            texts = [*own, *diagnosis_text(judged(part, rows))]
             findings += [Finding(name, subject, text) for subject, text in texts]
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: CentrifugePart, points: pd.DataFrame) -> None:
-        """Departure from the straight line over the acceleration, with the polynomial."""
+        """Departure from the straight line over the acceleration, with the polynomial; each radius has a line of its own."""
         place = drawing.subplots()
+        if part.radii_m:
+            drawn_radii(place, points, 1e-6 * part.radius_um)
+            return
         force, value = points["setting"].to_numpy(dtype=float), points["value"].to_numpy(dtype=float)
         line = np.polyfit(force, value, 1)
-        place.errorbar(
-            force,
-            1e3 * (value - np.polyval(line, force)),
-            2e3 * points["uncertainty"],
-            fmt="o",
-            ms=3.5,
-            lw=0.9,
-            c="#0072b2",
-            label="measured, U (k = 2)",
-        )
+        shown, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * points["uncertainty"]
+        place.errorbar(force, shown, expanded, fmt="o", ms=3.5, lw=0.9, c="#0072b2", label="measured, U (k = 2)")
         fit = fitted(part, points)
         x = np.linspace(force.min(), force.max(), 300)
-        place.plot(
-            x, 1e3 * (columns(x, fit.names) @ fit.value - np.polyval(line, x)), lw=1.1, c="#d55e00", label="polynomial"
-        )
+        curve = columns(x, fit.names) @ fit.value - np.polyval(line, x)
+        place.plot(x, 1e3 * curve, lw=1.1, c="#d55e00", label="polynomial")
         place.set(xlabel="acceleration / g", ylabel="departure from the straight line / mg")
         place.legend(frameon=False)
 
@@ -206,90 +240,33 @@ def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
 
 
+def _of_radius(part: CentrifugePart, rows: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
+    """Figures and texts of a unit at one radius."""
+    fit = fitted(part, rows)
+    figures = figures_of_radius(fit, part.full_scale_g, part.radius_m, 1e-6 * part.radius_um)
+    return figures, texts_of_radius(fit, part.radius_m, both=part.reversed)
+
+
+def _of_radii(part: CentrifugePart, rows: pd.DataFrame) -> tuple[list[FigureValue], list[tuple[str, str]]]:
+    """Figures and texts of a unit at several radii."""
+    fit = fitted_radii(rows, 1e-6 * part.radius_um)
+    return figures_of_radii(fit, part.full_scale_g), texts_of_radii(fit, part.radii)
+
+
 def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
     """The diagnosis of the part's model on the points of one unit."""
     force, value, error = (rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
-    slowing = np.r_[0.0, (np.diff(np.abs(force)) < 0.0) & (force[1:] * force[:-1] > 0.0)].astype(float)
-    spins = Spins(force, np.full(force.size, part.radius_m), np.linspace(0.0, 1.0, force.size), slowing)
+    radius = rows["radius_m"].to_numpy(dtype=float) if part.radii_m else np.full(force.size, part.radius_m)
+    same = (force[1:] * force[:-1] > 0.0) & (radius[1:] == radius[:-1])
+    slowing = np.r_[0.0, (np.diff(np.abs(force)) < 0.0) & same].astype(float)
+    spins = Spins(force, radius, np.linspace(0.0, 1.0, force.size), slowing, 1e-6 * part.radius_um)
     return diagnose_spins(spins, value, error, part.effects)
-
-
-def diagnosis_text(found: SpinDiagnosis) -> list[tuple[str, str]]:
-    """The diagnosis in sentences: subject and text."""
-    model = " + ".join(("bias", "scale", *found.fit.effects))
-    if found.adequate is None:
-        return [("diagnosis", f"{model} cannot be judged: {found.reason}")]
-    p = float(chi2.sf(found.fit.chi_square, found.fit.dof))
-    verdict = "adequate" if found.adequate else "not adequate"
-    text = f"{model} is {verdict} ({probability(p)}), rms residual {MICRO * found.error_g:.3g} µg"
-    out = [("diagnosis", text)]
-    for one in found.classes:
-        name = one.effects[0]
-        value, error = found.extended.of(name)
-        rivals = f"; the points do not separate it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
-        size = f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
-        out.append(("missing effect", f"{name}: {size}, {probability(one.p_value)}{rivals}"))
-    if found.classes:
-        text = (
-            f"rms residual {MICRO * found.error_g:.3g} → {MICRO * found.extended_g:.3g} µg; points left out, in standard "
-            f"uncertainties: {found.left_out[0]:.2f} → {found.left_out[1]:.2f}"
-        )
-        out.append(("with the missing effects", text))
-    if found.unexplained:
-        out.append(("unexplained", "no known effect explains the residual; look at it over the acceleration"))
-    return [*out, *(("next measurement", step) for step in found.next_steps)]
 
 
 def _responds(rows: pd.DataFrame) -> float:
     """Share of the output's variance that the acceleration explains."""
     force, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
     return float(np.corrcoef(force, value)[0, 1] ** 2)
-
-
-def _figures(part: CentrifugePart, fit: Polynomial) -> list[FigureValue]:
-    linearity = linearity_percent(fit, part.full_scale_g)
-    spread = linearity_error(fit, part.full_scale_g)
-    k2, k3, k1 = fit.of("second_order"), fit.of("third_order"), fit.of("scale")
-    radius = 1e-4 * part.radius_um / part.radius_m  # %
-    return [
-        FigureValue("centrifuge_linearity_percent", "z", linearity, spread),
-        FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
-        FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
-        FigureValue(
-            "centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), float(np.hypot(100.0 * k1[1], radius))
-        ),
-    ]
-
-
-def _texts(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, str]]:
-    p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
-    verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
-    judged_by = f"χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, {probability(p)}"
-    out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: {judged_by}")]
-    if not part.reversed:
-        text = (
-            "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
-            "measure with the units reversed"
-        )
-        return [*out, ("not determined", text)]
-    for name, text in (
-        (
-            "arm_stretch_or_odd_quadratic",
-            "arm stretch or Koq, one class: separate them by the optical radius at speed",
-        ),
-        (
-            "mass_offset_or_asymmetry",
-            "offset of the proof mass from the turning centre, or a scale that differs by sign, one class",
-        ),
-    ):
-        value, error = fit.of(name)
-        if abs(value) > 4.0 * error:
-            factor = 1e3 * part.radius_m if name.startswith("mass") else MICRO
-            unit = "mm of offset" if name.startswith("mass") else "µg/g²"
-            out.append(
-                ("effect found", f"{text}: {with_uncertainty(factor * value, 2.0 * factor * error)} {unit} (k = 2)")
-            )
-    return out
 
 
 PROCEDURE = CentrifugeTest()

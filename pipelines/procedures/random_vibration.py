@@ -27,6 +27,7 @@ from pipelines.procedures.base import (
     scale_of,
 )
 from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.wording import signed
 from schemas.bounds import Positive
 from schemas.recipe import Pose
 from schemas.units import AXES, MICRO
@@ -267,10 +268,9 @@ def _tolerance(part: RandomVibrationPart, points: pd.DataFrame) -> list[Finding]
     low, high = density_confidence(float(density["averages"].iloc[0]))
     beyond = float(np.mean(np.abs(apart) > LINE_DB))
     text = (
-        f"overall level {100.0 * (ratio.min() - 1.0):+.1f} to {100.0 * (ratio.max() - 1.0):+.1f} % of "
-        f"the order (± {100.0 * OVERALL:.0f} % "
-        f"allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of the lines of a right level lie within "
-        f"{low:.1f} to {high:+.1f} dB"
+        f"overall level {signed(100.0 * (ratio.min() - 1.0), 1)} to {signed(100.0 * (ratio.max() - 1.0), 1)} % from the order "
+        f"(± {100.0 * OVERALL:.0f} % allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of the lines of "
+        f"a right level lie within {signed(low, 1)} to {signed(high, 1)} dB"
     )
     return [Finding("", "level of the reference", text)]
 

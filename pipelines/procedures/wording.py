@@ -1,4 +1,4 @@
-"""Numbers in the findings of procedures: an expanded uncertainty to two digits, the value to the same place, probabilities."""
+"""Numbers in the findings of procedures: expanded uncertainties to two digits, values to the same place, signs, probabilities."""
 
 from __future__ import annotations
 
@@ -17,6 +17,13 @@ def with_uncertainty(value: float, expanded: float) -> str:
         return f"{value:.3e} ± {expanded:.1e}".replace("-", MINUS)
     shown = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, expanded))
     return " ± ".join(shown).replace("-", MINUS)
+
+
+def signed(value: float, places: int) -> str:
+    """A difference with its sign to some places; what rounds to zero has none."""
+    shown = round(value, places)
+    text = f"{shown:+.{places}f}" if shown else f"{0.0:.{places}f}"
+    return text.replace("-", MINUS)
 
 
 def probability(p: float) -> str:

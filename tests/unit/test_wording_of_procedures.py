@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipelines.procedures.wording import probability, with_uncertainty
+from pipelines.procedures.wording import probability, signed, with_uncertainty
 from pipelines.report.numbers import with_uncertainty as in_tables
 
 
@@ -16,6 +16,14 @@ from pipelines.report.numbers import with_uncertainty as in_tables
 )  # fmt: skip
 def test_a_value_has_the_digits_of_its_uncertainty(value: float, expanded: float, text: str) -> None:
     assert with_uncertainty(value, expanded) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(-0.04, "0.0"), (0.04, "0.0"), (0.0, "0.0"), (-0.06, "−0.1"), (0.2, "+0.2"), (-2.345, "−2.3"), (12.0, "+12.0")],
+)
+def test_a_difference_has_its_sign_and_a_rounded_zero_has_none(value: float, text: str) -> None:
+    assert signed(value, 1) == text
 
 
 def test_a_table_prints_no_negative_zero() -> None:

@@ -20,16 +20,20 @@ class Spins:
     radius_m : nominal radius, m
     order : time from the first to the last point, 0 to 1
     slowing : 1 where the point follows a faster one, else 0
+    radius_error_m : standard uncertainty of each radius, m; it counts where there are several
     """
 
     acceleration: Array
     radius_m: Array
     order: Array
     slowing: Array
+    radius_error_m: float = 0.0
 
     def picked(self, rows: NDArray[np.bool_]) -> Spins:
         """The points of the selected rows (n,)."""
-        return Spins(self.acceleration[rows], self.radius_m[rows], self.order[rows], self.slowing[rows])
+        return Spins(
+            self.acceleration[rows], self.radius_m[rows], self.order[rows], self.slowing[rows], self.radius_error_m
+        )
 
 
 class CentrifugeEffect(ABC):

@@ -16,6 +16,7 @@ POLL_S = 0.5
 PATIENCE_S = 600.0
 REACHED = 2e-5  # of the rate, or deg/s below one
 STANDING_DEG_S = 0.01
+SAME_MOUNTING = 1e-5  # m, or of the direction
 OVERSPEED = 1.02  # of the larger of the rate at the start and the ordered one, and a degree a second
 
 
@@ -33,18 +34,24 @@ class Acutrol(Equipment):
         "file",
     )
 
-    def spin(self, rate_deg_s: float, direction: int, seconds: float, slots: Sequence[int]) -> Recording:
+    def spin(
+        self, rate_deg_s: float, direction: int, seconds: float, slots: Sequence[int], radius_m: float | None = None
+    ) -> Recording:
         """A record at a constant rate in °/s; ``direction`` says which way the units are mounted (1 or −1).
+
+        Another mounting is ordered at standstill with the interlock open. ``radius_m`` is the radius of the mounting; a device
+        whose profile has no such command is not told.
 
         Raises
         ------
         OperatorNeeded
-            The interlock has opened, by guard door or overspeed; or the rate rises beyond the order.
+            The interlock has opened, by guard door or overspeed; or the rate rises beyond the order; or another mounting was
+            ordered and is not confirmed: the run continues when it is.
         RecordingSpoilt
             The recorder has missed its trigger, or the rate has left its band.
         """
         self._require_no_fault()
-        self.values.write("direction", float(direction))
+        self._mount({"direction": float(direction)} | self._radius(radius_m))
         self.values.write("interlock", "close 1")
         self.values.write("mode", "rate 1")
         self.values.write("rate", rate_deg_s)
@@ -63,6 +70,30 @@ class Acutrol(Equipment):
         if path in {before, "NONE"}:
             raise RecordingSpoilt(f"{self.name}: no recording, the trigger was missed; check the recorder")
         return read_recording(Path(path), list(slots), self.name)
+
+    def _radius(self, radius_m: float | None) -> dict[str, float]:
+        return {} if radius_m is None or not self.values.has("radius") else {"radius": radius_m}
+
+    def _mount(self, wanted: dict[str, float]) -> None:
+        """Stops, orders another mounting, and waits until it is confirmed; nothing where the units are mounted so."""
+        if self._mounted(wanted):
+            return
+        self.stop()
+        for name, value in wanted.items():
+            self.values.write(name, value)
+        end = self.clock.now() + PATIENCE_S
+        while not self._mounted(wanted):
+            if self.clock.now() > end:
+                way = "as marked" if wanted["direction"] > 0.0 else "the other way round"
+                place = f" at {wanted['radius']:g} m" if "radius" in wanted else ""
+                raise OperatorNeeded(
+                    f"{self.name}: mounting not confirmed in {PATIENCE_S:g} s, units mounted {way}{place} are needed; mount "
+                    "them, confirm it at the machine and give the command again"
+                )
+            self.clock.sleep(POLL_S)
+
+    def _mounted(self, wanted: dict[str, float]) -> bool:
+        return all(abs(self.values.number(name) - value) <= SAME_MOUNTING for name, value in wanted.items())
 
     def stop(self) -> None:
         """Rate 0, waits until it stands, opens the interlock."""

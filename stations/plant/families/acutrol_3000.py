@@ -1,4 +1,4 @@
-"""The simulated centrifuge behind an ACUTROL 3000, with arm stretch, an offset of each proof mass, and a recorder."""
+"""The simulated centrifuge behind an ACUTROL 3000: mountings at several radii, arm stretch, proof masses, a recorder."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stations.plant.bench import STANDARD_G, Waveforms
+from stations.plant.device import stream
 from stations.plant.result_files import ResultFiles
 
 if TYPE_CHECKING:
     from schemas.profile import Profile
+    from stations.plant.bench import Bench
     from stations.plant.world import World
 
 UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"
-RADIUS_M = 0.5
+RADIUS_M = 0.5  # of the usual mounting
+HOLE_M = 20e-6  # standard deviation of a mounting's radius about its nominal one
+STANDING_DEG_S = 0.01
 ACCELERATION_DEG_S2 = 100.0
 RECORD_HZ = 200.0
 IDLE_S = 900.0  # without a line for so long the machine stops by itself
@@ -27,22 +31,33 @@ def simulated(world: World, profile: Profile) -> Centrifuge:
     return Centrifuge(world)
 
 
+def radius_error(bench: Bench, radius_m: float) -> float:
+    """Radius of a mounting on the arm minus its nominal one, m: the same for all runs of a station."""
+    if math.isclose(radius_m, RADIUS_M, abs_tol=1e-6):
+        return bench.rig.arm_radius_error_m
+    return HOLE_M * float(stream(bench.station_seed, "bench", "radius", round(1e6 * radius_m)).standard_normal())
+
+
 class Centrifuge:
-    """Follows the demanded rate at constant acceleration; an open interlock or a long silence brings it to rest."""
+    """Follows the demanded rate at constant acceleration; an open interlock or a long silence brings it to rest.
+
+    Units are mounted (direction, radius) at rest only, with the interlock open.
+    """
 
     def __init__(self, world: World) -> None:
         self._world = world
         self._from, self._to, self._since_us = 0.0, 0.0, 0
         self._closed, self._direction, self._asked = False, 1.0, 0.0
+        self._radius = RADIUS_M
         self._heard_us, self._tripped = 0, ""
         self._number, self._seconds, self._start_us = 0, 0.0, 0
         self._files = ResultFiles()
 
-    def answer(self, line: str) -> tuple[str, bool]:
+    def answer(self, line: str) -> tuple[str, bool]:  # noqa: PLR0911 - one a kind of line
         """The answer to a line, and whether the line changed anything."""
         self._watch()
         head, _, value = line.partition(",")
-        if line in {":read:rate? 1", ":interlock? 1", ":rec:file?", ":mode? 1", ":int? 1"}:
+        if line in {":read:rate? 1", ":interlock? 1", ":rec:file?", ":mode? 1", ":int? 1", ":mount? 1", ":radius? 1"}:
             return self._report(line), False
         self._heard_us = self._world.now_us
         if line in {":int:close 1", ":int:open 1"}:
@@ -59,14 +74,24 @@ class Centrifuge:
         if head == ":dem:rate 1":
             self._asked = number
             self._go(number if self._closed and not self._tripped else 0.0)
-        elif head == ":mount 1":
-            self._direction = 1.0 if number > 0.0 else -1.0
+        elif head in {":mount 1", ":radius 1"}:
+            return self._mount(head, number)
         elif head == ":rec 1":
             if "missed_trigger" not in self._world.bench.conditions:
                 self._number += 1
                 self._seconds, self._start_us = number, self._world.now_us
         else:
             return UNKNOWN, False
+        return "OK", True
+
+    def _mount(self, head: str, number: float) -> tuple[str, bool]:
+        """Units mounted the other way round or at another radius."""
+        if self._closed or abs(self.rate()) > STANDING_DEG_S:
+            return WRONG, False
+        if head == ":mount 1":
+            self._direction = 1.0 if number > 0.0 else -1.0
+        else:
+            self._radius = number
         return "OK", True
 
     def rate(self) -> float:
@@ -94,6 +119,8 @@ class Centrifuge:
     def _report(self, line: str) -> str:
         if line == ":read:rate? 1":
             return f"{self.rate():.6f}"
+        if line in {":mount? 1", ":radius? 1"}:
+            return f"{self._direction:.0f}" if line == ":mount? 1" else f"{self._radius:.6f}"
         if line == ":interlock? 1":
             return f"Fault {self._tripped}" if self._tripped else ("Closed" if self._closed else "Open")
         if line == ":rec:file?":
@@ -106,7 +133,7 @@ class Centrifuge:
     def _recorded(self) -> Waveforms:
         bench = self._world.bench
         rig, omega = bench.rig, math.radians(self._to)
-        arm = (RADIUS_M + rig.arm_radius_error_m) * (1.0 + rig.arm_stretch * omega**2)
+        arm = (self._radius + radius_error(bench, self._radius)) * (1.0 + rig.arm_stretch * omega**2)
         offsets = np.array([unit.mass_offset_m for unit in bench.units])
         force = self._direction * (arm + self._direction * offsets) * omega**2 / STANDARD_G
         wobble = bench.stream_at(self._start_us, 10).standard_normal()

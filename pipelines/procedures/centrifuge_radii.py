@@ -1,0 +1,110 @@
+"""Figures, findings and picture of a centrifuge test at several radii."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from inertial.dynamics.centrifuge import columns, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
+from pipelines.procedures.base import FigureValue
+from pipelines.procedures.wording import probability, with_uncertainty
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+OF_RADII = ("centrifuge_mass_offset_um", "centrifuge_radius_consistency_ppm")
+"""Figures that one radius cannot determine."""
+ONE_RADIUS = "one radius: the offset is not parted from a scale that differs by sign; list two radii in radii_m"
+ONE_MOUNTING = "one mounting: errors of the radii are not parted from the offset; measure with the units reversed"
+ADEQUATE_P = 0.005
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
+
+
+def fitted_radii(rows: pd.DataFrame, radius_error_m: float) -> RadiiFit:
+    """The fit over all radii of the points of one unit; :class:`inertial.errors.NotIdentified` as there."""
+    force, value, error, radius = (
+        rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty", "radius_m")
+    )
+    return fit_radii(force, radius, value, error, radius_error_m)
+
+
+def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
+    """The figures: linearity, K2, K3 and sensitivity are the unit's own, without arm and mounting."""
+    unit = fit.unit
+    k1, k2, k3 = (unit.of(name) for name in ("scale", "second_order", "third_order"))
+    offset, spread = fit.mass_offset_m
+    linearity, error = linearity_percent(unit, full_scale_g), linearity_error(unit, full_scale_g)
+    found = [
+        FigureValue("centrifuge_linearity_percent", "z", linearity, error),
+        FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
+        FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
+        FigureValue("centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), 100.0 * k1[1]),
+        FigureValue("centrifuge_mass_offset_um", "z", MICRO * offset, MICRO * spread),
+    ]
+    name = "centrifuge_radius_consistency_ppm"
+    if fit.consistency is None:
+        return [*found, FigureValue.not_determined(name, "z", ONE_MOUNTING)]
+    value, error = fit.consistency
+    return [*found, FigureValue(name, "z", MICRO * value, MICRO * error)]
+
+
+def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str]]:
+    """Verdict on the whole model, and each parameter that one radius leaves open: subject and text."""
+    unit = fit.unit
+    p = float(chi2.sf(unit.chi_square, unit.dof)) if unit.dof > 0 else float("nan")
+    verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= ADEQUATE_P else "not adequate"
+    terms = " + ".join((*unit.names, "arm_stretch", "mass_offset"))
+    judged_by = f"χ² {unit.chi_square:.1f} for {unit.dof} degrees of freedom, {probability(p)}"
+    out = [
+        ("model", f"{terms}, with the errors of {len(radii)} radii, is {verdict}: {judged_by}"),
+        ("offset of the proof mass", f"{_stated(fit.mass_offset_m, MICRO)} µm (k = 2), the same at every radius"),
+        ("arm stretch", f"{_stated(fit.arm_stretch_s2, 1e9)} · 10⁻⁹ s² (k = 2), κ of r = r₀(1 + κω²)"),
+    ]
+    if "asymmetry" in unit.names:
+        out += [
+            ("K1′", f"{_stated(unit.of('asymmetry'), MICRO)} ppm (k = 2), scale that differs by sign"),
+            ("Koq", f"{_stated(unit.of('odd_quadratic'), MICRO)} µg/g² (k = 2)"),
+        ]
+    else:
+        text = "K1′ is in the sensitivity and Koq in K2; measure with the units reversed"
+        out.append(("not determined", text))
+    each = ", ".join(
+        f"{radius:g} m {_stated(one, MICRO)} µm"
+        for radius, one in zip(sorted(radii, reverse=True), fit.radius_errors_m, strict=True)
+    )
+    return [*out, ("errors of the radii", f"{each} (k = 2), by outputs and stated uncertainty together")]
+
+
+def _stated(one: tuple[float, float], factor: float) -> str:
+    return with_uncertainty(factor * one[0], 2.0 * factor * one[1])
+
+
+def drawn_radii(place: Any, points: pd.DataFrame, radius_error_m: float) -> None:
+    """Departure from a straight line for each radius: with offset and stretch it differs from radius to radius."""
+    fit = fitted_radii(points, radius_error_m)
+    for colour, (radius, rows) in zip(COLOURS, points.groupby("radius_m", sort=False), strict=False):
+        force, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
+        line, r = np.polyfit(force, value, 1), float(str(radius))
+        apart, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * rows["uncertainty"]
+        place.errorbar(force, apart, expanded, fmt="o", ms=3.5, lw=0.9, c=colour, label=f"{r:g} m, U (k = 2)")
+        x = np.linspace(force.min(), force.max(), 301)
+        place.plot(x, 1e3 * _apart(fit, x, r, force), lw=1.1, c=colour)
+    place.set(xlabel="acceleration / g", ylabel="departure from the straight line / mg")
+    place.legend(frameon=False)
+
+
+def _apart(fit: RadiiFit, x: Any, radius: float, force: Any) -> Any:
+    """The fitted curve at a radius minus its own straight line over the measured accelerations (n,)."""
+
+    def curve(a: Any) -> Any:
+        scale = fit.unit.of("scale")[0]
+        arm = fit.mass_offset_m[0] * np.abs(a) + fit.arm_stretch_s2[0] * 9.80665 * a * np.abs(a)
+        return columns(a, fit.unit.names) @ fit.unit.value + scale * arm / radius
+
+    return curve(x) - np.polyval(np.polyfit(force, curve(force), 1), x)

@@ -1,0 +1,95 @@
+"""Figures and findings of a centrifuge test at one radius, and its diagnosis in sentences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import chi2
+
+from inertial.dynamics.centrifuge import Polynomial, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge_effects import EFFECTS
+from pipelines.procedures.base import FigureValue
+from pipelines.procedures.centrifuge_radii import OF_RADII, ONE_RADIUS
+from pipelines.procedures.wording import probability, with_uncertainty
+from schemas.units import MICRO
+
+if TYPE_CHECKING:
+    from inertial.dynamics.centrifuge_diagnosis import SpinDiagnosis
+
+
+def figures_of_radius(
+    fit: Polynomial, full_scale_g: float, radius_m: float, radius_error_m: float
+) -> list[FigureValue]:
+    """Figures of a unit at one radius; those that need two are not determined."""
+    linearity = linearity_percent(fit, full_scale_g)
+    spread = linearity_error(fit, full_scale_g)
+    k2, k3, k1 = fit.of("second_order"), fit.of("third_order"), fit.of("scale")
+    radius = 100.0 * radius_error_m / radius_m  # %
+    return [
+        FigureValue("centrifuge_linearity_percent", "z", linearity, spread),
+        FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
+        FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
+        FigureValue(
+            "centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), float(np.hypot(100.0 * k1[1], radius))
+        ),
+        *(FigureValue.not_determined(name, "z", ONE_RADIUS) for name in OF_RADII),
+    ]
+
+
+def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tuple[str, str]]:
+    """Verdict on the polynomial at one radius, and the classes of effects that it holds: subject and text."""
+    p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
+    verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
+    judged_by = f"χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, {probability(p)}"
+    out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: {judged_by}")]
+    if not both:
+        text = (
+            "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
+            "measure with the units reversed"
+        )
+        return [*out, ("not determined", text)]
+    for name, text in (
+        (
+            "arm_stretch_or_odd_quadratic",
+            "arm stretch or Koq, one class: two radii (radii_m) or the optical radius at speed separate them",
+        ),
+        (
+            "mass_offset_or_asymmetry",
+            "offset of the proof mass from the turning centre, or K1′, one class: two radii (radii_m) separate them",
+        ),
+    ):
+        value, error = fit.of(name)
+        if abs(value) > 4.0 * error:
+            factor = 1e3 * radius_m if name.startswith("mass") else MICRO
+            unit = "mm of offset" if name.startswith("mass") else "µg/g²"
+            out.append(
+                ("effect found", f"{text}: {with_uncertainty(factor * value, 2.0 * factor * error)} {unit} (k = 2)")
+            )
+    return out
+
+
+def diagnosis_text(found: SpinDiagnosis) -> list[tuple[str, str]]:
+    """The diagnosis in sentences: subject and text."""
+    model = " + ".join(("bias", "scale", *found.fit.effects))
+    if found.adequate is None:
+        return [("diagnosis", f"{model} cannot be judged: {found.reason}")]
+    p = float(chi2.sf(found.fit.chi_square, found.fit.dof))
+    verdict = "adequate" if found.adequate else "not adequate"
+    text = f"{model} is {verdict} ({probability(p)}), rms residual {MICRO * found.error_g:.3g} µg"
+    out = [("diagnosis", text)]
+    for one in found.classes:
+        name = one.effects[0]
+        value, error = found.extended.of(name)
+        rivals = f"; the points do not separate it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
+        size = f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
+        out.append(("missing effect", f"{name}: {size}, {probability(one.p_value)}{rivals}"))
+    if found.classes:
+        text = (
+            f"rms residual {MICRO * found.error_g:.3g} → {MICRO * found.extended_g:.3g} µg; points left out, in standard "
+            f"uncertainties: {found.left_out[0]:.2f} → {found.left_out[1]:.2f}"
+        )
+        out.append(("with the missing effects", text))
+    if found.unexplained:
+        out.append(("unexplained", "no known effect explains the residual; look at it over the acceleration"))
+    return [*out, *(("next measurement", step) for step in found.next_steps)]
