@@ -68,6 +68,7 @@ class Series:
         self._s = s / self._size
         self.white = np.diag(profile**2)
         self.sound = np.ones(z.shape[:-1], dtype=bool)
+        self._grids: dict[bytes, Callable[[Array, Array], Array]] = {}
 
     @property
     def dof(self) -> int:
@@ -129,8 +130,12 @@ class Series:
         """What gives the restricted deviance of the sound blocks on a grid."""
         if self._s.shape[-1]:
             return self._pair_by_pair
-        h = np.broadcast_to(self._h, (*self._z.shape, self._h.shape[-1]))
-        return Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels).on_grid
+        blocks = self.sound.tobytes()
+        if blocks not in self._grids:
+            h = np.broadcast_to(self._h, (*self._z.shape, self._h.shape[-1]))
+            found = Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels)
+            self._grids = {blocks: found.on_grid}
+        return self._grids[blocks]
 
     def _pair_by_pair(self, first: Array, second: Array) -> Array:
         grid = [self.solve(pair).deviance for pair in product(first.tolist(), second.tolist())]

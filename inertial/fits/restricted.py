@@ -56,6 +56,7 @@ class Restricted:
             -1, self.width, self.blocks
         )
         self._i, self._j = np.tril_indices(self.width)
+        self._bases: dict[float, tuple[Array, Array, float]] = {}
 
     def on_grid(self, first: Array, second: Array) -> Array:
         """Restricted deviance, (k, l), for shares (k,) of the first kernel and (l,) of the second."""
@@ -72,7 +73,15 @@ class Restricted:
         return (profiled_deviance(squares / self._dof, self._dof) + self.blocks * volumes + own).T
 
     def _basis(self, share: float) -> tuple[Array, Array, float]:
-        """At a share of the second kernel λ (m,) of the first, the turn (m, m) to its vectors, and ln|W + t·K₂|."""
+        """At a share of the second kernel λ (m,) of the first, the turn (m, m) to its vectors, and ln|W + t·K₂|.
+
+        Kept, since the grids of one likelihood share some of their strengths.
+        """
+        if share not in self._bases:
+            self._bases[share] = self._basis_at(share)
+        return self._bases[share]
+
+    def _basis_at(self, share: float) -> tuple[Array, Array, float]:
         shrink = 1.0 / np.sqrt(1.0 + share * self._second)
         values, vectors = np.linalg.eigh(shrink[:, None] * self._first * shrink)
         return np.maximum(values, 0.0), (shrink[:, None] * vectors).T, self._volume - 2.0 * float(np.log(shrink).sum())

@@ -182,9 +182,10 @@ def sensitivity(
             if size > 0.0:
                 change = size * difference(model, state, errors)
                 enter(np.einsum("...nk,nm->...nkm", change, np.eye(change.shape[-2])), one)
-    shape = predict(model.effects, state, model.coefficients, model.nonlinear).shape
-    columns = [np.broadcast_to(c, (*shape, c.shape[-1])) for c in columns]
-    changes = np.concatenate(columns, axis=-1) if columns else np.zeros((*shape, 0))
+    if columns:
+        changes = np.concatenate(columns, axis=-1)
+    else:
+        changes = np.zeros((*predict(model.effects, state, model.coefficients, model.nonlinear).shape, 0))
     return Sensitivity(changes, tuple(contributions), tuple(scopes), tuple(dof), tuple(seen))
 
 

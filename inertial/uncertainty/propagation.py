@@ -49,10 +49,15 @@ class FitDesign:
         flat = np.broadcast_to(left, (*target.shape[:-1], left.shape[-1])).reshape(-1, left.shape[-1])
         return np.asarray(np.linalg.lstsq(flat, target.reshape(-1, target.shape[-1]), rcond=None)[0], dtype=np.float64)
 
-    def visible_share(self, changes: Array) -> Array:
-        """‖(1 − P_H)·J‖/‖J‖ of every influence, (q,), over all units and axes: what residuals can show of it."""
+    def visible_share(self, changes: Array, errors: Array | None = None) -> Array:
+        """‖(1 − P_H)·J‖/‖J‖ of every influence, (q,), over all units and axes: what residuals can show of it.
+
+        Parameters
+        ----------
+        errors : those that :meth:`coefficient_errors` gives of the same changes, where they are known
+        """
         along = np.moveaxis(changes, -2, -3)
-        left = along - self.columns @ self.coefficient_errors(changes)
+        left = along - self.columns @ (self.coefficient_errors(changes) if errors is None else errors)
         axes = tuple(range(along.ndim - 1))
         whole = np.sqrt(np.sum(along**2, axis=axes))
         return np.sqrt(np.sum(left**2, axis=axes)) / np.where(whole > 0.0, whole, 1.0)

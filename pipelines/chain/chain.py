@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 from pipelines.jobs.terms import budget_terms
 from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
-from pipelines.stages.fit import fit
+from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.noise import noise
 from pipelines.stages.procedures import procedures
 from pipelines.stages.reduce import dwells_of
 from pipelines.stages.validate import verdicts
-from pipelines.stages.verify import verify
+from pipelines.stages.verify import verify_tables
+from pipelines.tables.dwells import LotTables
 from pipelines.tables.samples import PROCEDURE
 from pipelines.tables.summaries import summarised
 
@@ -83,16 +84,31 @@ def _reduce(job: Job, run: Run) -> Tables:
     return {"dwells": dwells_of(_summaries(job, run), *tables, job.recipe.local_gravity_m_s2)}
 
 
+_converted: dict[tuple[str, str, str], LotTables] = {}
+"""The dwells of the last run whose stages were worked out: fit, verification and budget convert them once."""
+
+
+def _lot(run: Run) -> LotTables:
+    """The dwells of a run with their history; tables that change have another hash."""
+    dwells, history = (run.manifest(name)["sha256"] for name in ("dwells", "history"))
+    key = (str(run.path), dwells, history)
+    if key not in _converted:
+        found = LotTables(run.table("dwells"), run.table("history"))
+        _converted.clear()
+        _converted[key] = found
+    return _converted[key]
+
+
 _VERIFIED = ("dwells", "history", "coefficients", "covariance", "predictions")
 
 
 def _fit(job: Job, run: Run) -> Tables:
-    return fit(run.table("dwells"), run.table("history"), job.recipe.effects)
+    return fit_tables(_lot(run), job.recipe.effects)
 
 
 def _verify(job: Job, run: Run) -> Tables:
     del job
-    return verify(*(run.table(name) for name in _VERIFIED))
+    return verify_tables(_lot(run), *(run.table(name) for name in _VERIFIED[2:]))
 
 
 def _noise(job: Job, run: Run) -> Tables:
@@ -106,7 +122,9 @@ _BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verif
 
 
 def _budget(job: Job, run: Run) -> Tables:
-    return budget(BudgetTables(*(run.table(name) for name in _BUDGETED)), budget_terms(job))
+    lot = _lot(run)
+    tables = BudgetTables(lot.dwells, lot.history, *(run.table(name) for name in _BUDGETED[2:]), lot=lot)
+    return budget(tables, budget_terms(job))
 
 
 _EVIDENCE = (

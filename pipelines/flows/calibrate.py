@@ -24,6 +24,7 @@ from pipelines.chain.runner import Done, Runner
 from pipelines.flows.archive_address import archive_of
 from pipelines.flows.operator import Paused
 from pipelines.flows.policy import policy_of_tags
+from pipelines.flows.queue_rules import newer_run
 from pipelines.jobs.job import Request
 from schemas.errors import LinkLost, NotReached, StationTimeout
 from schemas.progress import silent
@@ -138,15 +139,18 @@ def late_start() -> str:
     """Reason why a scheduled run may no longer start; empty where it may.
 
     The worker cancels such runs (:mod:`pipelines.flows.queue_rules`). One that started in between, for instance when a suspended
-    computer resumed, ends here, before anything moves.
+    computer resumed, ends here, before anything moves; with ``missed=latest`` where a newer run of its deployment is due.
     """
     tags: list[str] = list(flow_run.tags or ())
     if AUTO not in tags or int(flow_run.run_count or 1) > 1:
         return ""
     policy = policy_of_tags(tags)
     late = datetime.now(UTC) - flow_run.scheduled_start_time
-    if policy.missed == "latest" or late <= policy.latest_start:
+    if late <= policy.latest_start:
         return ""
+    if policy.missed == "latest":
+        newer = newer_run(str(flow_run.deployment_id), flow_run.scheduled_start_time)
+        return f"missed: run {newer} of the same deployment is newer; policy missed=latest" if newer else ""
     return (
         f"missed: it starts {late.total_seconds() / 60.0:.0f} min after its time, at most {policy.latest_start_min} min are "
         "allowed; see latest_start_min of the deployment's policy"

@@ -10,9 +10,16 @@ import threading
 from collections import defaultdict
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
+from uuid import UUID
 
 from prefect.client.orchestration import SyncPrefectClient, get_client
+from prefect.client.schemas.filters import (
+    DeploymentFilter,
+    DeploymentFilterId,
+    FlowRunFilter,
+    FlowRunFilterExpectedStartTime,
+)
 from prefect.client.schemas.objects import StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.states import Cancelled, Scheduled
@@ -89,18 +96,37 @@ def _repeat(pool: str, queues: Sequence[str], ended: threading.Event) -> None:
 
 
 def _cancel_missed(client: SyncPrefectClient, pool: str, queue: str, now: datetime) -> list[str]:
-    """Cancel scheduled runs that are later than their policy allows, except the newest where it says ``missed=latest``."""
-    late: dict[object, list[FlowRun]] = defaultdict(list)
+    """Cancel scheduled runs that are later than their policy allows.
+
+    Where it says ``missed=latest``, the newest run of a deployment that is due stays: a missed one runs where no newer is due.
+    """
+    due: dict[object, list[FlowRun]] = defaultdict(list)
     for run in _due(client, pool, queue, now):
-        if now - _start(run) > policy_of_tags(run.tags).latest_start:
-            late[run.deployment_id].append(run)
+        due[run.deployment_id].append(run)
     texts: list[str] = []
-    for runs in late.values():
+    for runs in due.values():
         policy = policy_of_tags(runs[-1].tags)
         for run in runs[:-1] if policy.missed == "latest" else runs:
+            if now - _start(run) <= policy_of_tags(run.tags).latest_start:
+                continue
             message = MISSED.format(when=_text(_start(run)), limit=policy.latest_start_min, missed=policy.missed)
             texts += _cancelled(client, run, message)
     return texts
+
+
+def newer_run(deployment: str, start: datetime, now: datetime | None = None) -> str:
+    """Name of a run of the deployment's schedule that was due after ``start`` and is not cancelled; empty where there is none."""
+    # as Any: Prefect names a type of its own for times, and takes those of Python
+    after, before = cast("Any", start + timedelta(milliseconds=1)), cast("Any", now or datetime.now(UTC))
+    with get_client(sync_client=True) as client:
+        runs = client.read_flow_runs(
+            flow_run_filter=FlowRunFilter(
+                expected_start_time=FlowRunFilterExpectedStartTime(after_=after, before_=before)
+            ),
+            deployment_filter=DeploymentFilter(id=DeploymentFilterId(any_=[UUID(deployment)])),
+            sort=FlowRunSort.EXPECTED_START_TIME_DESC,
+        )
+    return next((run.name for run in runs if run.auto_scheduled and run.state_type != StateType.CANCELLED), "")
 
 
 def _cancelled(client: SyncPrefectClient, run: FlowRun, message: str) -> list[str]:

@@ -16,11 +16,11 @@ from pipelines.rerun.selection import entry_of
 from pipelines.rerun.steps import archived_job
 from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
-from pipelines.stages.fit import KINDS, fit
+from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
-from pipelines.stages.verify import verify
+from pipelines.stages.verify import verify_tables
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.dwells import lot_arrays
+from pipelines.tables.dwells import KINDS, LotTables, lot_arrays
 from pipelines.tables.frames import ByUnit
 from schemas.errors import DataRejected, TumblelineError
 from schemas.units import MICRO
@@ -105,13 +105,14 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     job = archived_job(run, change)
     names = ("verdicts", "grades", "coefficients", "covariance", "residuals", "verification", "noise")
     old = {name: run.table(name) for name in names}
-    dwells, history = run.table("dwells"), run.table("history")
-    new = fit(dwells, history, job.recipe.effects)
-    new |= verify(dwells, history, new["coefficients"], new["covariance"], new["predictions"])
+    lot = LotTables(run.table("dwells"), run.table("history"))
+    new = fit_tables(lot, job.recipe.effects)
+    new |= verify_tables(lot, new["coefficients"], new["covariance"], new["predictions"])
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
     names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
     stated = budget(
-        BudgetTables(dwells, history, *(new[name] for name in names), noise=old["noise"]), budget_terms(job)
+        BudgetTables(lot.dwells, lot.history, *(new[name] for name in names), noise=old["noise"], lot=lot),
+        budget_terms(job),
     )
     evidence = GradeEvidence(
         old["verdicts"],

@@ -17,12 +17,13 @@ from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.contributions import DwellConditions, influences, sources
 from pipelines.stages.quantities import VarianceParts, quantities_of
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
 from schemas.units import MICRO
 from schemas.validity import Stability
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from pipelines.tables.dwells import LotArrays
 
     Array = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     """
     if terms.stated is None or tables.coefficients.empty:
         return empty()
-    lot = lot_arrays(tables.dwells, tables.history, KINDS)
+    lot = tables.arrays()
     if lot.state.outer is None:  # faces or forces that are known otherwise: as a table would have turned to them
         outer, inner = angles_from_force(lot.state.force)
         lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
@@ -51,8 +52,12 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
 
 def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> DwellConditions:
     """The dwells of a lot on which the influences act."""
-    first = dwells[dwells["unit"] == lot.units[0]].set_index("dwell").reindex(lot.dwells)
-    soak = first["soak"].to_numpy(dtype=np.int64) if "soak" in first else np.zeros(lot.dwells.size, dtype=np.int64)
+    soak = np.zeros(lot.dwells.size, dtype=np.int64)
+    if "soak" in dwells:
+        own = np.flatnonzero(dwells["unit"].to_numpy(dtype=object) == lot.units[0])
+        own = own[np.argsort(dwells["dwell"].to_numpy()[own], kind="stable")]
+        rows = own[np.searchsorted(dwells["dwell"].to_numpy()[own], lot.dwells)]
+        soak = dwells["soak"].to_numpy()[rows].astype(np.int64)
     read = lot.state.temperature if lot.state.temperature is not None else np.full(lot.dwells.size, terms.room_C)
     mean = np.broadcast_to(read, (len(lot.units), lot.dwells.size)).mean(axis=0)
     target = np.array([mean[soak == one].mean() for one in soak])
@@ -73,10 +78,11 @@ def propagate(
     whole = sensitivity(physical, lot.state, own, scattered)
     design = fit_design(model, lot.state, dwell_noise(lot, wander, used), used)
     fitted = replace(whole, changes=whole.changes[..., used, :, :])
+    fit = propagated(design, fitted, calibration.response)
     return VarianceParts(
-        fit=propagated(design, fitted, calibration.response),
+        fit=fit,
         verification=whole.changes[..., ~used, :, :],
-        visible=design.visible_share(fitted.changes),
+        visible=design.visible_share(fitted.changes, fit.coefficients),
     )
 
 

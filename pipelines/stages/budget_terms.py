@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipelines.stages.contributions import merged
+from pipelines.tables.dwells import LotTables
 from schemas.validity import CertificateTerms, Stability
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from pipelines.tables.dwells import LotArrays
     from schemas.recipe import Recipe
     from schemas.reference import Reference
     from schemas.uncertainty import Uncertainty
@@ -20,16 +22,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BudgetTables:
-    """The tables that a budget is computed from."""
+    """The tables that a budget is computed from.
+
+    lot : the dwells with their history, where other stages have converted them already
+    """
 
     dwells: pd.DataFrame
-    history: pd.DataFrame
+    history: pd.DataFrame | None
     coefficients: pd.DataFrame
     covariance: pd.DataFrame
     wander: pd.DataFrame
     verification: pd.DataFrame
     verification_poses: pd.DataFrame
     noise: pd.DataFrame
+    lot: LotTables | None = None
+
+    def arrays(self) -> LotArrays:
+        """The dwells of fit and verification."""
+        return (self.lot or LotTables(self.dwells, self.history)).fitted_kinds
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
 from pipelines.stages.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.stages.nonlinear import profiled
 from pipelines.tables.calibration import coefficient_rows, covariance_rows
-from pipelines.tables.dwells import KINDS, LotArrays, lot_arrays
+from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
@@ -76,9 +76,14 @@ def fit(dwells: pd.DataFrame, history: pd.DataFrame, effects: Sequence[str]) -> 
     dwells : of every kind; those for verification are not fitted; they only state earlier conditions
     history : temperatures between the dwells
     """
-    if not np.any(dwells["kind"] == "dwell"):
+    return fit_tables(LotTables(dwells, history), effects)
+
+
+def fit_tables(tables: LotTables, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
+    """:func:`fit` of tables that other stages read as well."""
+    if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
-    lot = lot_arrays(dwells, history, KINDS)
+    lot = tables.fitted_kinds
     try:
         found = _fitted(lot, effects)
     except InertialError as problem:

@@ -137,9 +137,9 @@ def _budget(table: pd.DataFrame | None) -> dict[str, dict[tuple[str, str], Budge
     found: dict[str, dict[tuple[str, str], BudgetRow]] = {}
     if table is None:
         return found
-    for row in table.to_dict("records"):
-        own = found.setdefault(str(row["unit"]), {})
-        own[str(row["quantity"]), str(row["axis"])] = BudgetRow(row["value"], row["u_a"], row["u_b"], row["u"])
+    columns = (table[name].tolist() for name in ("unit", "quantity", "axis", "value", "u_a", "u_b", "u"))
+    for unit, quantity, axis, *numbers in zip(*columns, strict=True):
+        found.setdefault(str(unit), {})[str(quantity), str(axis)] = BudgetRow(*numbers)
     return found
 
 

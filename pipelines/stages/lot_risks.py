@@ -26,24 +26,28 @@ def lot_risks(figures: pd.DataFrame, limits: Limits, uncertainties: pd.DataFrame
     judged. ``largest_pfa`` is the largest specific probability of a unit that was accepted.
     """
     rows: list[dict[str, Any]] = []
-    limited = figures[np.isfinite(np.asarray(figures["limit"], dtype=float))]
-    for name, own in limited.groupby("figure", sort=False):
-        values = own["value"].to_numpy(dtype=float)
-        u = float(np.sqrt(np.mean((own["uncertainty"].to_numpy(dtype=float) / limits.coverage_factor) ** 2)))
-        limit, accept = float(own["limit"].iloc[0]), float(np.mean(own["accept"]))
+    numbers = {name: figures[name].to_numpy(dtype=float) for name in ("value", "uncertainty", "limit", "accept", "pfa")}
+    names, texts = (figures[name].to_numpy(dtype=object) for name in ("figure", "unit_text"))
+    limited = np.flatnonzero(np.isfinite(numbers["limit"]))
+    for name in dict.fromkeys(names[limited].tolist()):
+        places = limited[names[limited] == name]
+        own = {column: values[places] for column, values in numbers.items()}
+        values = own["value"]
+        u = float(np.sqrt(np.mean((own["uncertainty"] / limits.coverage_factor) ** 2)))
+        limit, accept = float(own["limit"][0]), float(np.nanmean(own["accept"]))
         process = process_deviation(values.tolist(), _independent(str(name), u, uncertainties))
         rows.append(
             {
                 "figure": name,
-                "unit_text": own["unit_text"].iloc[0],
-                "units": len(own),
+                "unit_text": texts[places[0]],
+                "units": len(values),
                 "mean": float(values.mean()),
                 "process": process,
                 "u": u,
                 "limit": limit,
                 "accept": accept,
-                **_risks(float(values.mean()), process, u, limit, accept, len(own)),
-                "largest_pfa": float(own["pfa"].max()),
+                **_risks(float(values.mean()), process, u, limit, accept, len(values)),
+                "largest_pfa": float(np.fmax.reduce(own["pfa"])),
             }
         )
     return pd.DataFrame(rows) if rows else empty_table(texts=TEXTS, whole="units", numbers=NUMBERS)

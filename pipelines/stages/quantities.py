@@ -12,6 +12,7 @@ from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import norm_errors, rms_over
 from pipelines.stages.period import Period, period_of
+from pipelines.tables.frames import ByUnit
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
@@ -230,12 +231,13 @@ def _verification(
 
 def _worst_pose(lot: LotArrays, tables: BudgetTables) -> tuple[Array, Array]:
     """Magnitude of the largest error of a pose and its uncertainty by noise, of every unit, µg."""
-    rows = tables.verification_poses
+    rows = ByUnit(tables.verification_poses)
     found = np.zeros((2, len(lot.units)))
     for place, unit in enumerate(lot.units):
-        own = rows[rows["unit"] == unit]
-        worst = int(np.argmax(np.abs(own["error_ug"].to_numpy())))
-        found[:, place] = abs(float(own["error_ug"].iloc[worst])), float(own["uncertainty_ug"].iloc[worst])
+        own = rows.of(unit)
+        error, u = own["error_ug"], own["uncertainty_ug"]
+        worst = int(np.argmax(np.abs(error)))
+        found[:, place] = abs(error[worst]), u[worst]
     return found[0], found[1]
 
 

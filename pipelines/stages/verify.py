@@ -10,7 +10,7 @@ import pandas as pd
 from inertial.correction import correct, station_change
 from pipelines.stages.rms_error import rms_uncertainty
 from pipelines.tables.calibration import read_calibration
-from pipelines.tables.dwells import LotArrays, lot_arrays
+from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.units import AXES, MICRO
 
@@ -38,10 +38,16 @@ def verify(
     which no calibration removes, is partly averaged out. Its uncertainty is that of this mean, with the correlation of its
     dwells.
     """
-    if not np.any(dwells["kind"] == "verification") or coefficients.empty:
+    return verify_tables(LotTables(dwells, history), coefficients, covariance, predictions)
+
+
+def verify_tables(
+    tables: LotTables, coefficients: pd.DataFrame, covariance: pd.DataFrame, predictions: pd.DataFrame
+) -> dict[str, pd.DataFrame]:
+    """:func:`verify` of tables that other stages read as well."""
+    if not np.any(tables.dwells["kind"] == "verification") or coefficients.empty:
         return nothing_verified()
-    # all dwells, because an effect with memory depends on the pose before
-    lot, calibration = lot_arrays(dwells, history), read_calibration(coefficients, covariance)
+    lot, calibration = tables.all_kinds, read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
     truth = lot.state.force + station_change(model, lot.state, calibration.shared, calibration.nonlinear)

@@ -7,6 +7,7 @@ needs every dwell of every unit and a reference force, as a fit in the output's 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,6 +76,29 @@ class LotArrays:
     def of_kind(self, kind: str) -> NDArray[np.bool_]:
         """Which dwells are of a kind, (n,)."""
         return np.asarray(self.kinds == kind)
+
+
+@dataclass(frozen=True)
+class LotTables:
+    """The tables of a lot's dwells, converted once for fit, verification and budget.
+
+    history : temperatures between the dwells
+    """
+
+    dwells: pd.DataFrame
+    history: pd.DataFrame | None
+
+    @cached_property
+    def fitted_kinds(self) -> LotArrays:
+        """The dwells of :data:`KINDS`."""
+        return lot_arrays(self.dwells, self.history, KINDS)
+
+    @cached_property
+    def all_kinds(self) -> LotArrays:
+        """All dwells, since an effect with memory depends on the dwell before."""
+        if self.dwells["kind"].isin(list(KINDS)).all():
+            return self.fitted_kinds
+        return lot_arrays(self.dwells, self.history)
 
 
 def measured(dwells: pd.DataFrame, history: pd.DataFrame | None = None) -> Measured:

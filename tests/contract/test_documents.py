@@ -83,6 +83,7 @@ CASES = {
     "station profiles --json": ["station", "profiles"],
     "archive clean --json": ["archive", "clean", "--dry-run"],
     "archive key --json": ["archive", "key", "--output", "{folder}/key.pem"],
+    "archive compact --json": ["archive", "compact"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }
 WITHOUT_ARCHIVE = {"plan", "station", "inspect", "keys", "extend"}

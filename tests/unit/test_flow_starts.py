@@ -33,7 +33,6 @@ def test_a_deployed_run_measures_anew_whatever_its_id_is(
         (14, ["auto-scheduled"], 1, ""),
         (600, [], 1, ""),  # an order of a person
         (600, ["auto-scheduled"], 2, ""),  # continues after a crash
-        (600, ["auto-scheduled", "missed=latest"], 1, ""),
         (40, ["auto-scheduled", "latest_start_min=30"], 1, "at most 30 min are allowed"),
     ],
 )
@@ -43,3 +42,18 @@ def test_a_run_of_a_schedule_that_comes_too_late_measures_nothing(
     due = datetime.now(UTC) - timedelta(minutes=minutes)
     running(monkeypatch, tags=tags, run_count=count, scheduled_start_time=due)
     assert told in calibrate.late_start() if told else calibrate.late_start() == ""
+
+
+@pytest.mark.parametrize(
+    ("newer", "told"), [("", ""), ("swift-hare", "run swift-hare of the same deployment is newer")]
+)
+def test_of_missed_runs_that_a_worker_took_before_the_rules_only_the_newest_measures(
+    monkeypatch: pytest.MonkeyPatch, newer: str, told: str
+) -> None:
+    due = datetime.now(UTC) - timedelta(hours=10)
+    tags = ["auto-scheduled", "missed=latest"]
+    running(monkeypatch, tags=tags, scheduled_start_time=due, deployment_id="aaaaaaaa-0000-4000-8000-000000000000")
+    asked: list[tuple[str, datetime]] = []
+    monkeypatch.setattr(calibrate, "newer_run", lambda *about: asked.append(about) or newer)
+    assert told in calibrate.late_start() if told else calibrate.late_start() == ""
+    assert asked == [("aaaaaaaa-0000-4000-8000-000000000000", due)]

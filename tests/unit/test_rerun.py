@@ -131,7 +131,7 @@ def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
         raise trouble
 
     with monkeypatch.context() as patch:
-        patch.setattr("pipelines.chain.chain.verify", unplugged)
+        patch.setattr("pipelines.chain.chain.verify_tables", unplugged)
         with pytest.raises(type(trouble)):
             again(run.archive, run.id, change)
     assert sorted(run.archive.root.rglob("*")) == before

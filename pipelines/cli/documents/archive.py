@@ -27,6 +27,18 @@ class ArchiveKeyDocument(TypedDict):
     private_file: str
 
 
+class ArchiveCompactDocument(TypedDict):
+    """``archive compact --json``: files of finished runs put into packs."""
+
+    archive: str
+    packs: Annotated[list[str], "names of the new packs, below `packed/`"]
+    packed: Annotated[int, "files that are in a pack now and were in none before"]
+    bytes: Annotated[int, "size of these files"]
+    freed: Annotated[int, "single files that were removed"]
+    kept: Annotated[list[str], "folders that changed, or that another process used; the next compaction packs them"]
+    unfinished: Annotated[list[str], "runs that are not finished; they stay as they are"]
+
+
 class Copied(TypedDict):
     """Files of a copy."""
 

@@ -1,0 +1,84 @@
+"""The index of the audit grows with the runs: what is added is what an audit would make, and small parts become one."""
+
+import json
+import logging
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+
+from pipelines.archive import Archive
+from pipelines.audit import index_growth
+from pipelines.audit.index import FOLDER, part_folders, runs_of, up_to_date, version_of_rows
+from pipelines.audit.index_growth import add_runs
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Archive:
+    """Six finished runs, one and its copies under other names: the index reads their files only."""
+    name = small_run(tmp_path).id
+    runs = tmp_path / "archive" / "runs"
+    for number in range(5):
+        shutil.copytree(runs / name, runs / f"copy-{number}")
+    return Archive(tmp_path / "archive")
+
+
+def index_of(archive: Archive) -> Path:
+    return Path(str(archive.root)) / FOLDER
+
+
+def names(archive: Archive) -> list[str]:
+    return sorted(place.name for place in (archive.root / "runs").iterdir())
+
+
+def rows(archive: Archive, table: str) -> list[dict]:
+    """The rows of a table of the index, in an order that does not depend on its parts."""
+    return sorted(up_to_date(archive).table(table).to_pylist(), key=lambda row: json.dumps(row, default=str))
+
+
+def test_an_audit_finds_every_run_that_was_added_and_reads_none_again(archive: Archive) -> None:
+    first, *others = names(archive)
+    assert add_runs(archive, [first]) == 1
+    assert add_runs(archive, others) == len(others)
+    found = up_to_date(archive)
+    assert (found.made, found.kept) == (0, 6)
+    added = {name: rows(archive, name) for name in ("runs", "coefficients")}
+    shutil.rmtree(index_of(archive))
+    assert up_to_date(archive).made == 6
+    assert added == {name: rows(archive, name) for name in ("runs", "coefficients")}
+    assert {row["run"] for row in added["runs"]} == set(names(archive))
+
+
+def test_small_parts_become_one_when_there_are_many(archive: Archive, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(index_growth, "MOST_SMALL", 3)
+    sizes: list[int] = []
+    parts: list[int] = []
+    for name in names(archive):
+        sizes.append(add_runs(archive, [name]))
+        parts.append(len(part_folders(index_of(archive))))
+    assert sizes == [1, 1, 1, 4, 1, 1]
+    assert parts == [1, 2, 3, 1, 2, 3]
+    held = [runs_of(part, version_of_rows()) for part in part_folders(index_of(archive))]
+    assert sorted(run for part in held for run in part) == names(archive), "every run once"
+
+
+def test_a_run_that_was_added_and_changed_is_read_again(archive: Archive) -> None:
+    add_runs(archive, names(archive))
+    os.utime(index_of(archive).parent / "runs" / names(archive)[2] / "run.json", (1.0, 1.0))
+    found = up_to_date(archive)
+    assert (found.made, found.kept) == (6, 0), "its part is made anew"
+    assert {row["run"] for row in rows(archive, "runs")} == set(names(archive))
+
+
+def test_an_index_that_cannot_grow_is_a_warning(archive: Archive, caplog: pytest.LogCaptureFixture) -> None:
+    index_of(archive).write_text("in the way", encoding="utf-8")
+    with caplog.at_level(logging.WARNING, "tumbleline.archive"):
+        assert add_runs(archive, names(archive)) == 0
+    assert "the next audit does it" in caplog.text
+
+
+def test_no_runs_make_no_part(archive: Archive) -> None:
+    assert add_runs(archive, []) == 0
+    assert not index_of(archive).exists()
