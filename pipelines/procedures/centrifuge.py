@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.stats import chi2
 
+from inertial.counts import degrees_of_freedom
 from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
@@ -264,7 +265,7 @@ def _figures(part: CentrifugePart, fit: Polynomial) -> list[FigureValue]:
 def _texts(part: CentrifugePart, fit: Polynomial) -> list[tuple[str, str]]:
     p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
     verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
-    judged_by = f"χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, {probability(p)}"
+    judged_by = f"χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, {probability(p)}"
     out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: {judged_by}")]
     if not part.reversed:
         text = (
