@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from inertial import effects as catalogue
+from inertial.counts import degrees_of_freedom, number_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.model import Model, Term
 from inertial.criticism.space import SEEN
@@ -86,8 +87,9 @@ def not_judged(model: Model, rms: float) -> str:
     if space.dof < FEWEST_DOF:
         count = model.problem.count
         return (
-            f"{count} measurements and {count - space.dof} coefficients leave {space.dof} degrees of freedom, "
-            f"{FEWEST_DOF} are needed; measure {FEWEST_DOF - space.dof} more dwells, or judge a smaller model"
+            f"{number_of(count, 'measurement')} and {number_of(count - space.dof, 'coefficient')} leave "
+            f"{degrees_of_freedom(space.dof)}, {FEWEST_DOF} are needed; "
+            f"measure {number_of(FEWEST_DOF - space.dof, 'more dwell')}, or judge a smaller model"
         )
     return ""
 

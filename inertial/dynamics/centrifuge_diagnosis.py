@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.counts import degrees_of_freedom
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.dynamics.missing_effects import breakers_of, missing_classes, p_value
 from inertial.dynamics.transfer_diagnosis import ADEQUATE_P, FEWEST_DOF
@@ -112,7 +113,8 @@ def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence
     judged = [name for name in effects if name in seen]
     base = fit_spins(points, output, error, judged)
     if base.dof < FEWEST_DOF:
-        reason = f"{base.dof} degrees of freedom, at least {FEWEST_DOF} are needed; add speeds, or measure the other mounting too"
+        left = degrees_of_freedom(base.dof)
+        reason = f"{left}, at least {FEWEST_DOF} are needed; add speeds, or measure the other mounting too"
         return _verdict(points, output, error, (base, base), None, reason, ())
     if p_value(base) >= ADEQUATE_P:
         return _verdict(points, output, error, (base, base), True, "", ())

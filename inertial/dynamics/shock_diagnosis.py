@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from inertial.counts import degrees_of_freedom
 from inertial.dynamics.missing_effects import breakers_of, missing_classes, p_value
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.transfer_diagnosis import ADEQUATE_P, FEWEST_DOF
@@ -143,7 +144,7 @@ def diagnose_shock(record: ShockRecord, effects: Sequence[str] = DEFAULT) -> Sho
     """The verdict on a comparison with ``effects``, with the classes of effects that make it adequate."""
     base = fit_shock(record, effects)
     if base.dof < FEWEST_DOF:
-        reason = f"{base.dof} degrees of freedom, at least {FEWEST_DOF} are needed; record faster"
+        reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; record faster"
         return _verdict(record, base, base, None, reason, ())
     if p_value(base) >= ADEQUATE_P:
         return _verdict(record, base, base, True, "", ())

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from inertial.counts import degrees_of_freedom
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points, TransferFit, best_of_exchange, fit_transfer
 
@@ -87,7 +88,7 @@ def diagnose_transfer(
     """
     base = fit_transfer(points, effects)
     if base.dof < FEWEST_DOF:
-        reason = f"{base.dof} degrees of freedom, at least {FEWEST_DOF} are needed; sweep more frequencies"
+        reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; sweep more frequencies"
         return _verdict(points, base, base, None, reason, (), unexplained=False, highest=highest_hz)
     if base.p_value >= ADEQUATE_P:
         return _verdict(points, base, base, True, "", (), unexplained=False, highest=highest_hz)

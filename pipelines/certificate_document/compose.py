@@ -19,6 +19,7 @@ from pipelines.certificate_document.content import (
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, stated_budget
 from pipelines.certificates.statement import stated
+from pipelines.stages.budget_rows import LABELS
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 from schemas.counts import number_of
@@ -47,6 +48,10 @@ SOURCES = {
     "[stability], ": "stability of the device, ",
     "[stability]": "stability of the device",
     "[uncertainty]": "uncertainties of the references",
+    "slot_rotation_mrad of the simulation": "simulation: rotation of the slots",
+    "slot_gradient_K of the simulation": "simulation: gradient in the slots",
+    "slot_lag_s of the simulation": "simulation: thermal lag of the slots",
+    "supply_spread of the simulation": "simulation: spread of the supply",
 }
 DECLARATION = (
     "The results relate only to the item calibrated, in the condition in which it was received, and to the stated conditions. "
@@ -178,7 +183,7 @@ def _budget(one: StatedQuantity) -> BudgetTable:
         expanded=None if deviation else one["expanded"],
         rows=tuple(
             Contribution(
-                name=row["name"],
+                name=LABELS.get(row["name"], row["name"]),
                 type=row["type"],
                 distribution=row["distribution"],
                 u=row["u"],
@@ -192,7 +197,7 @@ def _budget(one: StatedQuantity) -> BudgetTable:
 
 
 def _source(text: str) -> str:
-    """The source of a contribution without the names of tables in files."""
+    """The source of a contribution without the names of tables and keys in files."""
     for table, words in SOURCES.items():
         text = text.replace(table, words)
     return text
@@ -246,7 +251,7 @@ def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
     return (
         f"{procedure}Static multi-position calibration in the gravity of the Earth: {poses} poses at "
         f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
-        f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ()))}{verified}."
+        f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from inertial.counts import degrees_of_freedom
 from pipelines.cli.options import console, short
 
 
@@ -12,7 +13,7 @@ def evidence_text(document: dict[str, Any]) -> str:
     found = document.get("evidence")
     if not found:
         return ""
-    parts = [f"{found['degrees_of_freedom']} degrees of freedom"]
+    parts = [degrees_of_freedom(found["degrees_of_freedom"])]
     if found["condition"] is not None:
         parts.append(f"condition {short(found['condition'])}")
     if found["bias_jackknife_ug"] is not None and found["bias_change_by"] is not None:

@@ -101,6 +101,13 @@ def _print(one: InspectDocument) -> None:
         out.print(f"  time in {one['time_unit']}: {one['time_reason']}", soft_wrap=True)
     if one["gaps"]:
         out.print(f"  {number_of(one['gaps'], 'gap')} in time longer than five samples", soft_wrap=True)
+    for column in one["columns"]:
+        if column["clipped"] and column["low"] is not None and column["high"] is not None:
+            out.print(
+                f"  axis {column['meaning']} is clipped: {number_of(column['clipped'], 'sample')} in runs at the end of its "
+                f"range ({column['low']:g} to {column['high']:g}); the true output is beyond",
+                soft_wrap=True,
+            )
     for fault in one["faults"][:MOST_FAULTS]:
         what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
         out.print(

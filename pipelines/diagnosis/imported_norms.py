@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from inertial.counts import degrees_of_freedom
 from inertial.state import T_REFERENCE
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, dwells_of, gravity_of
@@ -162,7 +163,7 @@ def _noise_line(error: dict[str, Any], count: int) -> str:
 
 
 def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dict[str, Any], out_unit: str) -> str:
-    parts = [f"{evidence['degrees_of_freedom']} degrees of freedom"]
+    parts = [degrees_of_freedom(evidence["degrees_of_freedom"])]
     if evidence["condition"] is not None:
         parts.append(f"condition {evidence['condition']:.2g}")
     if evidence["bias_jackknife_ug"] is not None:

@@ -26,12 +26,28 @@ class Content:
     remarks : information for the user, such as a preamble
     units : column → unit, as the file states it
     interval_s : sample interval that the file states, s; None if it states none
+    lines : of a text, each file's name and the line of each of its rows, from 0, file after file; empty if unknown
     """
 
     table: pd.DataFrame
     remarks: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     interval_s: float | None = None
+    lines: tuple[tuple[str, Sequence[int]], ...] = ()
+
+    def line_of(self, row: int) -> str:
+        """The line of the text that a row (from 0) is in, as an editor counts it; empty if unknown."""
+        for name, lines in self.lines:
+            if row < len(lines):
+                return f"line {lines[row] + 1}" + (f" of {name}" if len(self.lines) > 1 else "")
+            row -= len(lines)
+        return ""
+
+
+def row_of(row: int, content: Content | None) -> str:
+    """A row (from 0) as a place: its number among the rows of data from 1, and the line of the file where it is known."""
+    line = "" if content is None else content.line_of(row)
+    return f"row {row + 1} ({line})" if line else f"row {row + 1}"
 
 
 def unit_in(name: str) -> str:

@@ -120,8 +120,10 @@ def _by_face(
 
 def _face_line(k: int, found: Faces, published: float, unit: str) -> str:
     bias = f"{AXES[k]}: bias {found.bias[k]:.5g} ± {found.bias_error[k]:.2g} {unit} (published method {published:.5g})"
-    misfit = f"lack of fit {found.rms[k]:.3g}, the samples allow {found.pure_error[k]:.2g} {unit}"
-    return f"{bias}; {misfit} (p = {found.p_value[k]:.1g})"
+    misfit = f"lack of fit {found.rms[k]:.3g}"
+    if not np.isfinite(found.p_value[k]):
+        return f"{bias}; {misfit} {unit}"
+    return f"{bias}; {misfit}, the samples allow {found.pure_error[k]:.2g} {unit} (p = {found.p_value[k]:.1g})"
 
 
 def _face_coefficients(unit: str, found: Faces, data: Imported) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers import clocks, exchange, held_out, pose_check, sample_faults, unit_check, values
+from pipelines.importers.content import row_of
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
@@ -66,17 +67,17 @@ def imported(
     columns = _columns(table, mapping, where)
     remarks = () if content is None else content.remarks
     stated = {} if content is None else content.units
-    kept, columns, dropped = _with_numbers(columns, mapping, where)
+    kept, columns, dropped = _with_numbers(columns, mapping, where, content)
     breaks = sorted({int(np.searchsorted(kept, k)) for k in breaks} | _behind(kept))
-    raw = np.column_stack([_finite(columns[axis], where) for axis in mapping.axes])
+    raw = np.column_stack([values.finite(columns[axis], where, content) for axis in mapping.axes])
     raw = raw * [1.0 if sign == "+" else -1.0 for sign in mapping.signs]
     remarks = (*remarks, *dropped, *unit_check.refuse_other_unit(raw, mapping.units.output, where))
     out_unit, factor = OUTPUT_UNITS[mapping.units.output]
     serials = _serials(columns, mapping, where)
-    extras = _extras(columns, mapping, where)
+    extras = _extras(columns, mapping, where, content)
     if mapping.rows == "dwells":
         return _as_dwells(columns, raw * factor, serials, extras, mapping, where, remarks)
-    clock = seconds(columns, mapping, stated, where, breaks)
+    clock = seconds(columns, mapping, stated, where, breaks, content=content)
     breaks, wide = gaps_of(clock.seconds, columns.get("dwell"), breaks, mapping, where)
     if len(set(serials)) > 1:
         raise DataRejected(
@@ -140,7 +141,7 @@ def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.
 
 
 def _with_numbers(
-    columns: dict[str, pd.Series], mapping: Mapping, where: str
+    columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content | None
 ) -> tuple[NDArray[np.int64], dict[str, pd.Series], tuple[str, ...]]:
     """Rows that are kept (k,), the columns with these rows, and a remark on the others, which lack a number."""
     count = len(columns["x"])
@@ -161,10 +162,8 @@ def _with_numbers(
         raise DataRejected(f"{where}: no row has a number in every mapped column, one is needed at least; check --map")
     if kept.size == count:
         return kept, columns, ()
-    first = int(np.flatnonzero(~whole)[0]) + 1
-    remark = (
-        f"{count - kept.size} of {count} rows without a number left out, the first is row {first}; dwells end there"
-    )
+    first = row_of(int(np.flatnonzero(~whole)[0]), content)
+    remark = f"{count - kept.size} of {count} rows without a number left out, the first is {first}; dwells end there"
     return kept, {name: one.iloc[kept].reset_index(drop=True) for name, one in columns.items()}, (remark,)
 
 
@@ -184,19 +183,6 @@ def _behind(kept: NDArray[np.int64]) -> set[int]:
     return {int(k) + 1 for k in np.flatnonzero(np.diff(kept) > 1)}
 
 
-def _finite(column: pd.Series, where: str, *, flags: bool = False) -> NDArray[np.float64]:
-    numbers = values.as_numbers(column, where, flags=flags)
-    bad = np.flatnonzero(~np.isfinite(numbers))
-    if bad.size:
-        row = int(bad[0])
-        raise DataRejected(
-            f"{where}: row {row + 1}, column '{shown(str(column.name))}': found {shown(str(column.iloc[row]))}, a finite number "
-            f"is needed ({bad.size} such rows); repair the file, or add --gaps split to use what lies between"
-        )
-    values.refuse_outside(numbers, "", where, label=str(column.name))
-    return numbers
-
-
 def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> list[str]:
     if "unit" in columns:
         serials = ["" if pd.isna(value) else values.text(value) for value in columns["unit"].tolist()]
@@ -210,14 +196,16 @@ def _serials(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> lis
     return [mapping.unit] * len(columns["x"])
 
 
-def _extras(columns: dict[str, pd.Series], mapping: Mapping, where: str) -> dict[str, NDArray[np.float64]]:
+def _extras(
+    columns: dict[str, pd.Series], mapping: Mapping, where: str, content: Content | None
+) -> dict[str, NDArray[np.float64]]:
     """Temperature, other known columns and covariates by the names of the tables."""
     extras: dict[str, NDArray[np.float64]] = {}
     for meaning, column in columns.items():
         if meaning in ("time", *AXES, "unit", "dwell"):
             continue
         name = MEANINGS.get(meaning, meaning)
-        numbers = _finite(column, where, flags=meaning not in MEANINGS)
+        numbers = values.finite(column, where, content, flags=meaning not in MEANINGS)
         if meaning in ("temperature", "chamber"):
             numbers = _celsius(numbers, mapping.units.temperature)
         values.refuse_outside(numbers, name, where)

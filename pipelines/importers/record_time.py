@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from pipelines.importers.content import Content
     from pipelines.importers.stretches import Stretches
 
 FASTEST_K_S = 5.0
@@ -39,6 +40,7 @@ def seconds(
     breaks: Sequence[int],
     *,
     dwells: bool = False,
+    content: Content | None = None,
 ) -> RecordingClock:
     """Seconds of every row from any beginning.
 
@@ -47,6 +49,7 @@ def seconds(
     stated : column → unit, as the file states it.
     breaks : rows before which another file begins, or rows are missing.
     dwells : whether rows are dwells, whose steps say nothing about their unit.
+    content : of the file, which knows the lines of its rows.
 
     Raises
     ------
@@ -55,7 +58,7 @@ def seconds(
     WrongUse
         There is no time and no rate, or the unit of time cannot be recognised.
     """
-    clock = _clock(columns, mapping, stated, where, dwells=dwells)
+    clock = _clock(columns, mapping, stated, where, dwells=dwells, content=content)
     values.refuse_outside(clock.seconds, "time_s", where)
     if dwells:
         return clock
@@ -88,7 +91,13 @@ def _continued(clock: RecordingClock) -> RecordingClock:
 
 
 def _clock(
-    columns: Columns[str, pd.Series], mapping: Mapping, stated: Columns[str, str], where: str, *, dwells: bool
+    columns: Columns[str, pd.Series],
+    mapping: Mapping,
+    stated: Columns[str, str],
+    where: str,
+    *,
+    dwells: bool,
+    content: Content | None,
 ) -> RecordingClock:
     time = columns.get("time")
     if time is not None and values.is_moment(time):
@@ -100,9 +109,13 @@ def _clock(
             raise WrongUse(
                 f"{where}: no time in seconds is mapped, a rate is needed then; map time=…, or give --rate HZ"
             )
-        count = np.arange(len(columns["x"]), dtype=np.float64) if time is None else finite(time, where)
+        count = (
+            np.arange(len(columns["x"]), dtype=np.float64)
+            if time is None
+            else values.finite(time, where, content, needed="a time")
+        )
         return RecordingClock(count / mapping.rate_hz, "samples", ())
-    numbers = finite(time, where)
+    numbers = values.finite(time, where, content, needed="a time")
     name = str(time.name)
     if dwells:
         found = clocks.recognised(numbers, name, stated.get(name, ""))
@@ -112,20 +125,6 @@ def _clock(
     if np.all(numbers == numbers[0]):
         return RecordingClock(np.zeros(len(numbers)), "s", ())
     return clocks.clock(numbers, name, mapping.units.time, stated.get(name, ""), where)
-
-
-def finite(column: pd.Series, where: str) -> NDArray[np.float64]:
-    """The numbers of a column of time; an invalid one is refused with its row."""
-    numbers = values.as_numbers(column, where)
-    bad = np.flatnonzero(~np.isfinite(numbers))
-    if bad.size:
-        row = int(bad[0])
-        raise DataRejected(
-            f"{where}: row {row + 1}, column '{shown(str(column.name))}': found {shown(str(column.iloc[row]))}, a time is needed "
-            f"({bad.size} such rows); repair the file, or add --gaps split to use what lies between"
-        )
-    values.refuse_outside(numbers, "", where, label=str(column.name))
-    return numbers
 
 
 def backwards(time: NDArray[np.float64], group: Sequence[Any], where: str, *, together: bool) -> None:

@@ -83,7 +83,10 @@ def _after(contents: list[Content], names: list[str], time: str) -> tuple[Conten
         if shifted:
             remarks.append(f"{name}: its clock restarts; it is continued after {names[len(tables) - 1]}")
         tables.append(table)
-    return replace(first, table=pd.concat(tables, ignore_index=True), remarks=tuple(remarks)), tuple(breaks[1:])
+    whole = all(one.lines for one in contents)
+    lines = tuple(part for one in contents for part in one.lines) if whole else ()
+    table = pd.concat(tables, ignore_index=True)
+    return replace(first, table=table, remarks=tuple(remarks), lines=lines), tuple(breaks[1:])
 
 
 def _behind(before: pd.DataFrame, table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, bool]:
@@ -118,7 +121,7 @@ def _beside(contents: list[Content], names: list[str], time: str) -> Content:
             units |= {own: content.units[str(column)]} if str(column) in content.units else {}
         how = f"read at the times of {names[0]}, linear in between" if clocked else "row by row"
         remarks += [*content.remarks, f"columns of {name} {how}"]
-    return replace(first, table=pd.DataFrame(columns), units=units, remarks=tuple(remarks))
+    return replace(first, table=pd.DataFrame(columns), units=units, remarks=tuple(remarks), lines=())
 
 
 def _at(times: pd.Series, own: pd.Series, data: pd.Series, where: str) -> NDArray[np.float64]:

@@ -68,14 +68,18 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     if found is None:
         raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
     labels = _labels(found, where)
-    body = [lines[k] for k in filled[bisect_left(filled, found.first) :]]
+    rows = filled[bisect_left(filled, found.first) :]
+    body = [lines[k] for k in rows]
     table = _parsed(body, found, labels, where)
     units = {label: unit for label, unit in zip(labels, found.units, strict=False) if unit} or {
         label: unit for label in labels if (unit := unit_in(label))
     }
     units = {label: unit.strip("[]() ") for label, unit in units.items()}
     remarks = _remarks(found, lines, encoding)
-    return Content(table, (*remarks, grouped) if grouped else remarks, units)
+    remarks = (*remarks, grouped) if grouped else remarks
+    # a line break inside a quoted field, or one that the parser joins, moves all rows behind it
+    whole = len(lines) == len(text.splitlines()) and len(rows) == len(table)
+    return Content(table, remarks, units, lines=((where, rows),) if whole else ())
 
 
 def logical_lines(text: str) -> list[str]:

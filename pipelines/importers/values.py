@@ -8,11 +8,14 @@ import numpy as np
 import pandas as pd
 
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST, LARGEST_TIME_S, RECORDED, SPREAD_COLUMNS
+from pipelines.importers.content import row_of
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from pipelines.importers.content import Content
 
 _FORCE_G = 1e4
 ANGLES = ("outer", "inner")
@@ -72,6 +75,28 @@ def as_numbers(values: pd.Series, where: str, *, flags: bool = False) -> NDArray
         )
     with foreign(f"{where}: column '{name}' does not turn into numbers", "repair the column"):
         return np.asarray(pd.to_numeric(values, errors="coerce"), dtype=np.float64)
+
+
+def finite(
+    values: pd.Series,
+    where: str,
+    content: Content | None = None,
+    *,
+    flags: bool = False,
+    needed: str = "a finite number",
+) -> NDArray[np.float64]:
+    """The numbers of a column; others are refused with row, and line if ``content`` knows it."""
+    numbers = as_numbers(values, where, flags=flags)
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        row = int(bad[0])
+        raise DataRejected(
+            f"{where}: {row_of(row, content)}, column '{shown(str(values.name))}': found {shown(str(values.iloc[row]))}, "
+            f"{needed} is needed ({bad.size} such {'row' if bad.size == 1 else 'rows'}); repair the file, or add --gaps split to "
+            "use what lies between"
+        )
+    refuse_outside(numbers, "", where, label=str(values.name))
+    return numbers
 
 
 def _has_flags(values: pd.Series) -> bool:

@@ -81,8 +81,8 @@ def refuse_unreachable(job: Measuring) -> None:
     wrong = unreachable(reachable(quiet, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
     if wrong:
         raise RecipeInvalid(
-            f"recipe {job.recipe.name} on station {job.station.name}: {wrong[0]}; raise the limit, or improve what rules it (see "
-            "'tumbleline plan')",
+            f"recipe {job.recipe.name} on station {job.station.name}: {wrong[0]}, noise of the device left out; raise the "
+            "limit, or improve what rules it (see 'tumbleline plan')",
             key="limits",
         )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
+from inertial.counts import degrees_of_freedom
 from inertial.dynamics.centrifuge import columns, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.procedures.base import FigureValue
@@ -60,7 +61,7 @@ def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str
     p = float(chi2.sf(unit.chi_square, unit.dof)) if unit.dof > 0 else float("nan")
     verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= ADEQUATE_P else "not adequate"
     terms = " + ".join((*unit.names, "arm_stretch", "mass_offset"))
-    judged_by = f"χ² {unit.chi_square:.1f} for {unit.dof} degrees of freedom, {probability(p)}"
+    judged_by = f"χ² {unit.chi_square:.1f} for {degrees_of_freedom(unit.dof)}, {probability(p)}"
     out = [
         ("model", f"{terms}, with the errors of {len(radii)} radii, is {verdict}: {judged_by}"),
         ("offset of the proof mass", f"{_stated(fit.mass_offset_m, MICRO)} µm (k = 2), the same at every radius"),

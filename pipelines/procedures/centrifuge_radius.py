@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
+from inertial.counts import degrees_of_freedom
 from inertial.dynamics.centrifuge import Polynomial, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_effects import EFFECTS
 from pipelines.procedures.base import FigureValue
@@ -41,7 +42,7 @@ def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tup
     """Verdict on the polynomial at one radius, and the classes of effects that it holds: subject and text."""
     p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
     verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
-    judged_by = f"χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, {probability(p)}"
+    judged_by = f"χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, {probability(p)}"
     out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: {judged_by}")]
     if not both:
         text = (

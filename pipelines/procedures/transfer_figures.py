@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import brentq
 
+from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, TransferFit, best_of_exchange, factor
@@ -155,7 +156,7 @@ def diagnosis_text(found: TransferDiagnosis) -> list[tuple[str, str]]:
         return [("model", f"{model}: cannot be judged: {found.reason}")]
     verdict = "adequate" if found.adequate else "not adequate"
     text = (
-        f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {fit.dof} degrees of freedom, "
+        f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, "
         f"{probability(fit.p_value)}, rms residual {found.error_percent:.2g} %"
     )
     out.append(("model", text))

@@ -32,6 +32,7 @@ FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which the kind of it
 _PER_G = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
 """Output per g by the name of the output's unit, for models without a scale."""
 
+_TURNED_G = 0.1  # difference of force between dwells from which on they have more than one orientation
 LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most
 
 
@@ -178,9 +179,12 @@ def _per_g(lot: LotArrays, found: LotFit) -> Array:
     if "scale" in found.effects:
         return scale
     if lot.out_unit not in _PER_G:
+        turned = bool(np.any(np.ptp(lot.state.force.reshape(-1, 3), axis=0) > _TURNED_G))
+        scale_too = "add 'scale' to the effects, or " if turned else "one orientation cannot show it; "
         raise DataRejected(
             f"fit: the model {', '.join(found.effects)} has no 'scale', and the outputs are in {lot.out_unit}: residuals in µg "
-            "need the output per g; add 'scale' to the effects (it needs at least two orientations), or import outputs in g"
+            f"need the output per g; {scale_too}divide the outputs by that of the data sheet and import them with "
+            "--units output=g"
         )
     return np.full_like(scale, _PER_G[lot.out_unit])
 

@@ -133,7 +133,7 @@ def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_
     path.write_text(gapped_file(record), encoding="utf-8")
     status, _, err = told(monkeypatch, capsys, "import", path, *MAPPED, "--archive", tmp_path / "b")
     assert status == 2
-    assert "a.csv: row 701, column 'ay': found nan" in err
+    assert "a.csv: row 701 (line 702), column 'ay': found nan" in err
     assert "--gaps split" in err
     assert not (tmp_path / "b").exists()
     path.write_text(recordings.table(record).drop(index=range(1500, 1560)).to_csv(index=False), encoding="utf-8")
