@@ -85,7 +85,7 @@ def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
 
     def call(run: Run) -> Tables:
         tables = {name: run.table(name) for name in names}
-        whole = BudgetTables(dwells=run.table("dwells"), history=history_of(run), noise=no_noise(), **tables)
+        whole = BudgetTables(dwells=run.table("dwells"), history=history_of(run), noise=no_noise(), lot=None, **tables)
         return budget(whole, terms) if known else norm_budget(whole, terms)
 
     module = "pipelines.stages.budget" if known else "pipelines.stages.norm_budget"
