@@ -184,7 +184,11 @@ class Decision:
         what = f"{self.value:.4g}{spread}{unit}, limit {side}{self.limit:.4g}{unit}"
         if self.outcome.startswith("conditional"):
             risk = f"probability of {'falling below' if self.least else 'exceeding'} it {100.0 * self.risk:.2g} %"
-            return f"{self.figure} not accepted: inside the guard band, {what}, {risk}: measure longer, or again"
+            beyond = "below" if self.least else "above"
+            where = (
+                "inside the guard band" if self.margin >= 0.0 else f"{beyond} the limit by less than its uncertainty"
+            )
+            return f"{self.figure} not accepted: {where}, {what}, {risk}: measure longer, or again"
         return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
 
 

@@ -184,6 +184,18 @@ def test_the_head_of_a_budget_is_what_its_contributions_add_up_to(run: Run) -> N
         assert all("[" not in row.source for row in one.rows)
 
 
+def test_contributions_sources_and_effects_are_named_in_words_and_not_by_keys(run: Run) -> None:
+    made = content(run)
+    named = {row.name for table in made.budgets for row in table.rows}
+    assert {"noise of the dwells", "repeatability of the poses", "seat of the fixture"} <= named, named
+    sources = {row.source for table in made.budgets for row in table.rows}
+    assert "simulation: rotation of the slots" in sources, sources
+    text = " ".join(text_of(pdf(made, dcc(made))))
+    assert "bias temperature" in text
+    for key in ("bias_temperature", "slot_rotation_mrad", "switch_on", "scale_temperature"):
+        assert key not in text.replace("\n", "")
+
+
 def test_values_of_the_xml_are_those_of_the_archive_in_si_units(run: Run) -> None:
     tree = etree.fromstring(dcc(content(run)))
     rows = run.table("uncertainties").query("unit == 'A1' and quantity == 'bias' and axis == 'y'").iloc[0]

@@ -44,6 +44,11 @@ def test_names_value_uncertainty_limit_margin_and_rule() -> None:
         "bias_error_ug not accepted: inside the guard band, 95 ± 10 µg, limit 100 µg, probability of exceeding it 16 %: "
         "measure longer, or again"
     )
+    beyond = decide(limits(), "bias_error_ug", 105.0, 5.0)
+    assert beyond.sentence == (
+        "bias_error_ug not accepted: above the limit by less than its uncertainty, 105 ± 10 µg, limit 100 µg, probability of "
+        "exceeding it 84 %: measure longer, or again"
+    )
     assert decision.rule == "ILAC-G8:09/2019 guarded acceptance, w = U with k = 2"
 
 
