@@ -256,6 +256,7 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
         for word in ("hare", "loud", "Send"):  # "Share chart…" would send the data to the maker of the library
             assert one.page.locator(f".modebar-btn[data-title*='{word}']").count() == 0
         assert one.page.locator(".modebar-btn").count() > 0
+        assert one.page.locator(".modebar-btn svg").first.bounding_box()["height"] >= 12  # px, to be seen and hit
         one.page.reload()
         one.ready()
         one.sees("[data-name='samples'][data-drawn]")
