@@ -117,11 +117,13 @@ def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[s
 @contextmanager
 def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()) -> Generator[Links]:
     """The links to a plant's devices, served on loopback: registers over Modbus TCP, lines beside it."""
-    from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415 - hardware needs no plant
+    from stations.one_processor import one_processor  # noqa: PLC0415 - hardware needs no plant
+    from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415
     from stations.plant.line_server import LineServer  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
 
     with ExitStack() as stack:
+        stack.enter_context(one_processor())
         server = stack.enter_context(PlantServer(plant))
         at: dict[Carrier, tuple[str, int]] = {
             "tcp": stack.enter_context(on_the_wire(plant, plant.faults, server.host, server.port))
