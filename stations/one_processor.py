@@ -8,7 +8,7 @@ import fcntl
 import os
 import tempfile
 from collections.abc import Generator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 _NAME = "tumbleline-{user}-processor-{number}.lock"
@@ -24,9 +24,15 @@ def one_processor() -> Generator[None]:
         number = _claimed(stack)
         if number is not None:
             before = os.sched_getaffinity(0)
-            os.sched_setaffinity(0, {number})  # of this thread only
-            stack.callback(os.sched_setaffinity, 0, before)
+            _tie(number)
+            stack.callback(_tie, *before)
         yield
+
+
+def _tie(*numbers: int) -> None:
+    """Let this thread run on some processors; it stays where it is when they are no longer its own (a changed cpuset)."""
+    with suppress(OSError):
+        os.sched_setaffinity(0, numbers)
 
 
 def _claimed(stack: ExitStack) -> int | None:

@@ -178,13 +178,13 @@ class Model:
 
     def _restricted(self, shares: Shares) -> float:
         """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
-        quick = None if self.shared.shape[-1] else self._columns.at_once(shares)
+        quick = None if self.shared.shape[-1] else self.own_columns.at_once(shares)
         if quick is None:
             space = self._rough(shares)
             information, squares, dof = space.information, space.squares, space.by_block
         else:
             information, squares = quick
-            dof = self.problem.covariance.count - float(self._columns.rank)
+            dof = self.problem.covariance.count - float(self.own_columns.rank)
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
         if self._least.any():
             known = dof > 0
@@ -197,12 +197,12 @@ class Model:
         return logdet + information + float(np.sum(own))
 
     @cached_property
-    def _columns(self) -> WhitenedColumns:
+    def own_columns(self) -> WhitenedColumns:
         """The columns with coefficients by block, and the measurements behind them, at any shares."""
         further = None
         if self._simpler is not None and not self.terms[-1].shared:
             further = np.concatenate([self._of(self.terms[-1]), self._start(self.terms[-1])], axis=-1)
-        before = None if self._simpler is None or further is None else self._simpler._columns  # noqa: SLF001 - of its own kind
+        before = None if self._simpler is None or further is None else self._simpler.own_columns
         return WhitenedColumns(self.problem, self.local, before, further)
 
     @cached_property

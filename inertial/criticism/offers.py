@@ -9,7 +9,7 @@ from inertial.criticism.menus import Kind, StepSequence
 from inertial.planning.sequences import SequenceStep
 
 
-class Search(Protocol):
+class SequenceSearch(Protocol):
     """What is asked of the search that the sequences are for."""
 
     least: float
@@ -46,7 +46,7 @@ class Offers:
     sequence, which fits every rival to every other, is left out where its bound is below the best gain per minute.
     """
 
-    def __init__(self, search: Search, chosen: Sequence[StepSequence], now: float) -> None:
+    def __init__(self, search: SequenceSearch, chosen: Sequence[StepSequence], now: float) -> None:
         self.search, self.chosen, self.now = search, tuple(chosen), now
         self.spent = search.minutes(chosen)
         offered = search.offers([*search.already, *(s for c in chosen for s in c.steps)])

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.counts import degrees_of_freedom
+from inertial.dynamics import goodness
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
-from inertial.dynamics.missing_effects import breakers_of, missing_classes, p_value
-from inertial.dynamics.transfer_diagnosis import ADEQUATE_P, FEWEST_DOF
+from inertial.dynamics.centrifuge_radii import radii_as_observed
+from inertial.dynamics.missing_effects import breakers_of, missing_classes
+from inertial.dynamics.transfer_diagnosis import FEWEST_DOF
 from inertial.errors import NotIdentified
 
 if TYPE_CHECKING:
@@ -87,7 +89,7 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
         msg = f"centrifuge: {len(output)} points for {2 + len(effects)} coefficients; add speeds"
         raise NotIdentified(msg)
     rows = _rows(points, effects)
-    known = _radii_as_observed(points, rows.shape[1])
+    known = radii_as_observed(len(_uncertain_radii(points)), rows.shape[1], points.radius_error_m)
     weighted = np.vstack([rows / error[:, None], known])
     size = np.linalg.norm(weighted, axis=0)
     design, target = weighted / size, np.append(output / error, np.zeros(len(known)))
@@ -116,7 +118,7 @@ def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence
         left = degrees_of_freedom(base.dof)
         reason = f"{left}, at least {FEWEST_DOF} are needed; add speeds, or measure the other mounting too"
         return _verdict(points, output, error, (base, base), None, reason, ())
-    if p_value(base) >= ADEQUATE_P:
+    if goodness.adequate(base):
         return _verdict(points, output, error, (base, base), True, "", ())
     classes, best = missing_classes(base, judged, seen, lambda names: fit_spins(points, output, error, names))
     return _verdict(points, output, error, (base, best), False, "", classes)
@@ -132,12 +134,6 @@ def _uncertain_radii(points: Spins) -> list[float]:
     """The radii whose errors are unknowns: those of several; the error of a single one is in the scale."""
     found = np.unique(points.radius_m).tolist()
     return found if len(found) > 1 and points.radius_error_m > 0.0 else []
-
-
-def _radii_as_observed(points: Spins, unknowns: int) -> Array:
-    """Weighted rows (radii, unknowns) of the stated radii: each error is 0 with its uncertainty."""
-    count = len(_uncertain_radii(points))
-    return np.eye(count, unknowns, unknowns - count) / (points.radius_error_m or 1.0)
 
 
 def _verdict(
@@ -157,7 +153,7 @@ def _verdict(
         base,
         best,
         classes,
-        adequate is False and not p_value(best) >= ADEQUATE_P,
+        adequate is False and not goodness.adequate(best),
         float(np.sqrt(np.mean(base.residuals**2))),
         float(np.sqrt(np.mean(best.residuals**2))),
         (left[0], left[1]),

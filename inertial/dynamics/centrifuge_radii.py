@@ -88,6 +88,11 @@ def _arm(acceleration: Array, radius_m: Array) -> Array:
     return np.column_stack([acceleration * size * STANDARD_GRAVITY / radius_m, size / radius_m])
 
 
+def radii_as_observed(count: int, unknowns: int, radius_error_m: float) -> Array:
+    """Weighted rows (count, unknowns) of the stated radii, whose errors are the last unknowns: each is 0 with its uncertainty."""
+    return np.eye(count, unknowns, unknowns - count) / (radius_error_m if count else 1.0)
+
+
 def _solved(
     rows: Array, of_radii: Array, output: Array, error: Array, radius_error_m: float
 ) -> tuple[Array, Array, Array, float]:
@@ -95,8 +100,7 @@ def _solved(
     weighted = np.column_stack([rows, of_radii]) / error[:, None]
     target = output / error
     if np.isfinite(radius_error_m):
-        known = np.zeros((of_radii.shape[1], weighted.shape[1]))
-        known[:, rows.shape[1] :] = np.eye(of_radii.shape[1]) / radius_error_m
+        known = radii_as_observed(of_radii.shape[1], weighted.shape[1], radius_error_m)
         weighted, target = np.vstack([weighted, known]), np.append(target, np.zeros(len(known)))
     size = np.linalg.norm(weighted, axis=0)
     if len(output) < rows.shape[1] or np.linalg.matrix_rank(weighted / size, tol=1e-8) < weighted.shape[1]:

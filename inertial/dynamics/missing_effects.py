@@ -5,34 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
-from scipy.stats import chi2
 
-from inertial.dynamics.transfer_diagnosis import ADDED_P, ADEQUATE_P, CLASS_WIDTH, MOST_ADDED, EffectClass
+from inertial.distributions import chi2_tail
+from inertial.dynamics.goodness import Fitted, adequate
+from inertial.dynamics.transfer_diagnosis import ADDED_P, CLASS_WIDTH, MOST_ADDED, EffectClass
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 
-class Fitted(Protocol):
-    """A fit of a model with some effects."""
-
-    @property
-    def chi_square(self) -> float:
-        """Sum of the squared weighted residuals."""
-        ...
-
-    @property
-    def dof(self) -> int:
-        """Degrees of freedom."""
-        ...
-
-
 AnyFit = TypeVar("AnyFit", bound=Fitted)
-
-
-def p_value(fit: Fitted) -> float:
-    """Probability of a larger χ² where the model is right; nan without degrees of freedom."""
-    return float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
 
 
 class Separated(Protocol):
@@ -63,7 +45,7 @@ def missing_classes(
     """
     classes: list[EffectClass] = []
     best, current = base, list(effects)
-    while len(classes) < MOST_ADDED and not p_value(best) >= ADEQUATE_P:
+    while len(classes) < MOST_ADDED and not adequate(best):
         left = [name for name in candidates if name not in current]
         found = _next_class(best, current, left, fit_of)
         if found is None:
@@ -85,7 +67,7 @@ def _next_class(
 
     def added_p(fit: Fitted) -> float:
         gain, parameters = max(0.0, best.chi_square - fit.chi_square), max(1, best.dof - fit.dof)
-        return float(min(1.0, len(candidates) * chi2.sf(gain, parameters)))
+        return float(min(1.0, len(candidates) * chi2_tail(gain, parameters)))
 
     real = sorted((name for name in fits if added_p(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
     if not real:

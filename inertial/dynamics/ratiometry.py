@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+
+from inertial.distributions import chi2_tail
+from inertial.dynamics.goodness import ADEQUATE_P
 
 Array = NDArray[np.float64]
-ADEQUATE = 0.005  # least p-value of a line that is adequate
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def largest_departure(supply: Array, departure: Array, own: Array) -> tuple[floa
     supply, departure : (n,), that of the first supply is 0; own : (n,), standard uncertainties without the first one's share
     """
     slope, error, square = _line(supply, departure, own)
-    if chi2.sf(square, max(1, len(supply) - 2)) >= ADEQUATE:
+    if chi2_tail(square, max(1, len(supply) - 2)) >= ADEQUATE_P:
         step = float(max(supply - supply[0], key=abs))
         return slope * step, error * abs(step)
     k = int(np.argmax(np.abs(departure)))

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from inertial.counts import degrees_of_freedom
-from inertial.dynamics.missing_effects import breakers_of, missing_classes, p_value
+from inertial.dynamics import goodness
+from inertial.dynamics.missing_effects import breakers_of, missing_classes
 from inertial.dynamics.shock_effects import EFFECTS
-from inertial.dynamics.transfer_diagnosis import ADEQUATE_P, FEWEST_DOF
+from inertial.dynamics.transfer_diagnosis import FEWEST_DOF
 from inertial.errors import NotIdentified
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ def diagnose_shock(record: ShockRecord, effects: Sequence[str] = DEFAULT) -> Sho
     if base.dof < FEWEST_DOF:
         reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; record faster"
         return _verdict(record, base, base, None, reason, ())
-    if p_value(base) >= ADEQUATE_P:
+    if goodness.adequate(base):
         return _verdict(record, base, base, True, "", ())
     classes, best = missing_classes(base, list(effects), list(EFFECTS), lambda names: fit_shock(record, names))
     return _verdict(record, base, best, False, "", classes)
@@ -234,7 +235,7 @@ def _verdict(
         base,
         best,
         classes,
-        adequate is False and not p_value(best) >= ADEQUATE_P,
+        adequate is False and not goodness.adequate(best),
         _where(record, base),
         _percent(record, list(base.residuals)),
         _percent(record, list(best.residuals)),

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from inertial.counts import degrees_of_freedom
+from inertial.distributions import chi2_tail
+from inertial.dynamics import goodness
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points, TransferFit, best_of_exchange, fit_transfer
 
@@ -17,10 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 Array = NDArray[np.float64]
-ADEQUATE_P = 0.005
-"""Below this probability of the residuals a model is inadequate; an effect is named only where it also passes ADDED_P."""
 ADDED_P = 1e-3
-"""Largest p-value of an added effect, times the number of candidates."""
+"""Largest p-value of an added effect of a model that is not adequate, times the number of candidates."""
 CLASS_WIDTH = 9.0
 """Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
 MOST_ADDED = 3
@@ -90,18 +89,18 @@ def diagnose_transfer(
     if base.dof < FEWEST_DOF:
         reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; sweep more frequencies"
         return _verdict(points, base, base, None, reason, (), unexplained=False, highest=highest_hz)
-    if base.p_value >= ADEQUATE_P:
+    if goodness.adequate(base):
         return _verdict(points, base, base, True, "", (), unexplained=False, highest=highest_hz)
     classes: list[EffectClass] = []
     best, current = base, list(effects)
-    while len(classes) < MOST_ADDED and best.p_value < ADEQUATE_P:
+    while len(classes) < MOST_ADDED and goodness.adequate(best) is False:
         found = _next_class(points, best, current)
         if found is None:
             break
         one, best = found
         classes.append(one)
         current.append(one.effects[0])
-    unexplained = best.p_value < ADEQUATE_P
+    unexplained = goodness.adequate(best) is False
     return _verdict(points, base, best, False, "", tuple(classes), unexplained=unexplained, highest=highest_hz)
 
 
@@ -124,7 +123,7 @@ def _next_class(points: Points, best: TransferFit, current: Sequence[str]) -> tu
 
     def p_value(fit: TransferFit) -> float:
         gain = max(0.0, best.chi_square - fit.chi_square)
-        return float(min(1.0, len(candidates) * chi2.sf(gain, len(fit.parameters) - len(best.parameters))))
+        return float(min(1.0, len(candidates) * chi2_tail(gain, len(fit.parameters) - len(best.parameters))))
 
     real = sorted((name for name in fits if p_value(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
     if not real:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.stats import chi2
 
+from inertial.dynamics.goodness import p_value
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
 from inertial.errors import NotIdentified
 
@@ -77,7 +77,7 @@ class TransferFit:
     @property
     def p_value(self) -> float:
         """Probability of a larger χ² where the model is right."""
-        return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
+        return p_value(self)
 
     def of(self, name: str) -> tuple[float, float, float, float]:
         """Value, standard uncertainty, and the ends of the 95 % interval of a parameter, in its unit."""

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inertial.counts import number_of
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import AuditFinding, some
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

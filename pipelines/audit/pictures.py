@@ -11,10 +11,10 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from inertial.counts import number_of
 from pipelines.audit.pairs import YEAR_D
 from pipelines.audit.parameters import unit_text
 from pipelines.report.plots import STYLE, WIDTH_IN, svg
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

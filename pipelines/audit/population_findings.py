@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from inertial.counts import number_of
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.parameters import unit_text
 from pipelines.report.numbers import significant
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from inertial.counts import number_of
 from pipelines.certificate_document.as_found import adjustment
 from pipelines.certificate_document.content import (
     Amendment,
@@ -22,7 +23,6 @@ from pipelines.certificates.statement import stated
 from pipelines.stages.budget_rows import LABELS
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
-from schemas.counts import number_of
 from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:

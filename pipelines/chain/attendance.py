@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+from inertial.counts import number_of
 from pipelines.jobs.seating import disagreements
 from pipelines.tables.frames import rows_of
-from schemas.counts import number_of
 from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.noise import noise
 from pipelines.stages.procedures import procedures
-from pipelines.stages.reduce import dwells_of
+from pipelines.stages.reduce import reduced_summaries
 from pipelines.stages.validate import verdicts
 from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
@@ -64,15 +64,15 @@ def _summaries(job: Job, run: Run) -> pd.DataFrame:
     """The summaries of a run's samples; samples that change have another hash."""
     records = _records(run)
     key = (str(records.path), records.hash(), job.recipe.zero_output)
-    found = _looked_at.get(key)
-    if found is None:
+    summaries = _looked_at.get(key)
+    if summaries is None:
         readings = run.table("readings")
         tumbled = set(readings.loc[readings["kind"] != PROCEDURE, "record"])
         selection = None if len(tumbled) == readings["record"].nunique() else tumbled
-        found = summarised(records.samples(selection), readings, job.recipe.zero_output)
+        summaries = summarised(records.samples(selection), readings, job.recipe.zero_output)
         _looked_at.clear()
-        _looked_at[key] = found
-    return found
+        _looked_at[key] = summaries
+    return summaries
 
 
 def _validate(job: Job, run: Run) -> Tables:
@@ -81,7 +81,7 @@ def _validate(job: Job, run: Run) -> Tables:
 
 def _reduce(job: Job, run: Run) -> Tables:
     tables = run.table("readings"), run.table("verdicts")
-    return {"dwells": dwells_of(_summaries(job, run), *tables, job.recipe.local_gravity_m_s2)}
+    return {"dwells": reduced_summaries(_summaries(job, run), *tables, job.recipe.local_gravity_m_s2)}
 
 
 _converted: dict[tuple[str, str, str], LotTables] = {}
@@ -92,11 +92,12 @@ def _lot(run: Run) -> LotTables:
     """The dwells of a run with their history; tables that change have another hash."""
     dwells, history = (run.manifest(name)["sha256"] for name in ("dwells", "history"))
     key = (str(run.path), dwells, history)
-    if key not in _converted:
-        found = LotTables(run.table("dwells"), run.table("history"))
-        _converted.clear()
-        _converted[key] = found
-    return _converted[key]
+    lot = _converted.get(key)
+    if lot is None:
+        lot = LotTables(run.table("dwells"), run.table("history"))
+        _converted.clear()  # the stages of another run may do the same in another thread: what is returned is the local one
+        _converted[key] = lot
+    return lot
 
 
 _VERIFIED = ("dwells", "history", "coefficients", "covariance", "predictions")

@@ -105,10 +105,10 @@ def _write_page(page: Path, found: Audit, audit_findings: list[AuditFinding], ro
 
 
 def _show(found: Audit, audit_findings: list[AuditFinding], page: Path | None) -> None:
+    from inertial.counts import number_of
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
-    from schemas.counts import number_of
 
     out, number = console(), counts(found)
     period = f"{date_of(found.scope.since)} to {date_of(found.scope.until - 1)}" if found.scope.since > _BEGINNING else (

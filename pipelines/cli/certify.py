@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -15,7 +16,6 @@ from pipelines.cli.options import (
     print_json,
     print_table,
 )
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pipelines.archive import Run

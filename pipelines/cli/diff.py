@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import STYLES, ArchiveOption, JsonOption, console, print_json, print_table, short
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from rich.text import Text

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.next_commands import archive_words, command_line, print_next
 from pipelines.cli.options import (
     ArchiveOption,
@@ -20,7 +21,6 @@ from pipelines.cli.options import (
     short,
     short_values,
 )
-from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 from schemas.foreign import shown
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import GroupOption, JoinOption, JsonOption, console, error_console, print_json, print_table
-from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:

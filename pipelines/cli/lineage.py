@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
-from schemas.counts import number_of
 
 PART = "Certificates, trace, audit"
 ORDER = 430

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from inertial.counts import number_of
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
 
 if TYPE_CHECKING:
@@ -32,16 +33,11 @@ def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> No
         console().print(f"no run in {store.root}; make one with 'tumbleline run'", markup=False)
         return
     out = console()
-    out.print(f"{plural(len(infos), 'run')} in archive {store.root}", markup=False, soft_wrap=True)
+    out.print(f"{number_of(len(infos), 'run')} in archive {store.root}", markup=False, soft_wrap=True)
     print_table(["run", "started (UTC)", "station", "passed", "units"], [_line(info) for info in infos])
     for info in infos:
         if info.rerun_of:
             out.print(f"{info.id} is a re-run of {info.rerun_of}", markup=False, soft_wrap=True)
-
-
-def plural(count: int, noun: str) -> str:
-    """A number with its noun."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _line(info: RunInfo) -> list[str]:

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table, short
-from schemas.counts import number_of
 from schemas.errors import WrongUse
 
 PART = "Results"

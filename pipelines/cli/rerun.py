@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import (
     ArchiveOption,
     DaskOption,
@@ -22,7 +23,6 @@ from pipelines.cli.options import (
     print_json,
     print_table,
 )
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -16,7 +17,6 @@ from pipelines.cli.options import (
     short,
 )
 from pipelines.cli.remarks import print_remarks
-from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import JsonOption, StationOption, error_console, print_json, print_table
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from inertial.counts import number_of
 from pipelines.capture.interruptions import interruptions
 from pipelines.cli.options import STYLES, console, print_table, short
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
-from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
-from schemas.counts import number_of
 from schemas.errors import DONE, PART_FAILED
 
 SHOWN = 8  # consequences of one finding

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inertial.counts import number_of
 from pipelines.cli.options import (
     ArchiveOption,
     DaskOption,
@@ -20,7 +21,6 @@ from pipelines.cli.options import (
     print_table,
     short,
 )
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive

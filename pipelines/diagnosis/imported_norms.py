@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from inertial.counts import degrees_of_freedom
 from inertial.state import T_REFERENCE
 from pipelines.diagnosis.diagnose import default_model, diagnose
-from pipelines.importers.judged import FitAnswer, dwells_of, gravity_of
+from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.stages.norm_fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
 from pipelines.tables.condense import MOST
 from schemas.errors import DataRejected
@@ -34,7 +34,7 @@ TEMPERATURE = "bias_temperature"
 
 def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     """The result of ``import --fit norm``: bias, scale and misalignment, with temperature terms if it varies by 5 °C."""
-    dwells = dwells_of(data)
+    dwells = imported_dwells(data)
     effects = default_model(dwells)
     answer = fitted(dwells, None, effects, gravity_of(mapping), str(data.out_unit))
     tables = norm_tables(answer.fit, dwells)

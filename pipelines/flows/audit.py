@@ -10,6 +10,7 @@ from prefect import flow, task
 from prefect.artifacts import create_markdown_artifact, create_table_artifact
 from prefect.cache_policies import NO_CACHE
 
+from inertial.counts import number_of
 from pipelines.archive.files import ELSEWHERE, json_bytes, publish
 from pipelines.audit.audit import Scope, audit
 from pipelines.audit.calibrations import date_of, day_of
@@ -22,7 +23,6 @@ from pipelines.certificates.days import today
 from pipelines.flows.archive_address import archive_of
 from pipelines.flows.dask_cluster import on_dask
 from pipelines.tables.json_values import json_value
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from pipelines.archive import Archive

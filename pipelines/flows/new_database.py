@@ -45,10 +45,8 @@ def make_database(home: Path) -> bool:
                 database.executescript(script)
                 database.execute("pragma journal_mode=wal")
             place.hardlink_to(made)  # complete or not at all, and never over one that another process has just made
-    except (
-        OSError,
-        sqlite3.Error,
-    ):  # made meanwhile, or it cannot be made this way: Prefect makes it, or says why it cannot
+    except (OSError, sqlite3.Error):
+        # made meanwhile, or it cannot be made this way: Prefect makes it, or says why it cannot
         return False
     return True
 

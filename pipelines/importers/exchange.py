@@ -49,7 +49,7 @@ def read_dwells(source: str | Path, *, archive: str | Path | None = None) -> pd.
     if files.is_file(source):
         frame, _ = files.read(Path(source))
         return checked(frame, where=Path(source).name, foreign=True)
-    return dwells_of(_run(source, archive))
+    return dwells_of_run(_run(source, archive))
 
 
 def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd.DataFrame:
@@ -63,15 +63,15 @@ def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd
     if files.is_file(source):
         frame, _ = files.read(Path(source))
         return _checked_history(frame, Path(source).name, foreign=True)
-    return history_of(_run(source, archive))
+    return history_of_run(_run(source, archive))
 
 
-def dwells_of(run: Run) -> pd.DataFrame:
+def dwells_of_run(run: Run) -> pd.DataFrame:
     """The dwells of a run, as :func:`read_dwells` reads them by its name."""
     return checked(run.table("dwells"), where=f"run {run.id}")
 
 
-def history_of(run: Run) -> pd.DataFrame:
+def history_of_run(run: Run) -> pd.DataFrame:
     """The temperatures of a run against time, as :func:`read_history` reads them by its name."""
     return _checked_history(run.table("history"), f"run {run.id}", foreign=False)
 

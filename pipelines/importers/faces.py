@@ -8,7 +8,7 @@ import numpy as np
 
 from inertial.fits.ferraris import Faces, faces, ferraris
 from inertial.probability import passes
-from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
+from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
 from pipelines.importers.mapping import FACES
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
@@ -29,7 +29,7 @@ UNLIKELY = 0.01
 
 def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
     """Six labelled faces: the published method, and least squares of all eighteen means with its lack of fit."""
-    dwells = dwells_of(data)
+    dwells = imported_dwells(data)
     gravity = gravity_of(mapping)
     up, down, error = _by_face(dwells, mapping)
     published, found = ferraris(up, down, gravity), faces(up, down, gravity, error)

@@ -31,7 +31,7 @@ class FitAnswer:
     """Further tables for the archive: covariance, residuals."""
 
 
-def dwells_of(data: Imported) -> pd.DataFrame:
+def imported_dwells(data: Imported) -> pd.DataFrame:
     """The dwells of an import of one unit."""
     if data.dwells is None:
         raise DataRejected(

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inertial.counts import number_of
 from inertial.errors import NotIdentified
 from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm, inside_of, plane_across, quiet_axis
 from inertial.probability import passes
-from pipelines.importers.judged import FitAnswer, coefficient, dwells_of, gravity_of
+from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
 from pipelines.tables.dwells import measured
-from schemas.counts import number_of
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
@@ -52,7 +52,7 @@ def axis_of_plane(dwells: pd.DataFrame) -> int | None:
 
 def plane(data: Imported, mapping: Mapping) -> FitAnswer:
     """The answer of ``import --fit plane``, with known poses or by the norm of gravity."""
-    dwells = dwells_of(data)
+    dwells = imported_dwells(data)
     across = axis_of_plane(dwells)
     if across is None:
         raise DataRejected(
@@ -68,7 +68,7 @@ def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
 
     The norm of the two other axes is that of gravity in a turn. About a dead axis it is not, for the missing part changes.
     """
-    dwells = dwells_of(data)
+    dwells = imported_dwells(data)
     across = axis_of_plane(dwells)
     if across is None:
         return None

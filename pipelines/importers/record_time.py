@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from inertial.counts import number_of
 from pipelines.importers import clocks, values
 from pipelines.importers.clocks import RecordingClock
 from pipelines.importers.mapping import TIME_UNITS, Mapping
-from schemas.counts import number_of
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
 

@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 
 from inertial import effects as catalogue
 from inertial.errors import InertialError
-from pipelines.importers.exchange import dwells_of, history_of
+from pipelines.importers.exchange import dwells_of_run, history_of_run
 from pipelines.jobs.model_files import use_formulas_of
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, sound_lot
 from schemas.errors import DataRejected, RecipeInvalid
@@ -61,10 +61,10 @@ def _verdict_on(run: Run, effects: Sequence[str], *, with_history: bool) -> Adeq
     """The verdict; where the data or an effect are not usable, the reason."""
     try:
         use_formulas_of(run)
-        dwells = dwells_of(run)
+        dwells = dwells_of_run(run)
         if dwells.empty:
             return _not_judged("every unit was refused, so that no dwell is left; see the reasons of each unit")
-        return adequacy(dwells, history_of(run) if with_history else None, effects)
+        return adequacy(dwells, history_of_run(run) if with_history else None, effects)
     except (DataRejected, RecipeInvalid, InertialError) as problem:
         return _not_judged(str(problem).rstrip("."))
 

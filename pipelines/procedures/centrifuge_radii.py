@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
 
-from inertial.counts import degrees_of_freedom
-from inertial.dynamics.centrifuge import columns, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge import STANDARD_GRAVITY, columns, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.procedures.base import FigureValue
-from pipelines.procedures.wording import probability, with_uncertainty
+from pipelines.procedures.wording import verdict_of, with_uncertainty
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -23,7 +21,6 @@ OF_RADII = ("centrifuge_mass_offset_um", "centrifuge_radius_consistency_ppm")
 """Figures that one radius cannot determine."""
 ONE_RADIUS = "one radius: the offset is not parted from a scale that differs by sign; list two radii in radii_m"
 ONE_MOUNTING = "one mounting: errors of the radii are not parted from the offset; measure with the units reversed"
-ADEQUATE_P = 0.005
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 
 
@@ -58,12 +55,9 @@ def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
 def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str]]:
     """Verdict on the whole model, and each parameter that one radius leaves open: subject and text."""
     unit = fit.unit
-    p = float(chi2.sf(unit.chi_square, unit.dof)) if unit.dof > 0 else float("nan")
-    verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= ADEQUATE_P else "not adequate"
     terms = " + ".join((*unit.names, "arm_stretch", "mass_offset"))
-    judged_by = f"χ² {unit.chi_square:.1f} for {degrees_of_freedom(unit.dof)}, {probability(p)}"
     out = [
-        ("model", f"{terms}, with the errors of {len(radii)} radii, is {verdict}: {judged_by}"),
+        ("model", f"{terms}, with the errors of {len(radii)} radii, {verdict_of(unit)}"),
         ("offset of the proof mass", f"{_stated(fit.mass_offset_m, MICRO)} µm (k = 2), the same at every radius"),
         ("arm stretch", f"{_stated(fit.arm_stretch_s2, 1e9)} · 10⁻⁹ s² (k = 2), κ of r = r₀(1 + κω²)"),
     ]
@@ -105,7 +99,7 @@ def _apart(fit: RadiiFit, x: Any, radius: float, force: Any) -> Any:
 
     def curve(a: Any) -> Any:
         scale = fit.unit.of("scale")[0]
-        arm = fit.mass_offset_m[0] * np.abs(a) + fit.arm_stretch_s2[0] * 9.80665 * a * np.abs(a)
+        arm = fit.mass_offset_m[0] * np.abs(a) + fit.arm_stretch_s2[0] * STANDARD_GRAVITY * a * np.abs(a)
         return columns(a, fit.unit.names) @ fit.unit.value + scale * arm / radius
 
     return curve(x) - np.polyval(np.polyfit(force, curve(force), 1), x)

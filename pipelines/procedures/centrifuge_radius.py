@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
 
-from inertial.counts import degrees_of_freedom
 from inertial.dynamics.centrifuge import Polynomial, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_effects import EFFECTS
+from inertial.dynamics.goodness import p_value
 from pipelines.procedures.base import FigureValue
 from pipelines.procedures.centrifuge_radii import OF_RADII, ONE_RADIUS
-from pipelines.procedures.wording import probability, with_uncertainty
+from pipelines.procedures.wording import probability, verdict_of, with_uncertainty
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -40,10 +39,7 @@ def figures_of_radius(
 
 def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tuple[str, str]]:
     """Verdict on the polynomial at one radius, and the classes of effects that it holds: subject and text."""
-    p = float(chi2.sf(fit.chi_square, fit.dof)) if fit.dof > 0 else float("nan")
-    verdict = "cannot be judged" if not np.isfinite(p) else "adequate" if p >= 0.005 else "not adequate"
-    judged_by = f"χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, {probability(p)}"
-    out = [("model", f"polynomial {' + '.join(fit.names)} is {verdict}: {judged_by}")]
+    out = [("model", f"polynomial {' + '.join(fit.names)} {verdict_of(fit)}")]
     if not both:
         text = (
             "arm stretch, Koq and the offset of the proof mass cannot be separated from K2, K3 and bias; "
@@ -75,9 +71,8 @@ def diagnosis_text(found: SpinDiagnosis) -> list[tuple[str, str]]:
     model = " + ".join(("bias", "scale", *found.fit.effects))
     if found.adequate is None:
         return [("diagnosis", f"{model} cannot be judged: {found.reason}")]
-    p = float(chi2.sf(found.fit.chi_square, found.fit.dof))
     verdict = "adequate" if found.adequate else "not adequate"
-    text = f"{model} is {verdict} ({probability(p)}), rms residual {MICRO * found.error_g:.3g} µg"
+    text = f"{model} is {verdict} ({probability(p_value(found.fit))}), rms residual {MICRO * found.error_g:.3g} µg"
     out = [("diagnosis", text)]
     for one in found.classes:
         name = one.effects[0]

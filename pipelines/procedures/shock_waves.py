@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
-from scipy.stats import chi2
 
+from inertial.dynamics.goodness import p_value
 from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
@@ -109,7 +109,7 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
     model = " + ".join(("sensitivity", *found.fit.effects))
     if found.adequate is None:
         return [("comparison of the waveforms", f"{model} cannot be judged: {found.reason}")]
-    p = float(chi2.sf(found.fit.chi_square, found.fit.dof))
+    p = p_value(found.fit)
     verdict = "adequate" if found.adequate else "not adequate"
     text = f"{model} is {verdict} ({probability(p)}), rms residual {found.error_percent:.2g} % of the peak"
     if not found.adequate:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from inertial.counts import degrees_of_freedom
+from inertial.dynamics.goodness import adequate
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
@@ -29,7 +29,7 @@ from pipelines.procedures.base import (
     scale_of,
 )
 from pipelines.procedures.columns import points as point_table
-from pipelines.procedures.wording import probability
+from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Pose
 from schemas.units import AXES
@@ -268,10 +268,8 @@ def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
             *out,
             ("model", "a sine over the angle cannot be judged: no degree of freedom is left; measure at more angles"),
         ]
-    verdict = "adequate" if found.p_value >= 0.005 else "not adequate"
-    text = f"a sine over the angle is {verdict}: χ² {found.chi_square:.1f} for {degrees_of_freedom(found.dof)}"
-    text += f", {probability(found.p_value)}"
-    if verdict == "not adequate":
+    text = f"a sine over the angle {verdict_of(found)}"
+    if adequate(found) is False:
         text += "; check the angles of the fixture and its resonance, repeat at another frequency"
     return [*out, ("model", text)]
 

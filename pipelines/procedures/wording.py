@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
+
+from inertial.counts import degrees_of_freedom
+from inertial.dynamics.goodness import adequate, p_value
+
+if TYPE_CHECKING:
+    from inertial.dynamics.goodness import Fitted
 
 MINUS = "−"
 SMALLEST = 1e-99  # a smaller probability is below what a distribution's tail means
@@ -17,6 +24,12 @@ def with_uncertainty(value: float, expanded: float) -> str:
         return f"{value:.3e} ± {expanded:.1e}".replace("-", MINUS)
     shown = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, expanded))
     return " ± ".join(shown).replace("-", MINUS)
+
+
+def verdict_of(fit: Fitted) -> str:
+    """Verb phrase of a fit's verdict with its evidence: ``is adequate: χ² 3.2 for 4 degrees of freedom, p = 0.53``."""
+    verdict = {None: "cannot be judged", True: "is adequate", False: "is not adequate"}[adequate(fit)]
+    return f"{verdict}: χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, {probability(p_value(fit))}"
 
 
 def signed(value: float, places: int) -> str:

@@ -35,7 +35,7 @@ class StageCall:
     call: Callable[[Run], Tables]
 
 
-def history_of(run: Run) -> pd.DataFrame:
+def recorded_history(run: Run) -> pd.DataFrame:
     """The temperatures between the dwells of a run; without rows where it has none."""
     return run.table("history") if "history" in run.tables() else empty_table(texts="unit", numbers="time_s unit_C")
 
@@ -85,7 +85,9 @@ def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
 
     def call(run: Run) -> Tables:
         tables = {name: run.table(name) for name in names}
-        whole = BudgetTables(dwells=run.table("dwells"), history=history_of(run), noise=no_noise(), lot=None, **tables)
+        whole = BudgetTables(
+            dwells=run.table("dwells"), history=recorded_history(run), noise=no_noise(), lot=None, **tables
+        )
         return budget(whole, terms) if known else norm_budget(whole, terms)
 
     module = "pipelines.stages.budget" if known else "pipelines.stages.norm_budget"

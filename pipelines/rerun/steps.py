@@ -18,7 +18,14 @@ from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.jobs.terms import archived_terms
-from pipelines.rerun.import_steps import StageCall, budget_step, history_of, no_noise, plane_step, verify_norms_step
+from pipelines.rerun.import_steps import (
+    StageCall,
+    budget_step,
+    no_noise,
+    plane_step,
+    recorded_history,
+    verify_norms_step,
+)
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import GradeEvidence, grade, refuse_limits_without_figures
@@ -274,7 +281,7 @@ def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> St
         return StageCall("fit", inputs, stage.outputs, {**parameters, "gravity_g": gravity}, code, of_norms)
 
     def call(run: Run) -> Tables:
-        return fit(run.table("dwells"), history_of(run), model["effects"])
+        return fit(run.table("dwells"), recorded_history(run), model["effects"])
 
     return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
 
@@ -285,7 +292,7 @@ def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
 
     def call(run: Run) -> Tables:
         names = ("coefficients", "covariance", "predictions")
-        return verify(run.table("dwells"), history_of(run), *(run.table(name) for name in names))
+        return verify(run.table("dwells"), recorded_history(run), *(run.table(name) for name in names))
 
     return StageCall("verify", inputs, stage.outputs, {}, code_hash(stage.modules), call)
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inertial.counts import number_of
 from pipelines.jobs.releases import keep_evidence
 from pipelines.parallel import map_partitions
 from pipelines.rerun import lot_comparison
 from pipelines.rerun.lot_comparison import FreshTask, LotComparison
 from pipelines.rerun.partition import parts
-from schemas.counts import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -32,16 +32,16 @@ WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)
 def reduce(
     samples: Iterable[pd.DataFrame], readings: pd.DataFrame, verdicts: pd.DataFrame, local_gravity_m_s2: float
 ) -> pd.DataFrame:
-    """Dwells of samples without summaries, see :func:`dwells_of`.
+    """Dwells of samples without summaries, see :func:`reduced_summaries`.
 
     Parameters
     ----------
     samples : one table per record, or several of a long one.
     """
-    return dwells_of(summarised(samples, readings), readings, verdicts, local_gravity_m_s2)
+    return reduced_summaries(summarised(samples, readings), readings, verdicts, local_gravity_m_s2)
 
 
-def dwells_of(
+def reduced_summaries(
     summaries: pd.DataFrame, readings: pd.DataFrame, verdicts: pd.DataFrame, local_gravity_m_s2: float
 ) -> pd.DataFrame:
     """Dwells of the accepted units, in order of measurement.

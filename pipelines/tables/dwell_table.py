@@ -128,7 +128,11 @@ def state_of_table(table: DwellTable, history: pd.DataFrame | None = None) -> tu
     columns = {
         name: values for name in covariates(table.frame) if (values := table.optional(name, filled=True)) is not None
     }
-    past = None if history is None or known["temperature"] is None else history_of(history, table.units, known["time"])
+    past = (
+        None
+        if history is None or known["temperature"] is None
+        else history_on_grid(history, table.units, known["time"])
+    )
     return reference, State(force=force, **known, covariates=columns, history=past)
 
 
@@ -152,7 +156,7 @@ def _power_off(table: DwellTable) -> Array | None:
     return np.broadcast_to(known.max(axis=0), known.shape).copy()  # one relay for all
 
 
-def history_of(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:
+def history_on_grid(history: pd.DataFrame, units: tuple[str, ...], time: Array) -> History | None:
     """Temperatures of every unit on one time grid; None where a unit has none, or the history does not cover the dwells.
 
     Parameters

@@ -13,7 +13,7 @@ ORDERS = {
 }
 
 
-class Search(Protocol):
+class SearchPage(Protocol):
     """Criteria of the search; empty for any.
 
     since, until : days, ISO · order : a key of :data:`ORDERS`
@@ -48,7 +48,7 @@ def like(text: str) -> str:
     return f"{quoted(f'%{plain}%')} ESCAPE '!'"
 
 
-def conditions(page: Search) -> str:
+def conditions(page: SearchPage) -> str:
     """The conditions of the fields of the page."""
     parts: list[str] = []
     if page.search:
@@ -63,7 +63,7 @@ def conditions(page: Search) -> str:
     return " AND ".join(parts) or "true"
 
 
-def units_question(page: Search) -> str:
+def units_question(page: SearchPage) -> str:
     """A page of units with their runs."""
     start = (page.page - 1) * ROWS
     return (
@@ -73,7 +73,7 @@ def units_question(page: Search) -> str:
     )
 
 
-def yield_question(page: Search) -> str:
+def yield_question(page: SearchPage) -> str:
     """Number of units by outcome."""
     return (
         f"SELECT outcome, count(*) AS units FROM units JOIN runs USING (run) WHERE {conditions(page)} GROUP BY outcome"  # noqa: S608 - texts are quoted

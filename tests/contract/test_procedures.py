@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import signal
+from stopped_capture import Stopped, Stopping
 
 from docs.procedures_page import PAGE, page
 from inertial.dynamics import second_order
@@ -265,26 +266,6 @@ def step_truth(unit: DynamicTruth) -> dict[str, float]:
         "step_overshoot_percent": 100.0 * float(out.max() - 1.0),
         "step_rise_ms": 1e3 * float(ninety - ten),
     }
-
-
-class Stopped(Exception):
-    """The test ends a capture here."""
-
-
-class Stopping:
-    """A sink that ends the capture after some records."""
-
-    def __init__(self, records, count: int) -> None:
-        self._records, self._left = records, count
-
-    def __getattr__(self, name: str):
-        return getattr(self._records, name)
-
-    def put(self, *args) -> None:
-        if self._left == 0:
-            raise Stopped
-        self._left -= 1
-        self._records.put(*args)
 
 
 def load_steps(folder: Path, name: str):

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli import app
-from pipelines.cli.list import plural
 
 KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
 
@@ -63,4 +63,4 @@ def test_the_document_has_the_same(archive: Path) -> None:
 
 
 def test_one_is_no_plural() -> None:
-    assert [plural(count, "run") for count in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+    assert [number_of(count, "run") for count in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stopped_capture import Stopped, Stopping
 
 from pipelines.archive import Archive
 from pipelines.capture.capture import capture
@@ -111,26 +112,6 @@ def taken(folder: Path, more: str, stop_after: int | None = None):
     with open_station(load_station(), LOT, resume=sink.last_state(), roles=roles_of(recipe)) as station:
         capture(station, recipe, LOT, sink, progress=silent, events=sink.events)
     return recipe, records
-
-
-class Stopped(Exception):
-    """The test ends a capture here."""
-
-
-class Stopping:
-    """A sink that ends the capture after some records."""
-
-    def __init__(self, records, count: int) -> None:
-        self._records, self._left = records, count
-
-    def __getattr__(self, name: str):
-        return getattr(self._records, name)
-
-    def put(self, *args) -> None:
-        if self._left == 0:
-            raise Stopped
-        self._left -= 1
-        self._records.put(*args)
 
 
 def figures(folder: Path, more: str) -> dict[str, dict]:

@@ -22,6 +22,6 @@ class Fault:
 Look = Callable[[Readings], Iterator[Fault]]
 
 
-def dwells_of(places: NDArray[np.intp]) -> tuple[int, ...]:
+def places_of(places: NDArray[np.intp]) -> tuple[int, ...]:
     """Places of dwells, as listed in a fault."""
     return tuple(int(place) for place in places)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism import decisions
-from inertial.criticism.faults.fault import Fault, dwells_of
+from inertial.criticism.faults.fault import Fault, places_of
 from inertial.criticism.readings import Array, Readings
 
 
@@ -16,14 +16,14 @@ def stuck(readings: Readings) -> Iterator[Fault]:
         still = _still(readings, unit)
         if still.size:
             evidence = f"an axis is constant in {still.size} dwells: it has no scatter, unlike in the others"
-            yield Fault("stuck_output", unit, dwells_of(still), evidence)
+            yield Fault("stuck_output", unit, places_of(still), evidence)
             continue
         moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
         same = (np.diff(out, axis=0) == 0.0).any(axis=-1) & moved
         if np.count_nonzero(same) >= 2:
             places = np.flatnonzero(same) + 1
             yield Fault(
-                "stuck_output", unit, dwells_of(places), f"output repeats exactly in {places.size} dwells of new poses"
+                "stuck_output", unit, places_of(places), f"output repeats exactly in {places.size} dwells of new poses"
             )
 
 
@@ -57,7 +57,7 @@ def noisy(readings: Readings) -> Iterator[Fault]:
         name = "torn_words" if together > 2.0 and places.size >= 3 else "spikes"
         worst = float(np.nanmax(np.where(row, ratio[unit], 0.0)))
         yield Fault(
-            name, unit, dwells_of(places), f"scatter up to {worst:.0f} times the unit's own in {places.size} dwells"
+            name, unit, places_of(places), f"scatter up to {worst:.0f} times the unit's own in {places.size} dwells"
         )
 
 
@@ -71,7 +71,7 @@ def outliers(readings: Readings) -> Iterator[Fault]:
     for unit, row in enumerate(np.asarray(out)):
         places = np.flatnonzero(row)
         if 0 < places.size <= 0.1 * row.size:
-            yield Fault("spikes", unit, dwells_of(places), f"{places.size} dwells far from the others")
+            yield Fault("spikes", unit, places_of(places), f"{places.size} dwells far from the others")
 
 
 def quantised(readings: Readings) -> Iterator[Fault]:

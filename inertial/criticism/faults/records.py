@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.criticism.faults.fault import Fault, dwells_of
+from inertial.criticism.faults.fault import Fault, places_of
 from inertial.criticism.readings import Readings
 
 
@@ -18,7 +18,7 @@ def truncated(readings: Readings) -> Iterator[Fault]:
         last = np.flatnonzero(row)[-1] if row.any() else -1
         at_end = missing[missing > last]
         name = "truncated_file" if at_end.size >= 0.5 * missing.size else "dropped_samples"
-        yield Fault(name, unit, dwells_of(missing), f"{missing.size} of {row.size} dwells of the lot are missing")
+        yield Fault(name, unit, places_of(missing), f"{missing.size} of {row.size} dwells of the lot are missing")
     if there.all() and _cut_off(readings):
         for unit in range(len(there)):
             yield Fault(
@@ -47,7 +47,7 @@ def clock(readings: Readings) -> Iterator[Fault]:
             places = np.flatnonzero(row)[back + 1]
             step = float(np.diff(time[row])[back[0]])
             yield Fault(
-                "clock_jitter", unit, dwells_of(places), f"time steps back by {-step:.1f} s at dwell {places[0]}"
+                "clock_jitter", unit, places_of(places), f"time steps back by {-step:.1f} s at dwell {places[0]}"
             )
 
 
@@ -71,6 +71,6 @@ def dropped(readings: Readings) -> Iterator[Fault]:
             yield Fault(
                 "dropped_samples",
                 unit,
-                dwells_of(places),
+                places_of(places),
                 f"{places.size} dwells hold as little as {worst:.0%} of the samples",
             )
