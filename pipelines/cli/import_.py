@@ -228,18 +228,18 @@ def _transfer(files: list[Path], procedure: str, unit: str, effects: str, archiv
     if not unit:
         raise WrongUse("import: no serial number, a transfer function needs one; add --unit SN")
     model = [part.strip() for part in effects.split(",")] if effects else ["second_order", "delay"]
-    found = [import_transfer(path, unit, model, archive) for path in files]
+    imported = [import_transfer(path, unit, model, archive) for path in files]
     if as_json:
-        print_json(dict(found[0]) if len(found) == 1 else {"imports": found})
+        print_json(dict(imported[0]) if len(imported) == 1 else {"imports": imported})
     else:
         out = console()
-        for one in found:
+        for one in imported:
             out.print(f"{one['unit']}: {one['points']} points, kept as run {one['run']}", markup=False)
             for line in one["text"]:
                 out.print(f"  {line}", markup=False, soft_wrap=True)
             verdict, style = VERDICTS_OF_TRANSFER[one["adequate"]]
             out.print(f"  {verdict}", style=style)
-    return DONE if all(one["adequate"] is True for one in found) else PART_FAILED
+    return DONE if all(one["adequate"] is True for one in imported) else PART_FAILED
 
 
 def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:

@@ -70,8 +70,8 @@ def test_nothing_new_is_certified_on_noise_only_and_what_was_certified_then_is_t
         certify(Ledger(run.archive), run, start=measured_on(run))
     monkeypatch.setattr(certifying, "refuse_unstated", lambda run: None)  # as versions before did
     certify(Ledger(run.archive), run, start=measured_on(run))
-    found = lineage(run.archive, "A1")
-    kinds = {node.kind for node in found.graph.nodes.values()}
+    traced = lineage(run.archive, "A1")
+    kinds = {node.kind for node in traced.graph.nodes.values()}
     assert {"certificate", "samples", "table", "station", "recipe"} <= kinds
 
 
