@@ -37,7 +37,8 @@ def audit(request: Request) -> Response:
         problems = [*problems, str(problem)]
     return page(
         request, "audit.html", state, problems, empty=not bench.archive.run_ids(), audited=audited, job=job, who=WHO,
-        most_due=DUE, most_findings=FINDINGS, compared=COMPARED, chance=chance, labels={name: kind.label for name, kind in FIGURES.items()},
+        most_due=DUE, most_findings=FINDINGS, compared=COMPARED, chance=chance,
+        labels={name: kind.label for name, kind in FIGURES.items()},
     )  # fmt: skip
 
 
