@@ -84,7 +84,9 @@ def test_it_is_fitted_anew_without_measuring_again(run: Run) -> None:
     assert stages["capture"]
     assert not stages["fit"]
     assert set(runner.run.table("grades")["unit"]) == {"A1", "A2"}
-    with pytest.raises(WrongUse, match="noise only"):  # run again by a version that knows the budget, but without a statement
+    with pytest.raises(
+        WrongUse, match="noise only"
+    ):  # run again by a version that knows the budget, but without a statement
         certify(Ledger(run.archive), runner.run, start=measured_on(runner.run))
 
 
