@@ -98,13 +98,13 @@ def main() -> int:
             seen = output[:, RECORD:].T - bias[:, :RECORD].mean(axis=1)
             turn_on = np.full(3, 3e-6 * preset.bias_instability_ug)
             for kind, model in enumerate(models(record, turn_on)):
-                found = tracked(model, seen)
+                bias_track = tracked(model, seen)
                 at = [UPDATES - 1, *range(UPDATES, UPDATES + len(GAPS) - 1)]
                 real = truth[UPDATES - 1 + np.array(GAPS)]
-                errors[kind].append(found.bias[at] - real)
-                stated[kind].append(np.sqrt(np.diagonal(found.covariance[at], axis1=1, axis2=2)))
+                errors[kind].append(bias_track.bias[at] - real)
+                stated[kind].append(np.sqrt(np.diagonal(bias_track.covariance[at], axis1=1, axis2=2)))
                 if kind == 0:
-                    nis.append(found.consistency)
+                    nis.append(bias_track.consistency)
         e, s = ([1e6 * np.array(part) for part in pair] for pair in (errors, stated))
         for g, gap in enumerate(GAPS):
             row = [name, f"{gap} s"]

@@ -189,13 +189,13 @@ def one_lot(plan: Plan, preset: Preset, rng: np.random.Generator) -> dict[str, l
     history = pd.DataFrame({"time_s": [0.0], "chamber_C": [25.0], "slot": [0], "unit": ["U0"], "unit_C": [25.0]}).iloc[
         :0
     ]
-    found = fit(dwells, history, plan.effects)
-    checked = verify(dwells, history, found["coefficients"], found["covariance"], found["predictions"])
+    fitted = fit(dwells, history, plan.effects)
+    checked = verify(dwells, history, fitted["coefficients"], fitted["covariance"], fitted["predictions"])
     stability = Stability(horizon_days=3660.0, source="history", bias_temperature_ug_K=preset.bias_tempco_ug_per_K,
                           scale_temperature_ppm_K=preset.scale_tempco_ppm_per_K, temperature_of="slot")  # fmt: skip
     terms = BudgetTerms(STATED, stability, CertificateTerms(frame="fixture"), (), 900.0, DWELL_S, 23.0)
     empty = pd.DataFrame({"unit": [], "axis": [], "term": [], "value": [], "high": [], "identified": []})
-    tables = BudgetTables(dwells, history, found["coefficients"], found["covariance"], found["wander"],
+    tables = BudgetTables(dwells, history, fitted["coefficients"], fitted["covariance"], fitted["wander"],
                           checked["verification"], checked["verification_poses"], empty)  # fmt: skip
     stated = budget(tables, terms)
     width = 4 if plan.effects == BASE else 8
@@ -203,15 +203,15 @@ def one_lot(plan: Plan, preset: Preset, rng: np.random.Generator) -> dict[str, l
     sums = stated["uncertainties"]
     for unit, truth in enumerate(truths):
         own = f"U{unit}"
-        names = found["coefficients"]["unit"] == own
+        names = fitted["coefficients"]["unit"] == own
         estimate = (
-            found["coefficients"]
-            .loc[names & (found["coefficients"]["axis"] != "*"), "value"]
+            fitted["coefficients"]
+            .loc[names & (fitted["coefficients"]["axis"] != "*"), "value"]
             .to_numpy()
             .reshape(3, width)
         )
         by_noise = _triangle(
-            found["covariance"][found["covariance"]["unit"] == own]["value"].to_numpy().reshape(3, -1), width
+            fitted["covariance"][fitted["covariance"]["unit"] == own]["value"].to_numpy().reshape(3, -1), width
         )
         by_budget = _triangle(stated["budget_covariance"].query("unit == @own")["value"].to_numpy()[None], 3 * width)[0]
         error = estimate - true_coefficients(truth, plan.effects)

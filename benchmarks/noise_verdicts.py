@@ -43,12 +43,12 @@ def terms(records: int, seed: int) -> None:
         x = made.white(rng, records, SAMPLES, density, RATE) + made.walk(rng, records, SAMPLES, walk, RATE)
         if flicker:
             x = x + made.flicker(rng, records, SAMPLES, flicker)
-        found = fit_terms(overlapping(x, RATE))
+        fitted = fit_terms(overlapping(x, RATE))
         truth = {"Q": 0.0, "N": density / np.sqrt(2.0), "B": flicker, "K": walk, "R": 0.0}
         print(f"white {density:g} µg/√Hz, K {walk:g} µg/√s, B {flicker:g} µg, one hour at {RATE:g} Hz")
         for symbol, true in truth.items():
-            place = found.symbols.index(symbol)
-            value, low, high = (part[:, place] for part in (found.value, found.low, found.high))
+            place = fitted.symbols.index(symbol)
+            value, low, high = (part[:, place] for part in (fitted.value, fitted.low, fitted.high))
             known = np.isfinite(value)
             zero = int(np.sum(known & (low <= 0.0)))
             print(
@@ -86,10 +86,10 @@ def verification(records: int, seed: int) -> None:
                 day_s=0,
                 **world,
             ).dwells
-            found = fit(
+            fitted = fit(
                 dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
             )
-            tables = (found[name] for name in ("coefficients", "covariance", "predictions"))
+            tables = (fitted[name] for name in ("coefficients", "covariance", "predictions"))
             rows = verify(dwells, lots.NO_HISTORY, *tables)["verification"]
             for _, own in rows.groupby("unit"):
                 for axis in "xyz":
@@ -125,12 +125,12 @@ def bias(records: int, seed: int) -> None:
         total, ratio, day = 0, [], []
         for _ in range(records):
             one = lots.world(rng, units=4, **world)
-            found = fit(one.dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment"])
-            rows = found["coefficients"]
+            fitted = fit(one.dwells, lots.NO_HISTORY, ["bias", "scale", "misalignment"])
+            rows = fitted["coefficients"]
             rows = rows[rows["effect"] == "bias"].sort_values(["unit", "axis"])
             value = 1e6 * rows["value"].to_numpy().reshape(-1, 3)
             stated = {"standard error": 1e6 * rows["standard_error"].to_numpy().reshape(-1, 3)}
-            own = found["wander"].sort_values(["unit", "axis"])
+            own = fitted["wander"].sort_values(["unit", "axis"])
             stated |= {n: own[n].to_numpy().reshape(-1, 3) for n in ("bias_record_u_ug", "bias_long_u_ug") if n in own}
             for what, u in stated.items():
                 for whom, truth in (("the record's mean", one.record), ("the day's mean", one.day)):
@@ -164,16 +164,16 @@ def sphere(records: int, seed: int) -> None:
             rows = one.dwells
             output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
             error = (rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()
-            found = fit_ellipsoid(output, time=time, error=error)
-            wrong = np.abs(1e6 * found.bias - one.record[0])
-            held[0] += int(np.sum(wrong <= 2e6 * np.sqrt(np.diagonal(found.covariance)[:3])))
-            late = np.abs(1e6 * found.bias - one.day[0])
-            u = np.sqrt(np.diagonal(found.covariance)[:3])
-            u = of_a_day(u, np.full(3, float(found.flicker)), time, slowest=4.0, widened=student(found.dof))
+            fitted = fit_ellipsoid(output, time=time, error=error)
+            wrong = np.abs(1e6 * fitted.bias - one.record[0])
+            held[0] += int(np.sum(wrong <= 2e6 * np.sqrt(np.diagonal(fitted.covariance)[:3])))
+            late = np.abs(1e6 * fitted.bias - one.day[0])
+            u = np.sqrt(np.diagonal(fitted.covariance)[:3])
+            u = of_a_day(u, np.full(3, float(fitted.flicker)), time, slowest=4.0, widened=student(fitted.dof))
             held[2] += int(np.sum(late <= 2e6 * u))
             correction = np.linalg.cholesky(np.linalg.inv(one.gain[0] @ one.gain[0].T)).T
-            spread = np.sqrt(np.diagonal(found.covariance)[3:6])
-            held[1] += int(np.sum(np.abs(np.diagonal(found.correction) - np.diagonal(correction)) <= 2.0 * spread))
+            spread = np.sqrt(np.diagonal(fitted.covariance)[3:6])
+            held[1] += int(np.sum(np.abs(np.diagonal(fitted.correction) - np.diagonal(correction)) <= 2.0 * spread))
         print(f"sphere fit, 24 poses of 10 s every 30 s, one unit, {name}")
         print(made.told("  2·u contains the bias of the next day", int(held[2]), 3 * records))
         print(made.told("  2·u contains the mean bias of the record", int(held[0]), 3 * records))
@@ -200,8 +200,8 @@ def series(records: int, seed: int) -> None:
                 print(made.told(f"{n} points, {name}: a change at p < {level:g}", int(np.sum(p < level)), records))
             for step in (2.0, 4.0):
                 moved = made_ + step * (np.arange(n) >= n // 2)
-                found = sum(any(abs(c.first - n // 2) <= 3 for c in change_points(v)) for v in moved)
-                print(made.told(f"    a step of {step:g} σ half-way is found", found, records))
+                hits = sum(any(abs(c.first - n // 2) <= 3 for c in change_points(v)) for v in moved)
+                print(made.told(f"    a step of {step:g} σ half-way is found", hits, records))
     for first, n in ((10, 20), (20, 40), (40, 100)):
         for name, memory, dof in kinds:
             made_ = made.autoregressive(rng, records, n, memory, dof=dof)
@@ -209,8 +209,8 @@ def series(records: int, seed: int) -> None:
             p = np.array([p_of_alarms(v, first) for v in made_])
             for level in (0.01, 0.001):
                 print(made.told(f"{title}: out of control at p < {level:g}", int(np.sum(p < level)), records))
-            found = sum(p_of_alarms(v + 2.0 * (np.arange(n) >= first), first) < 0.01 for v in made_)
-            print(made.told("    a change of 2 σ after the baseline is found", found, records))
+            hits = sum(p_of_alarms(v + 2.0 * (np.arange(n) >= first), first) < 0.01 for v in made_)
+            print(made.told("    a change of 2 σ after the baseline is found", hits, records))
 
 
 def p_of_alarms(values: np.ndarray, first: int) -> float:

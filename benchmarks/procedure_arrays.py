@@ -43,9 +43,11 @@ def hours(units: int, seed: int) -> None:
     true = TRUTHS["bias_stability"](plant, 0)
     noise = UnitNoise(preset, [np.random.default_rng([seed, 1, k]) for k in range(units)])
     records = (1e6 * noise.sample(HOUR_S, 1.0)).reshape(HOUR_S, -1).T
-    found = [stability(one, 1.0) for one in records]
+    stabilities = [stability(one, 1.0) for one in records]
     for key, name in NAMES.items():
-        rows = [(getattr(one, key), getattr(one, f"{key}_error"), *getattr(one, f"{key}_interval")) for one in found]
+        rows = [
+            (getattr(one, key), getattr(one, f"{key}_error"), *getattr(one, f"{key}_interval")) for one in stabilities
+        ]
         tell(name, rows, true[name])
 
 
@@ -58,11 +60,11 @@ def warm_ups(units: int, seed: int) -> None:
     clean, rows, lost = 1e6 * WARM_G * np.exp(-time / WARM_S), list[tuple[float, float, float, float]](), 0
     for one in records:
         try:
-            found = entered(time, clean + one, band=BAND_UG, window_s=10.0)
+            entry = entered(time, clean + one, band=BAND_UG, window_s=10.0)
         except NotIdentified:
             lost += 1
             continue
-        rows.append((found.value, found.error, found.low, found.high))
+        rows.append((entry.value, entry.error, entry.low, entry.high))
     tell("warm_up_s", rows, WARM_S * float(np.log(1e6 * WARM_G / BAND_UG)), lost)
 
 

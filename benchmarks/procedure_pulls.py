@@ -115,10 +115,10 @@ def outcome(name: str, count: int, seed: int) -> tuple[pd.DataFrame, Plant]:
     points = procedure.reduce(part, taken, device)
     if name in ONE_AXIS:
         points = points[points["axis"] == "z"]
-    found = procedure.evaluate(part, points, device).figures
+    figures = procedure.evaluate(part, points, device).figures
     rows = [
         (unit, one.figure, one.axis, one.value, one.uncertainty, one.low, one.high, one.identified)
-        for unit, values in found.items()
+        for unit, values in figures.items()
         for one in values
     ]
     heads = ["unit", "figure", "axis", "value", "uncertainty", "low", "high", "known"]

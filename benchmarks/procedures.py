@@ -129,12 +129,12 @@ def naming(n: int, seed: int) -> None:
         kind = KINDS[k % len(KINDS)]
         rng = np.random.default_rng([seed, k])
         points, model = at_twice_the_floor(kind, rng)
-        found = diagnose_transfer(points, model)
-        hits[kind].append(any(kind in one.effects for one in found.classes))
+        diagnosis = diagnose_transfer(points, model)
+        hits[kind].append(any(kind in one.effects for one in diagnosis.classes))
         print(f"  {k + 1} of {n}, named: {sum(map(sum, hits.values()))}", flush=True)  # a stop keeps what was counted
         if not hits[kind][-1]:
             print(
-                f"  missed {kind}: p {found.fit.p_value:.2g}, {[one.effects for one in found.classes]}",
+                f"  missed {kind}: p {diagnosis.fit.p_value:.2g}, {[one.effects for one in diagnosis.classes]}",
                 flush=True,
             )
     whole = sum(map(sum, hits.values()))
@@ -157,11 +157,11 @@ def null(n: int, seed: int) -> None:
         rng.bit_generator.state = before
         w0, zeta, delay = rng.uniform(1800.0, 3000.0), rng.uniform(0.55, 0.75), rng.uniform(5e-6, 60e-6)
         rng.bit_generator.state = after
-        found = diagnose_transfer(points_of(c, truth, rng), MODEL)
-        named += bool(found.classes)
+        diagnosis = diagnose_transfer(points_of(c, truth, rng), MODEL)
+        named += bool(diagnosis.classes)
         print(f"  null {k + 1} of {n}, named: {named}", flush=True)
         true = {"natural_hz": w0, "damping": zeta, "delay_s": delay}
-        pulls.append([(found.fit.of(p)[0] - t) / found.fit.of(p)[1] for p, t in true.items()])
+        pulls.append([(diagnosis.fit.of(p)[0] - t) / diagnosis.fit.of(p)[1] for p, t in true.items()])
     spread = np.std(np.array(pulls), axis=0, ddof=1)
     print(f"null sweeps in which an effect is named: {named} of {n}", flush=True)
     print(

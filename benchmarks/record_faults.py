@@ -83,13 +83,13 @@ def told(kind: str, seed: tuple[int, ...], folder: Path) -> tuple[bool, str]:
     path = folder / "recording.csv"
     path.write_text(recordings.table(one).to_csv(index=False, float_format="%.7g"), encoding="utf-8")
     faults = inspect([path]).document["faults"]
-    found = {(f["fault"], f["axis"]) for f in faults}
+    reported = {(f["fault"], f["axis"]) for f in faults}
     if kind == "sound":
-        return not faults, str(found)
-    right = found == {(NAMES[kind], AXES[axis])}
+        return not faults, str(reported)
+    right = reported == {(NAMES[kind], AXES[axis])}
     if kind == "frozen":
         right = right and any(f["first_row"] <= start + 6 and f["first_row"] + f["samples"] >= stop - 5 for f in faults)
-    return right, str(found)
+    return right, str(reported)
 
 
 def interval(hits: int, runs: int) -> str:

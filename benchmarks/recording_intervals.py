@@ -39,14 +39,14 @@ def pulls(what: recordings.Recording, seed: int) -> tuple[Floats, ...]:
 
     made = recordings.make(what, seed)
     done = norms_fitted(made.dwells, None, EFFECTS)
-    found, errors = done.fit.fit.coefficients[0], done.fit.fit.standard_errors[0]
+    coefficients, errors = done.fit.fit.coefficients[0], done.fit.fit.standard_errors[0]
     truth = upper(made.response)
-    bias = (found[:, 0] - made.bias) / errors[:, 0]
+    bias = (coefficients[:, 0] - made.bias) / errors[:, 0]
     of_record = 1e-6 * bias_uncertainty(done)["bias_record_u_ug"][0] * done.scale[0]
-    record = (found[:, 0] - made.bias - made.response @ made.wander) / of_record
-    scale = np.array([(found[k, 1] - truth[k, k]) / errors[k, 1] for k in range(3)])
+    record = (coefficients[:, 0] - made.bias - made.response @ made.wander) / of_record
+    scale = np.array([(coefficients[k, 1] - truth[k, k]) / errors[k, 1] for k in range(3)])
     places = ((0, 1, 2), (0, 2, 3), (1, 2, 2))  # axis, other axis, column: the axes after the own one in turn
-    angles = np.array([(found[i, c] - truth[i, j]) / errors[i, c] for i, j, c in places])
+    angles = np.array([(coefficients[i, c] - truth[i, j]) / errors[i, c] for i, j, c in places])
     return record, bias, scale, angles
 
 

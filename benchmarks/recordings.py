@@ -190,8 +190,8 @@ def bad(runs: int, sigma: float = 0.0) -> list[Recording]:
 
 def hidden(runs: int) -> list[Recording]:
     """40-100 positions with a cubic term of 1 mg/g³, or a drift of 2 mg after switching on."""
-    found = [Recording((40, 60, 100)[k % 3], "white 280, B 30") for k in range(runs)]
-    return [replace(one, cubic=1000.0) if k % 2 else replace(one, warm_up=2000.0) for k, one in enumerate(found)]
+    recordings = [Recording((40, 60, 100)[k % 3], "white 280, B 30") for k in range(runs)]
+    return [replace(one, cubic=1000.0) if k % 2 else replace(one, warm_up=2000.0) for k, one in enumerate(recordings)]
 
 
 def interval(hits: int, runs: int) -> str:

@@ -46,7 +46,7 @@ def beside(world: World, seed: int) -> list[tuple[str, float, bool]]:
     from inertial.criticism.handling.base import Handling
     from pipelines.diagnosis.diagnose import diagnose
 
-    made, found = make(world, seed), []
+    made, alternatives = make(world, seed), []
     own = {name for told in made.faults for name in told.names}
     plain = search.is_remainder
 
@@ -54,7 +54,7 @@ def beside(world: World, seed: int) -> list[tuple[str, float, bool]]:
         if chosen and isinstance(rival.term.effect, Handling):
             largest = max(search.size_of(model.without_term(t), t) for t in chosen)
             ratio = search.size_where_it_acts(model, rival.term) / largest
-            found.append((rival.term.effect.id, ratio, rival.term.effect.id in own))
+            alternatives.append((rival.term.effect.id, ratio, rival.term.effect.id in own))
         return plain(model, rival, chosen)
 
     search.is_remainder = noted
@@ -62,7 +62,7 @@ def beside(world: World, seed: int) -> list[tuple[str, float, bool]]:
         diagnose(made.dwells, made.history)
     finally:
         search.is_remainder = plain
-    return found
+    return alternatives
 
 
 def main() -> None:

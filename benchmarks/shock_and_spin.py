@@ -51,7 +51,7 @@ def shocks(kind: str, knob: float, drawn: Array, noise: Array | None) -> ShockRe
     drawn : (2, 2), standard normal numbers of peak and duration of each shock
     """
     time = np.arange(round((BEFORE + DURATION + AFTER) * FINE)) / FINE - BEFORE
-    found: list[Waves] = []
+    waves: list[Waves] = []
     for k, sign in enumerate((1.0, -1.0)):
         peak, length = PEAK * (1.0 + 0.05 * drawn[k, 0]), DURATION * (1.0 + 0.03 * drawn[k, 1])
         pulse = np.where((time > 0) & (time < length), sign * peak * np.sin(np.pi * time / length), 0.0)
@@ -62,8 +62,8 @@ def shocks(kind: str, knob: float, drawn: Array, noise: Array | None) -> ShockRe
         turn = 1e-4 * knob if kind == "own_clock" else 0.0
         own = np.interp(at * (1.0 + turn) - late, time, unit)
         extra = 0.0 if noise is None else noise[k, : at.size]
-        found.append(Waves(np.interp(at, time, reference), own + WAVE_FLOOR * extra, np.full(at.size, WAVE_FLOOR)))
-    return ShockRecord(RATE, DURATION, BEFORE - 1e-3, tuple(found))
+        waves.append(Waves(np.interp(at, time, reference), own + WAVE_FLOOR * extra, np.full(at.size, WAVE_FLOOR)))
+    return ShockRecord(RATE, DURATION, BEFORE - 1e-3, tuple(waves))
 
 
 def _low_pass(wave: Array, corner: float) -> Array:
@@ -143,11 +143,11 @@ def twice_the_floor(left: Callable[[float], float]) -> float:
     low, high = 1e-4, 1e4
     knob = 1.0
     for _ in range(30):
-        found = left(knob)
-        if abs(found / LOOKED_FOR - 1.0) < NEAR:
+        remainder = left(knob)
+        if abs(remainder / LOOKED_FOR - 1.0) < NEAR:
             break
-        low, high = (max(low, knob), high) if found < LOOKED_FOR else (low, min(high, knob))
-        step = knob * LOOKED_FOR / max(found, 1e-9)
+        low, high = (max(low, knob), high) if remainder < LOOKED_FOR else (low, min(high, knob))
+        step = knob * LOOKED_FOR / max(remainder, 1e-9)
         knob = step if low < step < high else float(np.sqrt(low * high))
     return knob
 
@@ -164,14 +164,14 @@ def shock(n: int, seed: int) -> None:
             fit = fit_shock(shocks(kind, knob, drawn, None), model)
             return float(np.sqrt(np.mean(np.concatenate(fit.residuals) ** 2)) / WAVE_FLOOR)
 
-        found = diagnose_shock(shocks(kind, twice_the_floor(left), drawn, noise), model)
-        _count(hits, kind, [one.effects for one in found.classes], k, n)
+        diagnosis = diagnose_shock(shocks(kind, twice_the_floor(left), drawn, noise), model)
+        _count(hits, kind, [one.effects for one in diagnosis.classes], k, n)
     _print("shock", hits, n)
     named = 0
     for k in range(n):
         rng = np.random.default_rng([seed, 2, k])
-        found = diagnose_shock(shocks("none", 0.0, rng.normal(size=(2, 2)), rng.normal(size=(2, 1000))))
-        named += bool(found.classes)
+        diagnosis = diagnose_shock(shocks("none", 0.0, rng.normal(size=(2, 2)), rng.normal(size=(2, 1000))))
+        named += bool(diagnosis.classes)
     print(f"shock: something is named in {named} of {n} without a hidden effect", flush=True)
 
 
@@ -193,9 +193,9 @@ def centrifuge(n: int, seed: int, radii: tuple[float, ...] = (0.5,)) -> None:
             return float(np.sqrt(np.mean((fit.residuals / error) ** 2)))
 
         output = spun(points, kind, twice_the_floor(left), drawn(rng)) + SPIN_FLOOR * rng.normal(size=error.size)
-        found = [one.effects for one in diagnose_spins(points, output, error, model).classes]
-        _count(hits, kind, found, k, n)
-        alone[kind] += (kind,) in found
+        classes = [one.effects for one in diagnose_spins(points, output, error, model).classes]
+        _count(hits, kind, classes, k, n)
+        alone[kind] += (kind,) in classes
     _print(test, hits, n)
     print(f"{test}: alone in its class: {', '.join(f'{kind} {count}' for kind, count in alone.items())}", flush=True)
     named = 0

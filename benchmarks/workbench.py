@@ -204,8 +204,8 @@ def main() -> None:
             until(server.answers, "the server answers")
             httpx.get(f"{server.address}/units", timeout=3000.0)  # the index is made once
             first = time.perf_counter() - start
-            found = httpx.get(f"{server.address}/units?order=unit", timeout=600.0).text
-            count = found.partition('<div class="card"><b>')[2].partition("<")[0]
+            page = httpx.get(f"{server.address}/units?order=unit", timeout=600.0).text
+            count = page.partition('<div class="card"><b>')[2].partition("<")[0]
             print(
                 f"{given.units} units × {given.dwells} dwells among {count} calibrations; load {os.getloadavg()[0]:.1f}"
             )

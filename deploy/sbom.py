@@ -29,12 +29,12 @@ SPACE = uuid.UUID("6f1c1d5e-0f0c-5d4e-9b65-0d6f1f3b7a10")
 
 def pins(lock: str) -> dict[str, tuple[str, list[str]]]:
     """Version and SHA-256 of the files of each library of a lock, by its normalised name."""
-    found: dict[str, tuple[str, list[str]]] = {}
+    by_name: dict[str, tuple[str, list[str]]] = {}
     for entry in re.split(r"\n(?=\S)", lock.strip()):
         pin = PIN.match(entry)
         if pin is not None:
-            found[canonicalize_name(pin[1])] = (pin[2], HASH.findall(entry))
-    return found
+            by_name[canonicalize_name(pin[1])] = (pin[2], HASH.findall(entry))
+    return by_name
 
 
 def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, str] | None = None) -> dict[str, Any]:
@@ -47,7 +47,7 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
     when : time of the release
     hashes : SHA-256 of the files of the release, by name
     """
-    found = pins(lock)
+    locked = pins(lock)
     name, version = project["name"], project["version"]
     own = {
         "type": "application",
@@ -61,7 +61,7 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
             {"name": "tumbleline:release:sha256", "value": f"{value}  {file}"} for file, value in (hashes or {}).items()
         ],
     }
-    direct = [_reference(lib, found[lib][0]) for lib in sorted(_needed(project["dependencies"])) if lib in found]
+    direct = [_reference(lib, locked[lib][0]) for lib in sorted(_needed(project["dependencies"])) if lib in locked]
     content = {
         "bomFormat": "CycloneDX",
         "specVersion": "1.6",
@@ -71,10 +71,10 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
             "timestamp": when.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
             "component": own,
         },
-        "components": [_component(lib, pin, sums) for lib, (pin, sums) in sorted(found.items())],
+        "components": [_component(lib, pin, sums) for lib, (pin, sums) in sorted(locked.items())],
         "dependencies": [
             {"ref": own["bom-ref"], "dependsOn": direct},
-            *({"ref": _reference(lib, found[lib][0]), "dependsOn": _below(lib, found)} for lib in sorted(found)),
+            *({"ref": _reference(lib, locked[lib][0]), "dependsOn": _below(lib, locked)} for lib in sorted(locked)),
         ],
     }
     json.dumps(content, allow_nan=False)
@@ -98,24 +98,24 @@ def _component(name: str, version: str, sums: list[str]) -> dict[str, Any]:
 
 def _licence(name: str, version: str) -> dict[str, Any]:
     """The licence as its metadata state it: an SPDX expression, else a name; empty where there is none."""
-    found = _installed(name, version)
-    if found is None:
+    installed = _installed(name, version)
+    if installed is None:
         return {}
-    if found.get("License-Expression"):
-        return {"expression": found["License-Expression"]}
-    stated = (found.get("License") or "").strip()
-    classes = [c.rpartition(" :: ")[2] for c in found.get_all("Classifier") or () if c.startswith("License ::")]
+    if installed.get("License-Expression"):
+        return {"expression": installed["License-Expression"]}
+    stated = (installed.get("License") or "").strip()
+    classes = [c.rpartition(" :: ")[2] for c in installed.get_all("Classifier") or () if c.startswith("License ::")]
     text = (
         stated if stated and "\n" not in stated and len(stated) <= 80 else ", ".join(classes)
     )  # some hold the whole text
     return {"license": {"name": text}} if text else {}
 
 
-def _below(name: str, found: dict[str, tuple[str, list[str]]]) -> list[str]:
+def _below(name: str, locked: dict[str, tuple[str, list[str]]]) -> list[str]:
     """References of the libraries of the lock that an installed library needs, without its extras."""
-    held = _installed(name, found[name][0])
+    held = _installed(name, locked[name][0])
     needed = _needed(held.get_all("Requires-Dist") or ()) if held is not None else set()
-    return [_reference(lib, found[lib][0]) for lib in sorted(needed) if lib in found]
+    return [_reference(lib, locked[lib][0]) for lib in sorted(needed) if lib in locked]
 
 
 def _needed(requirements: Any) -> set[str]:

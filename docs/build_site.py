@@ -96,8 +96,8 @@ def navigation(folder: Path) -> list[dict[str, object]]:
 
 
 def _names(folder: Path, place: str) -> list[str]:
-    found = sorted((folder / place).glob("*.md"), key=lambda path: (path.stem not in {"README", "index"}, path.stem))
-    return [str(path.relative_to(folder)) for path in found]
+    paths = sorted((folder / place).glob("*.md"), key=lambda path: (path.stem not in {"README", "index"}, path.stem))
+    return [str(path.relative_to(folder)) for path in paths]
 
 
 def build(target: Path) -> int:

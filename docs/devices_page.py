@@ -43,19 +43,21 @@ values on which sources disagree. Addresses are those on the wire, from 0.
 
 def page() -> str:
     """The whole page as Markdown."""
-    found = sorted((load_profile(name) for name in profile_names()), key=lambda p: (list(KINDS).index(p.kind), p.name))
-    parts = [HEAD, _table(found), _families(), _disputes(found)]
+    profiles = sorted(
+        (load_profile(name) for name in profile_names()), key=lambda p: (list(KINDS).index(p.kind), p.name)
+    )
+    parts = [HEAD, _table(profiles), _families(), _disputes(profiles)]
     for kind, title in KINDS.items():
         parts.append(f"## {title}\n")
-        parts += [_section(profile) for profile in found if profile.kind == kind]
+        parts += [_section(profile) for profile in profiles if profile.kind == kind]
     return "\n".join(parts)
 
 
-def _table(found: list[Profile]) -> str:
+def _table(profiles: list[Profile]) -> str:
     rows = [
         f"| [`{p.name}`](#{p.name}) | {_cell(f'{p.maker} {p.model}')} | {p.kind} | `{p.adapter}` | {', '.join(p.links)} | "
         f"{'yes' if p.verified else 'no'} | {sum(bool(entry.disputed) for entry in _entries(p)) or ''} |"
-        for p in found
+        for p in profiles
     ]
     head = "| profile | device | kind | adapter | links | verified | disputed |"
     return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
@@ -83,11 +85,11 @@ def _kind(name: str, adapter: type) -> str:
     return next(p.kind for p in map(load_profile, profile_names()) if p.adapter == name)
 
 
-def _disputes(found: list[Profile]) -> str:
+def _disputes(profiles: list[Profile]) -> str:
     """What to check first at the device."""
     rows = [
         f"| `{p.name}` | `{entry.name}` | {entry.manual} | {_cell(entry.disputed)} |"
-        for p in found
+        for p in profiles
         for entry in _entries(p)
         if entry.disputed
     ]

@@ -51,12 +51,12 @@ def several_levels(x: ArrayLike) -> int:
     noise = neighbour_noise(data)
     if not np.any(data.std(axis=0) > _MANY_TIMES * noise):
         return 1
-    found = levels(data, None)
-    if len(found) < 2 or found.explained < _EXPLAINED:
+    pieces = levels(data, None)
+    if len(pieces) < 2 or pieces.explained < _EXPLAINED:
         return 1
-    means = np.stack([data[a:b].mean(axis=0) for a, b in zip(found.start, found.stop, strict=True)])
+    means = np.stack([data[a:b].mean(axis=0) for a, b in zip(pieces.start, pieces.stop, strict=True)])
     steps = np.linalg.norm(np.diff(means, axis=0) / np.where(noise > 0.0, noise, 1.0), axis=1)
-    return len(found) if np.quantile(steps, 0.25) > _CLEAR_STEP else 1
+    return len(pieces) if np.quantile(steps, 0.25) > _CLEAR_STEP else 1
 
 
 def levels(x: ArrayLike, count: int | None, *, shortest: int = _SHORTEST) -> Levels:
@@ -98,7 +98,7 @@ def levels(x: ArrayLike, count: int | None, *, shortest: int = _SHORTEST) -> Lev
 
 def _divided(sums: Array, n: int, most: int, shortest: int, penalty: float) -> list[int]:
     queue: list[tuple[float, int, int, int]] = []
-    found: list[int] = []
+    cuts: list[int] = []
 
     def offer(a: int, b: int) -> None:
         gain, place = _best(sums, a, b, shortest)
@@ -106,12 +106,12 @@ def _divided(sums: Array, n: int, most: int, shortest: int, penalty: float) -> l
             heapq.heappush(queue, (-gain, place, a, b))
 
     offer(0, n)
-    while queue and len(found) < most:
+    while queue and len(cuts) < most:
         _, place, a, b = heapq.heappop(queue)
-        found.append(place)
+        cuts.append(place)
         offer(a, place)
         offer(place, b)
-    return found
+    return cuts
 
 
 def _best(sums: Array, a: int, b: int, shortest: int) -> tuple[float, int]:

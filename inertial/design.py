@@ -32,9 +32,9 @@ def split(names: Sequence[str]) -> tuple[list[SensorEffect], list[StationEffect]
     UnknownEffect
         With the close matches.
     """
-    found: list[AnyEffect] = catalogue.get_all(names)
-    sensor = [e for e in found if isinstance(e, SensorEffect)]
-    return sensor, [e for e in found if isinstance(e, StationEffect)]
+    effects: list[AnyEffect] = catalogue.get_all(names)
+    sensor = [e for e in effects if isinstance(e, SensorEffect)]
+    return sensor, [e for e in effects if isinstance(e, StationEffect)]
 
 
 def starting_values(effects: Sequence[AnyEffect], state: State) -> dict[str, dict[str, float]]:
@@ -54,14 +54,14 @@ def local_columns(effects: Sequence[SensorEffect], state: State, values: Values)
     # columns that all units share are repeated where others differ from unit to unit
     *batch, n = np.broadcast_shapes(*{c.shape[:-1] for columns in axes for c in columns})
     # in memory one column after another: written across the rows of a large lot they take four times as long
-    found = np.empty((*batch, 3, sum(c.shape[-1] for c in axes[0]), n))
+    design = np.empty((*batch, 3, sum(c.shape[-1] for c in axes[0]), n))
     for axis, columns in enumerate(axes):
         start = 0
         for own in columns:
             for column in range(own.shape[-1]):
-                found[..., axis, start + column, :] = own[..., column]
+                design[..., axis, start + column, :] = own[..., column]
             start += own.shape[-1]
-    return np.swapaxes(found, -1, -2)
+    return np.swapaxes(design, -1, -2)
 
 
 def shared_columns(effects: Sequence[StationEffect], state: State, values: Values, response: Array) -> Array:

@@ -87,8 +87,8 @@ class Expression:
     def names(self) -> tuple[str, ...]:
         """Quantities and columns that it speaks of, each once."""
         called = {n.func.id for n in ast.walk(self._tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
-        found = [n.id for n in ast.walk(self._tree) if isinstance(n, ast.Name)]
-        return tuple(dict.fromkeys(name for name in found if name not in called))
+        names = [n.id for n in ast.walk(self._tree) if isinstance(n, ast.Name)]
+        return tuple(dict.fromkeys(name for name in names if name not in called))
 
     @property
     def covariates(self) -> tuple[str, ...]:
@@ -106,13 +106,13 @@ class Expression:
             A value is not finite.
         """
         with np.errstate(all="ignore"):
-            found = np.broadcast_to(self._value(self._tree, state, axis), state.force.shape[:-1]).astype(np.float64)
-        bad = int(np.count_nonzero(~np.isfinite(found)))
+            values = np.broadcast_to(self._value(self._tree, state, axis), state.force.shape[:-1]).astype(np.float64)
+        bad = int(np.count_nonzero(~np.isfinite(values)))
         if bad:
             self._refuse(
-                f"'{self.text}' is not finite in {bad} of {found.size} dwells; mind roots, logarithms and quotients"
+                f"'{self.text}' is not finite in {bad} of {values.size} dwells; mind roots, logarithms and quotients"
             )
-        return found
+        return values
 
     def _parsed(self) -> ast.expr:
         if len(self.text) > _LONGEST:

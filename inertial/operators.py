@@ -100,11 +100,11 @@ class _Clamps:
         self._ends = np.empty((size, 2, stretches, self._rows))
         ends = np.empty((2, stretches, self._rows))
         ends[0], ends[1] = -1.0, 1.0
-        for change, found in zip(own, self._ends, strict=True):
-            np.add(ends, change, out=found)
-            np.maximum(found, -1.0, out=found)
-            np.minimum(found, 1.0, out=found)
-            ends = found
+        for change, clamped in zip(own, self._ends, strict=True):
+            np.add(ends, change, out=clamped)
+            np.maximum(clamped, -1.0, out=clamped)
+            np.minimum(clamped, 1.0, out=clamped)
+            ends = clamped
 
     def from_start(self, start: float) -> Array:
         """Positions (..., m) from a position before the first point."""

@@ -42,11 +42,11 @@ def pointing_error(force: Array, output: Array) -> float:
         return 0.0
     design = np.column_stack([force, np.ones(len(force))])
     flat = output.reshape(len(output), -1)
-    found, _, rank, _ = np.linalg.lstsq(design, flat, rcond=1e-6)
-    gain = np.linalg.norm(found[:3], axis=0)
+    coefficients, _, rank, _ = np.linalg.lstsq(design, flat, rcond=1e-6)
+    gain = np.linalg.norm(coefficients[:3], axis=0)
     if rank < design.shape[1] or not np.all(gain > 0.0):
         return 0.0
-    common = np.median(((flat - design @ found) / gain).reshape(output.shape), axis=1)
+    common = np.median(((flat - design @ coefficients) / gain).reshape(output.shape), axis=1)
     size = np.sum(force**2, axis=1, keepdims=True)
     square = common - force * np.sum(common * force, axis=1, keepdims=True) / size
     turned = np.sqrt(np.sum(square**2) / spare / 2.0 / np.mean(size))

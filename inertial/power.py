@@ -22,19 +22,19 @@ def coldness(state: State, tau: float) -> Array:
     A device cools without power as it warms with it, with ``tau`` s: off for less, it begins where it has not cooled to.
     """
     since = state.time - state.time[..., :1] if state.since_power is None else state.since_power
-    found = np.ones(np.broadcast_shapes(state.time.shape, since.shape))
+    lacking = np.ones(np.broadcast_shapes(state.time.shape, since.shape))
     cycles = switched(state)
     if not cycles or state.power_off is None:
-        return found
+        return lacking
     on_at = state.time - since
-    cold = np.ones(found.shape[:-1])
+    cold = np.ones(lacking.shape[:-1])
     for k in cycles:
         off = state.power_off[..., k]
         warming = np.maximum(on_at[..., k] - off - on_at[..., max(k - 1, 0)], 0.0)
         warm = 1.0 - cold * np.exp(-warming / tau) if k > 0 else np.zeros_like(cold)
         cold = 1.0 - warm * np.exp(-off / tau)
-        found[..., k:] = cold[..., None]
-    return found
+        lacking[..., k:] = cold[..., None]
+    return lacking
 
 
 def running(state: State) -> Array:

@@ -205,12 +205,12 @@ def is_covariate(column: str) -> bool:
 
 def attribute_drivers() -> dict[str, str]:
     """Names of the drivers that every lot may have, with the state's attribute of each; a derived one follows its source."""
-    found: dict[str, str] = {}
+    attributes: dict[str, str] = {}
     for row in RECORDED:
         if row.driver and row.attribute:
-            found[row.column] = row.attribute
-        found |= {one.name: one.attribute for one in DERIVED if one.driver and one.column == row.column}
-    return found
+            attributes[row.column] = row.attribute
+        attributes |= {one.name: one.attribute for one in DERIVED if one.driver and one.column == row.column}
+    return attributes
 
 
 def is_clock(driver: str) -> bool:
@@ -231,13 +231,13 @@ def shown_factor(driver: str) -> float:
 
 def formula_names() -> dict[str, tuple[str, float, str]]:
     """Names in formulas: the state's attribute, the factor, what it is."""
-    found: dict[str, tuple[str, float, str]] = {}
+    names: dict[str, tuple[str, float, str]] = {}
     for row in RECORDED:
         if row.formula:
-            found[row.formula] = (row.attribute, row.formula_factor, row.meaning)
-            found[row.column] = (row.attribute, 1.0, row.column_meaning)
-        found |= {one.formula: (one.attribute, 1.0, one.meaning) for one in DERIVED if one.column == row.column}
-    return found
+            names[row.formula] = (row.attribute, row.formula_factor, row.meaning)
+            names[row.column] = (row.attribute, 1.0, row.column_meaning)
+        names |= {one.formula: (one.attribute, 1.0, one.meaning) for one in DERIVED if one.column == row.column}
+    return names
 
 
 def formula_name(driver: str) -> str:

@@ -90,8 +90,8 @@ def _refined(step: float, gaps: Array) -> float:
     for reach in (3.0, 9.0, 27.0, 81.0):
         used = gaps[gaps < reach * step]
         steps = np.rint(used / step)
-        found = float(np.sum(used * steps) / np.sum(steps**2))
-        step = step if abs(found - step) < _SAME_STEP * step else found
+        fitted = float(np.sum(used * steps) / np.sum(steps**2))
+        step = step if abs(fitted - step) < _SAME_STEP * step else fitted
     return step
 
 
@@ -128,12 +128,12 @@ def frozen(x: ArrayLike) -> list[Frozen]:
     """
     data = np.asarray(x, dtype=np.float64)
     n, axes = data.shape
-    found: list[Frozen] = []
+    stretches: list[Frozen] = []
     lively = [bool(np.any(np.diff(data[:, k]) != 0.0)) for k in range(axes)]
     for axis in range(axes):
         if not lively[axis]:
             if any(lively) and n >= _SHORTEST_RUN:
-                found.append(Frozen(axis, 0, n))
+                stretches.append(Frozen(axis, 0, n))
             continue
         equal = np.diff(data[:, axis]) == 0.0
         usual = _usual_share(equal)
@@ -141,8 +141,8 @@ def frozen(x: ArrayLike) -> list[Frozen]:
             continue
         shortest = max(_SHORTEST_RUN, int(np.ceil(np.log(_CHANCE / n) / np.log(usual))))
         start, stop = runs_of(equal)
-        found += [Frozen(axis, int(a), int(b) + 1) for a, b in zip(start, stop, strict=True) if b - a >= shortest]
-    return found
+        stretches += [Frozen(axis, int(a), int(b) + 1) for a, b in zip(start, stop, strict=True) if b - a >= shortest]
+    return stretches
 
 
 def _usual_share(equal: NDArray[np.bool_]) -> float | None:
@@ -163,7 +163,7 @@ def torn(x: ArrayLike) -> list[Torn]:
     fault that all dwells have is seen as well. What a hand does in between is no power of two.
     """
     data = np.asarray(x, dtype=np.float64)
-    found: list[Torn] = []
+    faults: list[Torn] = []
     for axis in range(data.shape[1]):
         step = resolution(data[:, axis])
         if step is None or data.shape[0] < 4 * _BLOCK:
@@ -172,8 +172,8 @@ def torn(x: ArrayLike) -> list[Torn]:
         if rows.size:
             kinds, often = np.unique(offsets, return_counts=True)
             order = np.argsort(-often)
-            found.append(Torn(axis, rows, tuple(int(kinds[k]) for k in order[:4]), rows.size / quiet))
-    return found
+            faults.append(Torn(axis, rows, tuple(int(kinds[k]) for k in order[:4]), rows.size / quiet))
+    return faults
 
 
 def running_median(x: Array, width: int = _MEDIAN) -> Array:

@@ -76,11 +76,11 @@ class State:
     def remember(self, key: tuple[object, ...], make: Callable[[], Array]) -> Array:
         """The array that ``make`` returns, computed once per key: operators with memory are the same for every axis."""
         if key not in self.memory:
-            found = make()
+            array = make()
             # all have about one size; the oldest go first
-            while self.memory and (len(self.memory) + 1) * found.size > _REMEMBERED:
+            while self.memory and (len(self.memory) + 1) * array.size > _REMEMBERED:
                 del self.memory[next(iter(self.memory))]
-            self.memory[key] = found
+            self.memory[key] = array
         return self.memory[key]
 
     def need(self, quantity: str, effect: str) -> Array:

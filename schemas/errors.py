@@ -89,19 +89,19 @@ class StationRefused(StationError):
     """A command outside what a device is able or allowed to do; nothing was moved."""
 
 
-def close_matches(found: str, known: Iterable[str]) -> tuple[str, ...]:
+def close_matches(given: str, known: Iterable[str]) -> tuple[str, ...]:
     """Up to three known names that are similar to the given one, best first."""
     by_lower: dict[str, list[str]] = {}
     for name in sorted(set(known)):
         by_lower.setdefault(name.lower(), []).append(name)
-    near = get_close_matches(found.lower(), list(by_lower), n=3, cutoff=0.55)
+    near = get_close_matches(given.lower(), list(by_lower), n=3, cutoff=0.55)
     return tuple(name for lower in near for name in by_lower[lower])[:3]
 
 
-def did_you_mean(found: str, known: Iterable[str]) -> str:
+def did_you_mean(given: str, known: Iterable[str]) -> str:
     """The end of a message: the similar names, or all known names where none is similar."""
     names = sorted(set(known))
-    close = close_matches(found, names)
+    close = close_matches(given, names)
     if close:
         return f"did you mean {' or '.join(close)}?"
     return f"known: {', '.join(names)}"

@@ -46,7 +46,7 @@ class Key(NamedTuple):
 
 def keys_of(model: type[BaseModel]) -> list[Key]:
     """The keys of a file: those of the file itself, and then table by table; a table that several keys have is listed once."""
-    found: list[Key] = []
+    keys: list[Key] = []
     waiting: list[tuple[str, type[BaseModel]]] = [("", model)]
     listed: set[type[BaseModel]] = set()
     while waiting:
@@ -58,10 +58,10 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
             below = list(_models(field.annotation))
             default = "needed" if field.is_required() else _text(field.get_default(call_default_factory=True))
             value = _value(field.annotation)
-            found.append(Key(table, name, value, default, meaning(one, name)))
+            keys.append(Key(table, name, value, default, meaning(one, name)))
             dotted = f"{table}.{name}" if table else name
             waiting += [(dotted, part) for part in below]
-    return found
+    return keys
 
 
 def meaning(model: type[BaseModel], name: str) -> str:

@@ -60,8 +60,8 @@ class Limit(Strict):
     @model_validator(mode="after")
     def _one_side(self) -> Limit:
         if (self.max is None) == (self.min is None):
-            found = "neither" if self.max is None else "both"
-            raise ValueError(f"max, min: {found} given, one of them is needed; state max, or min for a least value")
+            given = "neither" if self.max is None else "both"
+            raise ValueError(f"max, min: {given} given, one of them is needed; state max, or min for a least value")
         return self
 
     @model_serializer(mode="wrap")

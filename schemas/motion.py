@@ -48,13 +48,13 @@ class Motion(Strict):
         return self._beyond(1e3 * mm, m_s, PEAK_FACTOR * level_g)
 
     def _beyond(self, mm: float, m_s: float, g: float) -> str:
-        for found, most, unit, what in (
+        for peak, most, unit, what in (
             (mm, self.displacement_mm, "mm", "displacement"),
             (m_s, self.velocity_m_s, "m/s", "velocity"),
             (g, self.acceleration_g, "g", "acceleration"),
         ):
-            if most is not None and not found <= 1.001 * most:
-                return f"peak {what} {found:.4g} {unit}, at most {most:g} {unit} is allowed"
+            if most is not None and not peak <= 1.001 * most:
+                return f"peak {what} {peak:.4g} {unit}, at most {most:g} {unit} is allowed"
         return ""
 
 

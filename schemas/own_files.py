@@ -39,8 +39,8 @@ def folders(kind: Kind) -> list[Path]:
 
 def own_files(kind: Kind) -> dict[str, Path]:
     """The user's files of a kind by their names, sorted; of two with one name that of the working folder."""
-    found = {path.stem: path for folder in reversed(folders(kind)) for path in folder.glob(f"*{SUFFIX}")}
-    return dict(sorted(found.items()))
+    paths = {path.stem: path for folder in reversed(folders(kind)) for path in folder.glob(f"*{SUFFIX}")}
+    return dict(sorted(paths.items()))
 
 
 def own_names(kind: Kind) -> list[str]:
@@ -88,10 +88,10 @@ def refuse_built_in_name(kind: Kind, name: str, path: Path, built_in: Iterable[s
 
 def contents(named: Iterable[tuple[Kind, str]]) -> dict[str, str]:
     """SHA-256 of the named files that are the user's, by ``kind/name``; built-in files belong to the product's version."""
-    found = {(kind, name): own_file(kind, name) for kind, name in named}
+    paths = {(kind, name): own_file(kind, name) for kind, name in named}
     return {
         f"{kind}/{name}": sha256(path.read_bytes()).hexdigest()
-        for (kind, name), path in sorted(found.items())
+        for (kind, name), path in sorted(paths.items())
         if path is not None
     }
 

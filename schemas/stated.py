@@ -114,12 +114,12 @@ class Entry(Strict):
 
 def _forms(entry: Entry) -> list[tuple[str, str, str]]:
     """(key, form, unit) of the uncertainties that an entry states."""
-    found: list[tuple[str, str, str]] = []
+    forms: list[tuple[str, str, str]] = []
     for name in type(entry).model_fields:
         match = _STATED.match(name)
         if match and match["unit"] in TO_SI and getattr(entry, name) is not None:
-            found.append((name, match["form"], match["unit"]))
-    return found
+            forms.append((name, match["form"], match["unit"]))
+    return forms
 
 
 def _part_of(name: str) -> str:

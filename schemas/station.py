@@ -99,8 +99,8 @@ class Equipment(Strict):
 
     def there(self) -> dict[str, Device]:
         """The equipment that the station has, by role."""
-        found = {role: getattr(self, role) for role in type(self).model_fields if role != "built_in"}
-        return {role: device for role, device in found.items() if device is not None}
+        devices = {role: getattr(self, role) for role in type(self).model_fields if role != "built_in"}
+        return {role: device for role, device in devices.items() if device is not None}
 
 
 @cache
@@ -252,9 +252,9 @@ class StationConfig(Strict):
 
     def fitted(self) -> dict[str, Device]:
         """The equipment of the station by role; a simulated one has the built-in equipment where its file names none."""
-        found = self.equipment.there()
+        named = self.equipment.there()
         built_in = built_in_equipment().there() if self.kind == "simulated" and self.equipment.built_in else {}
-        return {**built_in, **found}
+        return {**built_in, **named}
 
     @model_validator(mode="after")
     def _can_be_safe(self) -> StationConfig:
@@ -338,8 +338,8 @@ def load_station(path: Path | None = None) -> StationConfig:
         source = f"stations/{SIMULATED}"
         text = files("stations").joinpath(SIMULATED).read_text("utf-8")
     else:
-        found = path if is_file(path) else own_file("stations", str(path), {BUILT_IN}) or path
-        source, text = str(found), read_text(found, "station")
+        file = path if is_file(path) else own_file("stations", str(path), {BUILT_IN}) or path
+        source, text = str(file), read_text(file, "station")
     try:
         return StationConfig.model_validate(parse_toml(text, source))
     except ValidationError as problem:

@@ -98,8 +98,8 @@ def _sentence(detail: ErrorDetails, key: str) -> str:
         return reason
     if isinstance(detail["input"], dict | list):
         return f"key '{key}': {reason}"
-    found = detail["input"]
-    text = f"'{shown(found)}'" if isinstance(found, str) else shown(found)
+    value = detail["input"]
+    text = f"'{shown(value)}'" if isinstance(value, str) else shown(value)
     return f"key '{key}': found {text}: {reason[:1].lower()}{reason[1:]}"
 
 
@@ -118,4 +118,4 @@ def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[
 def _models_in(annotation: object) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [found for inner in getattr(annotation, "__args__", ()) for found in _models_in(inner)]
+    return [model for inner in getattr(annotation, "__args__", ()) for model in _models_in(inner)]

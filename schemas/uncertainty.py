@@ -52,12 +52,12 @@ class Gravity(RelativeEntry):
 
     def relative(self) -> StandardUncertainty:
         """Relative standard uncertainty; 60 ppm of the formula where none is stated."""
-        found = self.standard()
-        if found.unit == "m_s2":
-            return found._replace(u=found.u / self.value)
-        if not found.unit and not self.exact:
+        standard = self.standard()
+        if standard.unit == "m_s2":
+            return standard._replace(u=standard.u / self.value)
+        if not standard.unit and not self.exact:
             return StandardUncertainty(60e-6, "ppm", 60.0, "normal", 1.0)
-        return found
+        return standard
 
     @property
     def origin(self) -> str:
@@ -187,8 +187,8 @@ class Uncertainty(Strict):
     @property
     def entries(self) -> dict[str, Entry]:
         """The entries that are stated, by name."""
-        found = {name: getattr(self, name) for name in type(self).model_fields if name != "grade_source"}
-        return {name: entry for name, entry in found.items() if entry is not None}
+        entries = {name: getattr(self, name) for name in type(self).model_fields if name != "grade_source"}
+        return {name: entry for name, entry in entries.items() if entry is not None}
 
     @property
     def not_stated(self) -> dict[str, str]:

@@ -166,10 +166,12 @@ class Tab:
     def findings(self) -> list[str]:
         """What axe-core finds serious or critical."""
         self.page.evaluate(gzip.decompress(AXE.read_bytes()).decode())
-        found = self.page.evaluate("async () => (await axe.run(document, { resultTypes: ['violations'] })).violations")
+        violations = self.page.evaluate(
+            "async () => (await axe.run(document, { resultTypes: ['violations'] })).violations"
+        )
         return [
             f"{one['id']}: {one['help']}: {one['nodes'][0]['html'][:160]}"
-            for one in found
+            for one in violations
             if one["impact"] in {"serious", "critical"}
         ]
 

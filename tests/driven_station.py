@@ -82,8 +82,8 @@ def told(event, after=0):
     """The machine's log of one kind of event, once there are more than ``after``."""
     end = time.monotonic() + SOON_S
     while time.monotonic() < end:
-        found = [line for line in folder.read_log(folder.state_folder()) if line["event"] == event]
-        if len(found) > after:
-            return found[-1]
+        lines = [line for line in folder.read_log(folder.state_folder()) if line["event"] == event]
+        if len(lines) > after:
+            return lines[-1]
         time.sleep(0.05)
     return pytest.fail(f"no {event}: {folder.read_log(folder.state_folder())}")

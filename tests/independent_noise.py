@@ -12,8 +12,8 @@ Array = np.ndarray
 
 def share(count: int, total: int) -> tuple[float, float, float]:
     """Share of a count with the exact 95 % interval (Clopper and Pearson 1934)."""
-    found = binomtest(count, total).proportion_ci(0.95, "exact")
-    return count / total, float(found.low), float(found.high)
+    interval = binomtest(count, total).proportion_ci(0.95, "exact")
+    return count / total, float(interval.low), float(interval.high)
 
 
 def told(name: str, count: int, total: int) -> str:

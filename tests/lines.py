@@ -70,7 +70,7 @@ def kill_all(process: subprocess.Popen[bytes]) -> int:
 
 def order(line: Orchestrator, deployment: str, **parameters: Any) -> dict[str, Any]:
     """A run of a deployment that a person ordered."""
-    _, found = line.ask(f"/api/deployments/name/calibrate_lot/{deployment}")
-    status, run = line.ask(f"/api/deployments/{found['id']}/create_flow_run", {"parameters": parameters})
+    _, deployed = line.ask(f"/api/deployments/name/calibrate_lot/{deployment}")
+    status, run = line.ask(f"/api/deployments/{deployed['id']}/create_flow_run", {"parameters": parameters})
     assert status == 201, run
     return run

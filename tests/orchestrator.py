@@ -85,15 +85,15 @@ class Orchestrator:
             "deployments": {"name": {"any_": [deployment]}},
             "sort": "EXPECTED_START_TIME_ASC",
         }
-        status, found = self.ask("/api/flow_runs/filter", wanted)
-        assert status == 200, found
-        return found
+        status, flow_runs = self.ask("/api/flow_runs/filter", wanted)
+        assert status == 200, flow_runs
+        return flow_runs
 
-    def until(self, found: Any, what: str, patience_s: float = PATIENCE_S) -> Any:
-        """What ``found`` gives as soon as it gives anything."""
+    def until(self, condition: Any, what: str, patience_s: float = PATIENCE_S) -> Any:
+        """What ``condition`` gives as soon as it gives anything."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end:
-            if result := found():
+            if result := condition():
                 return result
             time.sleep(0.5)
         raise AssertionError(f"{what}: not within {patience_s:g} s; log: {errors_in(self.home / LOG)}")
@@ -122,19 +122,19 @@ def served(home: Path, *, faultless: bool = True, log_name: str = LOG, **setting
     with (home / log_name).open("ab") as log:
         process = subprocess.Popen(command, cwd=ROOT, env={**common, SERVER_KEY: key}, stdout=log, stderr=log)
     client = {**common, "PREFECT_API_URL": f"http://127.0.0.1:{port}/api", CLIENT_KEY: key}
-    found = Orchestrator(home, port, key, client)
+    orchestrator = Orchestrator(home, port, key, client)
     try:
-        found.until(lambda: _answers(found, process), "the server answers")
-        yield found
+        orchestrator.until(lambda: _answers(orchestrator, process), "the server answers")
+        yield orchestrator
     finally:
         process.terminate()
         process.wait(60)
     assert not (faultless and errors_in(home / log_name)), errors_in(home / log_name)
 
 
-def _answers(found: Orchestrator, process: subprocess.Popen[bytes]) -> bool:
+def _answers(orchestrator: Orchestrator, process: subprocess.Popen[bytes]) -> bool:
     assert process.poll() is None, "the server has ended"
     try:
-        return found.ask("/api/health", key="")[0] == 200
+        return orchestrator.ask("/api/health", key="")[0] == 200
     except OSError:
         return False

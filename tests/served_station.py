@@ -38,10 +38,10 @@ def modbus_station(port: int, host: str = "127.0.0.1", **changes: dict[str, obje
 @contextmanager
 def served(lot: Lot | None = None, silence_s: float = 0.0, **simulation: object) -> Generator[int, None, None]:
     """The simulated station served while the block lasts; gives its port."""
-    stop, listening, found, failed = threading.Event(), threading.Event(), list[int](), list[Exception]()
+    stop, listening, ports, failed = threading.Event(), threading.Event(), list[int](), list[Exception]()
 
     def ready(_host: str, port: int) -> None:
-        found.append(port)
+        ports.append(port)
         listening.set()
 
     def run() -> None:
@@ -57,7 +57,7 @@ def served(lot: Lot | None = None, silence_s: float = 0.0, **simulation: object)
     try:
         assert listening.wait(60.0), "the station did not listen within 60 s"
         if not failed:
-            yield found[0]
+            yield ports[0]
     finally:
         stop.set()
         thread.join(20.0)

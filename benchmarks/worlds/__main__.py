@@ -38,8 +38,8 @@ DATA = {"data"}
 
 def interval(hits: int, runs: int) -> str:
     """A rate with its Clopper-Pearson interval."""
-    found = stats.binomtest(hits, runs).proportion_ci(0.95, "exact")
-    return f"{hits}/{runs} [{found.low:.2f}, {found.high:.2f}]"
+    limits = stats.binomtest(hits, runs).proportion_ci(0.95, "exact")
+    return f"{hits}/{runs} [{limits.low:.2f}, {limits.high:.2f}]"
 
 
 def diagnosed(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
@@ -107,14 +107,14 @@ def _agrees(told: Any, names: set[str], units: list[str], dwells: list[int]) -> 
 def looped(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
     """Whether wrong effects are confirmed, and right ones of two floors, with and without a fresh run."""
     _, name, seed = task
-    found: dict[str, list[tuple[str, bool | None]]] = defaultdict(list)
+    confirmed: dict[str, list[tuple[str, bool | None]]] = defaultdict(list)
     empty = make(LOOP[name], seed)
     for kind, effects in (("wrong", WRONG), ("right", RIGHT)):
         for effect in effects:
             made = empty if kind == "wrong" else make(replace(LOOP[name], hidden=((effect, 2.0),)), seed)
             for where, again in (("fresh", (made.fresh, made.fresh_history)), ("left out", (None, None))):
-                found[f"{kind} {where}"].append((effect, _confirmed(made, effect, again)))
-    return name, dict(found)
+                confirmed[f"{kind} {where}"].append((effect, _confirmed(made, effect, again)))
+    return name, dict(confirmed)
 
 
 def _confirmed(made: Made, effect: str, again: tuple[Any, Any]) -> bool | None:

@@ -234,8 +234,8 @@ def followed(task: tuple[str, int]) -> tuple[str, dict[str, Any]]:
     """One run: the proposals of its diagnosis, measured, and what they parted."""
     name, seed = task
     begin = time.process_time()
-    found = _followed(SCENES[name], seed)
-    return name, {"seed": seed, "seconds": time.process_time() - begin, **found}
+    outcome = _followed(SCENES[name], seed)
+    return name, {"seed": seed, "seconds": time.process_time() - begin, **outcome}
 
 
 def _followed(blind: Blind, seed: int) -> dict[str, Any]:
@@ -279,9 +279,9 @@ def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step], before
     groups = [list(n.effects.ids) for n in after.named] if after is not None else []
     wrong = other if truth == one else one
     promised = dict(wanted.if_true).get(truth)
-    found = added = None
+    measured = added = None
     if after is not None and promised is not None:
-        found = separation(after, truth, wrong)
+        measured = separation(after, truth, wrong)
         # of what the steps add, luck apart: the devices without their noise, judged by the noise that was there
         expected = promised - separation(before, truth, wrong)
         clean = separation(after, truth, wrong, run.tables(steps, quiet=True))
@@ -289,7 +289,7 @@ def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step], before
         added = clean / max(expected, 1e-9)
     return {
         "pair": list(wanted.pair), "minutes": wanted.minutes, "steps": len(steps), "promised": promised,
-        "measured": found, "added": added,
+        "measured": measured, "added": added,
         "after": groups, "kinds": list(wanted.kinds),
         # of a pair without the truth neither is right: parted is what leaves neither with the truth
         "parted": any(truth in g for g in groups) and not any(truth in g and wrong in g for g in groups)

@@ -227,15 +227,15 @@ def _with_heat(scene: Scene, world: World, rng: np.random.Generator) -> Scene:
 
 def _hidden(world: World, scene: Scene, again: Scene, floor: float, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """What the hidden effects add to the run and to the fresh one, (units, n, 3), g."""
-    found = [np.zeros((world.units, len(scene.start), 3)) for _ in range(2)]
+    added = [np.zeros((world.units, len(scene.start), 3)) for _ in range(2)]
     for name, size in world.hidden:
         physics: Callable[..., Callable[[Scene], Floats]] = PHYSICS[name]
         effect = physics(rng, world.units, scene)
         shape = effect(scene)
         left = float(np.sqrt(np.mean(_left(scene, shape) ** 2)))
         factor = size * floor / left
-        found = [f + factor * effect(s) for f, s in zip(found, (scene, again), strict=True)]
-    return found[0], found[1]
+        added = [f + factor * effect(s) for f, s in zip(added, (scene, again), strict=True)]
+    return added[0], added[1]
 
 
 def _left(scene: Scene, shape: Floats) -> Floats:

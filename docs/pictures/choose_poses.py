@@ -94,8 +94,8 @@ def draw_rivals() -> None:
     force = forces("twenty_six")
     f = np.linspace(-1.0, 1.0, 401)
     wrong = np.column_stack([force[:, 0], force[:, 0] * np.abs(force[:, 0])])
-    found = np.linalg.lstsq(wrong, force[:, 0] ** 3, rcond=None)[0]
-    curve = 30.0 * (f**3 - np.column_stack([f, f * np.abs(f)]) @ found)
+    coefficients = np.linalg.lstsq(wrong, force[:, 0] ** 3, rcond=None)[0]
+    curve = 30.0 * (f**3 - np.column_stack([f, f * np.abs(f)]) @ coefficients)
     figure, axes = plt.subplots(figsize=(7.2, 3.2))
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     axes.plot(f, curve, color=BLUE)

@@ -46,11 +46,11 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
         gain = space.gain(candidate)
         looks += gain.drop.size
         for place, (drop, rank) in enumerate(zip(gain.drop.tolist(), gain.rank.tolist(), strict=True)):
-            found = log_p_value(space, drop, rank)
+            log_p = log_p_value(space, drop, rank)
             together = of_poses if candidate.shared else common
-            if found < worst and together > 1.0:
-                found = log_p_value(space, drop * _own_part(space, candidate, place, together), rank)
-            worst = min(worst, found)
+            if log_p < worst and together > 1.0:
+                log_p = log_p_value(space, drop * _own_part(space, candidate, place, together), rank)
+            worst = min(worst, log_p)
     charged = worst + np.log(max(looks, 1))
     certain = CERTAIN_BELOW**2 if draws.heavy else CERTAIN_BELOW
     if charged < np.log(certain):
@@ -64,8 +64,8 @@ def _against_draws(draws: "_Draws", looks: Callable[[], Iterable[Candidate]], wo
     batch = int(np.clip(_NUMBERS // (blocks * n), 5, _BATCH))
     drawn, beyond = 0, 0
     while drawn < DRAWS and beyond < ENOUGH:
-        found = draws.worst(looks(), batch)
-        drawn, beyond = drawn + found.size, beyond + int(np.count_nonzero(found <= worst))
+        log_p = draws.worst(looks(), batch)
+        drawn, beyond = drawn + log_p.size, beyond + int(np.count_nonzero(log_p <= worst))
     return float(np.log((1.0 + beyond) / (1.0 + drawn)))
 
 
@@ -156,12 +156,12 @@ class _Draws:
         """Restricted deviance of each draw at some shares, (draws,)."""
         space = self._space(shares)
         dof = space.by_block[:, None]
-        found = np.empty(series.shape[-1])
+        log_squares = np.empty(series.shape[-1])
         for some in self._pieces(series.shape[-1]):
             left = space.project(space.whiten(series[..., some]))
             squares = np.einsum("bnd,bnd->bd", left, left)
-            found[some] = np.sum(dof * np.log(np.maximum(squares, 1e-300)), axis=0)
-        return space.logdet + space.information + found
+            log_squares[some] = np.sum(dof * np.log(np.maximum(squares, 1e-300)), axis=0)
+        return space.logdet + space.information + log_squares
 
     def _space(self, shares: Shares) -> Space:
         return self.model.at(Noise(shares, np.ones(self.model.problem.blocks)))
@@ -185,13 +185,13 @@ class _At:
 
     def worst(self, candidate: Candidate) -> Array:
         """Smallest log p of a candidate over its grid, for each draw."""
-        found = np.zeros(self.left.shape[-1])
+        log_p = np.zeros(self.left.shape[-1])
         for drop, rank in _drops(candidate, self.space, self.left):
             after = self.space.dof - rank
             if rank and after > 0:
                 ratio = (drop / rank) / (np.maximum(self.total - drop, 1e-300) / after)
-                found = np.minimum(found, log_f_tail(ratio, rank, after))
-        return found
+                log_p = np.minimum(log_p, log_f_tail(ratio, rank, after))
+        return log_p
 
 
 def _lattice(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]], int]:
@@ -233,12 +233,12 @@ def _shared_drops(candidate: Candidate, space: Space, noise: Array) -> list[tupl
         np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0)), 1e-300
     )
     noise_flat = noise.reshape(blocks * n, -1)
-    found: list[tuple[Array, int]] = []
+    drops: list[tuple[Array, int]] = []
     for g in range(grid):
         u, s, _ = np.linalg.svd(left[:, g], full_matrices=False)
         along = u[:, s > SEEN].T @ noise_flat
-        found.append((np.sum(along**2, axis=0), int(np.count_nonzero(s > SEEN))))
-    return found
+        drops.append((np.sum(along**2, axis=0), int(np.count_nonzero(s > SEEN))))
+    return drops
 
 
 def _local_drops(white: Array, left: Array, noise: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -117,8 +117,8 @@ class RivalDiscrimination:
             self._begun[fine] = separations(rivals, fine=fine)
         if not steps:
             return rivals.observed, _needed(rivals, apart(rivals, fine=fine))
-        found = apart(rivals, steps, pace, fine=fine)
-        return rivals.observed + np.maximum(found.left - self._begun[fine], 0.0), _needed(rivals, found)
+        separation = apart(rivals, steps, pace, fine=fine)
+        return rivals.observed + np.maximum(separation.left - self._begun[fine], 0.0), _needed(rivals, separation)
 
     def picks(
         self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
@@ -230,14 +230,14 @@ def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]
 
     The size is the geometric mean of the usual range, at the largest excursion of the column.
     """
-    found: list[Array] = []
+    scaled: list[Array] = []
     for term in terms:
         columns = problem.columns(term.effect, term.keywords)[..., : term.first]
         largest = np.max(np.abs(columns), axis=(0, 1))
         low, high = term.effect.typical_ug
         size = 1e-6 * float(np.sqrt(max(low, 1e-3) * high))
-        found.append(columns * np.where(largest > 0.0, size / np.where(largest > 0.0, largest, 1.0), 0.0))
-    return np.concatenate(found, axis=-1), [f.shape[-1] for f in found]
+        scaled.append(columns * np.where(largest > 0.0, size / np.where(largest > 0.0, largest, 1.0), 0.0))
+    return np.concatenate(scaled, axis=-1), [f.shape[-1] for f in scaled]
 
 
 def _greedy(grid: Sequence[SequenceStep], n: int, count: int, score: "Score") -> list[SequenceStep]:
@@ -265,16 +265,16 @@ def _error(problem: Problem, rivals: Rivals) -> Array:
     return np.where(np.isfinite(problem.error), problem.error * rivals.noise.scale[:, None], np.inf)
 
 
-def _needed(rivals: Rivals, found: Apart) -> Array:
+def _needed(rivals: Rivals, separation: Apart) -> Array:
     """Chi-square (r, r) between a truth (row) and a wrong rival (column) that removes the wrong one.
 
     The observed difference
     scatters by twice its own root; a simpler rival has the lower price.
     """
     counts = [_coefficients(rivals, t) for t in rivals.terms]
-    paid = np.array([price(d, k) for d, k in zip(found.whole, counts, strict=True)])
+    paid = np.array([price(d, k) for d, k in zip(separation.whole, counts, strict=True)])
     wrong = np.array([[price(max(d - lost, 0.0), k) for k, lost in zip(counts, row, strict=True)]
-                      for d, row in zip(found.whole, found.left, strict=True)])  # fmt: skip
+                      for d, row in zip(separation.whole, separation.left, strict=True)])  # fmt: skip
     least = np.maximum(CLASS_WIDTH + paid[:, None] - wrong, CLASS_WIDTH)
     return (UNLUCKY + np.sqrt(UNLUCKY**2 + least)) ** 2
 

@@ -48,10 +48,10 @@ class BadDwell:
         return float(np.linalg.norm(self.by_axis))
 
 
-def without(lot: Lot, found: list[BadDwell]) -> Lot:
+def without(lot: Lot, bad: list[BadDwell]) -> Lot:
     """The lot without some dwells of some units."""
     error = lot.error.copy()
-    for one in found:
+    for one in bad:
         error[one.unit, one.dwell] = np.inf
     return replace(lot, error=error)
 
@@ -64,16 +64,16 @@ def bad_dwells(model: Model) -> list[BadDwell]:
             for one in bad_norms(model)
             for dwell, off, deviations in zip(one.dwells, one.off, one.deviations, strict=True)
         ]
-    found: list[BadDwell] = []
+    bad: list[BadDwell] = []
     lot = model.problem.lot
     for _ in range(_ROUNDS):
-        more = _round(model, max(int(MOST_BAD * lot.state.time.size) + 1, _AT_LEAST) - len(found))
+        more = _round(model, max(int(MOST_BAD * lot.state.time.size) + 1, _AT_LEAST) - len(bad))
         if not more:
             break
-        found += more
-        problem = Problem(without(lot, found), slope=model.problem.slope)
+        bad += more
+        problem = Problem(without(lot, bad), slope=model.problem.slope)
         model = Model(problem, model.terms, near=model.noise)
-    return found
+    return bad
 
 
 def _round(model: Model, most: int) -> list[BadDwell]:
@@ -81,16 +81,16 @@ def _round(model: Model, most: int) -> list[BadDwell]:
     space = model.space
     axes = 1 if model.problem.lot.radial else 3
     looked = _Deletion(space, axes)
-    found: list[BadDwell] = []
-    while len(found) < most:
+    bad: list[BadDwell] = []
+    while len(bad) < most:
         best = looked.worst()
         if best is None:
             break
         unit, dwell, by_axis = best
-        if found and float(np.linalg.norm(by_axis)) < _ALIKE * found[0].deviations:
+        if bad and float(np.linalg.norm(by_axis)) < _ALIKE * bad[0].deviations:
             break
-        found.append(BadDwell(unit, dwell, looked.delete(unit, dwell), by_axis))
-    return found
+        bad.append(BadDwell(unit, dwell, looked.delete(unit, dwell), by_axis))
+    return bad
 
 
 class _Deletion:
@@ -134,8 +134,8 @@ class _Deletion:
         dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
         freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())
         chance = float(stats.f.sf(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
-        found = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
-        return found if chance < BAD_DWELL and dof >= _LEAST_DOF else None
+        outlier = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
+        return outlier if chance < BAD_DWELL and dof >= _LEAST_DOF else None
 
     def _studentised(self, drop: Array) -> Array:
         """Squares of each dwell over a variance without it, (units, axes, n)."""

@@ -58,17 +58,17 @@ class Suspicion:
 
 def bad_norms(model: Model) -> list[Suspicion]:
     """The dwells that disagree with a model and its noise, the most certain first."""
-    found: list[Suspicion] = []
+    suspicions: list[Suspicion] = []
     while True:
         tried = [_judged(model, unit, dwells) for unit, dwells in _suspicions(model)]
         known = [one for one in tried if one is not None and one.log_p < np.log(BAD_NORM)]
-        count = sum(len(one.dwells) for one in found)
+        count = sum(len(one.dwells) for one in suspicions)
         known = [one for one in known if count + len(one.dwells) <= max(2, int(MOST * model.problem.n))]
         if not known:
-            return found
+            return suspicions
         # of nested sets the smaller one, unless the larger is far more probable
         best = min(known, key=lambda one: one.log_p + 4.0 * len(one.dwells))
-        found.append(best)
+        suspicions.append(best)
         model = _without(model, best.unit, best.dwells)
 
 
@@ -119,16 +119,16 @@ def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]
     own = np.diagonal(p)
     sound = np.flatnonzero(own > _HANGING * max(float(own.max()), 1e-300))
     singles = py[sound] ** 2 / own[sound]
-    found: list[tuple[int, Array, list[tuple[int, ...]]]] = [(1, singles, [(int(k),) for k in sound])]
+    drops: list[tuple[int, Array, list[tuple[int, ...]]]] = [(1, singles, [(int(k),) for k in sound])]
     if not 2 <= sound.size <= _LONG:
-        return found
+        return drops
     i, j = (sound[k] for k in np.triu_indices(sound.size, 1))
     area = own[i] * own[j] - p[i, j] ** 2
     fair = area > 1e-3 * own[i] * own[j]
     i, j, area = i[fair], j[fair], area[fair]
     pairs = (own[j] * py[i] ** 2 - 2.0 * p[i, j] * py[i] * py[j] + own[i] * py[j] ** 2) / area
     best = np.argsort(pairs)[::-1][: 4 * _TRIED]
-    return [*found, (2, pairs[best], [(int(i[k]), int(j[k])) for k in best])]
+    return [*drops, (2, pairs[best], [(int(i[k]), int(j[k])) for k in best])]
 
 
 def _variance(rest: Model, unit: int) -> tuple[float, int]:

@@ -106,15 +106,15 @@ def _free(unit: Array, inverse: Array, columns: Array) -> Array:
     return columns - unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ columns))
 
 
-def residuals_of(problem: Problem, found: Estimate) -> Array:
+def residuals_of(problem: Problem, fit: Estimate) -> Array:
     """Residuals (blocks, n) in g of a problem under given coefficients; NaN where a dwell is missing."""
-    local = [t for t in found.terms if not t.shared]
-    shared = [t for t in found.terms if t.shared]
+    local = [t for t in fit.terms if not t.shared]
+    shared = [t for t in fit.terms if t.shared]
     left = problem.series.copy()
     if local:
-        left -= np.einsum("bnp,bp->bn", _columns(problem, local), found.local)
+        left -= np.einsum("bnp,bp->bn", _columns(problem, local), fit.local)
     if shared:
-        left -= _columns(problem, shared) @ found.shared
+        left -= _columns(problem, shared) @ fit.shared
     return np.where(np.isfinite(problem.error), left, np.nan)
 
 

@@ -120,7 +120,7 @@ class Covariance:
 
     def _grouped(self, time: Array, error: Array, direction: Array | None) -> list[tuple[int, int, NDArray[np.intp]]]:
         """(kernel, steps by which its shares are larger than the lot's, blocks)."""
-        found: dict[tuple[int, int], list[int]] = {}
+        groups: dict[tuple[int, int], list[int]] = {}
         for block, there in enumerate(self.there):
             profile = np.where(there, np.where(there, error[block], 1.0) / self.level[block], 1.0)
             own = profile[there]
@@ -133,8 +133,8 @@ class Covariance:
                 self._kernels.append(_Kernel(time[block], there, profile, way))
             # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
             steps = 2 * round(0.5 * SHARE_STEP * np.log10(self.white / self.level[block] ** 2))
-            found.setdefault((place, steps), []).append(block)
-        return [(place, steps, np.array(blocks)) for (place, steps), blocks in found.items()]
+            groups.setdefault((place, steps), []).append(block)
+        return [(place, steps, np.array(blocks)) for (place, steps), blocks in groups.items()]
 
     @cached_property
     def _wander(self) -> tuple[Array, Array] | None:
@@ -151,22 +151,22 @@ class Covariance:
 
     def about_mean(self, shares: Shares) -> Array:
         """Mean variance of the wander of each block about its record's own mean, over its white variance, (blocks,)."""
-        found = np.zeros(len(self.level))
+        variance = np.zeros(len(self.level))
         if self._wander is None:
-            return found
+            return variance
         for place, steps, blocks in self._groups:
             there = self._kernels[place].there
             for share, kernel in zip(shares, self._wander, strict=True):
                 own = kernel[place][np.ix_(there, there)]
                 n = max(len(own), 1)
-                found[blocks] += share * 10.0 ** (steps / SHARE_STEP) * (np.trace(own) / n - own.sum() / n**2)
-        return found
+                variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * (np.trace(own) / n - own.sum() / n**2)
+        return variance
 
     def side_by_side(self, shares: Shares) -> Array:
         """Half the mean variance of the wander's steps from one dwell to the next, over the white variance, (blocks,)."""
-        found = np.zeros(len(self.level))
+        variance = np.zeros(len(self.level))
         if self._wander is None:
-            return found
+            return variance
         for place, steps, blocks in self._groups:
             there = self._kernels[place].there
             for share, kernel in zip(shares, self._wander, strict=True):
@@ -174,8 +174,8 @@ class Covariance:
                 if len(own) > 1:
                     each = np.diagonal(own)
                     step = 0.5 * (each[1:] + each[:-1]) - np.diagonal(own, 1)
-                    found[blocks] += share * 10.0 ** (steps / SHARE_STEP) * float(np.mean(step))
-        return found
+                    variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * float(np.mean(step))
+        return variance
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
@@ -217,14 +217,14 @@ class Covariance:
         if len(self._groups) == 1:
             place, steps, _ = self._groups[0]
             level = self.level if blocks is None else self.level[blocks]
-            found = self._whitener(place, steps, shares)
-            if found is not None:
+            whitener = self._whitener(place, steps, shares)
+            if whitener is not None:
                 if columns.shape[-1] > _FEW:
-                    white = np.matmul(found[0], columns)
+                    white = np.matmul(whitener[0], columns)
                     white /= level[:, None, None]
                     return white
                 own = columns / level[:, None, None]
-                return np.swapaxes(_applied(found[0], np.swapaxes(own, -1, -2)), -1, -2)
+                return np.swapaxes(_applied(whitener[0], np.swapaxes(own, -1, -2)), -1, -2)
         place_of = np.arange(len(self.level)) if blocks is None else blocks
         where = np.full(len(self.level), -1)
         where[place_of] = np.arange(place_of.size)
@@ -234,13 +234,13 @@ class Covariance:
             rows = rows[rows >= 0]
             if rows.size:
                 own = columns[rows] / self.level[place_of[rows], None, None]
-                found = self._whitener(place, steps, shares)
-                if found is None:
+                whitener = self._whitener(place, steps, shares)
+                if whitener is None:
                     kernel = self._kernels[place]
                     out[rows] = own * np.where(kernel.there, 1.0 / kernel.profile, 0.0)[:, None]
                 else:
                     n, m = columns.shape[1:]
-                    flat = found[0] @ own.transpose(1, 0, 2).reshape(n, -1)
+                    flat = whitener[0] @ own.transpose(1, 0, 2).reshape(n, -1)
                     out[rows] = flat.reshape(n, rows.size, m).transpose(1, 0, 2)
         return out
 
@@ -249,34 +249,37 @@ class Covariance:
         if len(self._groups) > 1:
             return None
         place, steps, _ = self._groups[0]
-        found = self._whitener(place, steps, shares)
-        if found is None:
+        whitener = self._whitener(place, steps, shares)
+        if whitener is None:
             return None
-        few = np.matmul(found[0], columns[:distinct])
+        few = np.matmul(whitener[0], columns[:distinct])
         whole = few[np.newaxis] / self.level.reshape(-1, distinct, 1, 1)
         return whole.reshape(columns.shape)
 
     def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
         """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
         for place, steps, members in self._groups:
-            found = self._whitener(place, steps, shares)
+            whitener = self._whitener(place, steps, shares)
             kernel = self._kernels[place]
-            yield members, np.diag(np.where(kernel.there, 1.0 / kernel.profile, 0.0)) if found is None else found[0]
+            yield (
+                members,
+                np.diag(np.where(kernel.there, 1.0 / kernel.profile, 0.0)) if whitener is None else whitener[0],
+            )
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, n, m), g, with this noise, from independent normal numbers; zero where a dwell is missing."""
         out = np.empty(drawn.shape)
         for place, steps, members in self._groups:
             kernel = self._kernels[place]
-            found = self._whitener(place, steps, noise.shares)
+            whitener = self._whitener(place, steps, noise.shares)
             n, m = drawn.shape[1:]
             flat = drawn[members].transpose(1, 0, 2).reshape(n, -1)
             made = np.zeros_like(flat)
-            if found is None:
+            if whitener is None:
                 made = flat * (kernel.profile * kernel.there)[:, None]
             else:
                 there = kernel.there
-                made[there] = solve_triangular(found[0][np.ix_(there, there)], flat[there], lower=True)
+                made[there] = solve_triangular(whitener[0][np.ix_(there, there)], flat[there], lower=True)
             own = made.reshape(n, members.size, m).transpose(1, 0, 2)
             out[members] = own * (self.level * noise.scale)[members, None, None]
         return out
@@ -297,29 +300,29 @@ class Covariance:
         distinct : how many blocks, the first, have columns of their own, which the others repeat in turn; all where None
         """
         name = (key, shares)
-        found = self._kept.get(name)
-        if found is None:
-            found = self._repeated(columns, shares, distinct) if distinct and blocks is None else None
-            found = self.whiten(columns, shares, blocks) if found is None else found
+        white = self._kept.get(name)
+        if white is None:
+            white = self._repeated(columns, shares, distinct) if distinct and blocks is None else None
+            white = self.whiten(columns, shares, blocks) if white is None else white
             if self.there.size > LARGE:
-                return found
-            self._kept[name] = found
-            self._used += found.size
+                return white
+            self._kept[name] = white
+            self._used += white.size
             while self._used > _COLUMNS and self._kept:
                 self._used -= self._kept.popitem(last=False)[1].size
         else:
             self._kept.move_to_end(name)
-        return found
+        return white
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""
-        found = np.zeros(len(self.level))
+        logdets = np.zeros(len(self.level))
         for place, steps, members in self._groups:
             kernel = self._kernels[place]
             whitener = self._whitener(place, steps, shares)
             white = 2.0 * float(np.sum(np.log(kernel.profile[kernel.there])))
-            found[members] = white if whitener is None else whitener[1]
-        return found
+            logdets[members] = white if whitener is None else whitener[1]
+        return logdets
 
     def white_noise(self) -> Noise:
         """White noise as stated by the errors."""

@@ -128,7 +128,7 @@ def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carrie
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
     """A class for every identified effect, the largest first."""
     held = {t.effect.id for t in base.terms}
-    model, found = final, []
+    model, classes = final, []
     for term in [t for t in final.terms if t.effect.id not in held]:
         group = class_of(field, model, term)
         best = next((m.term for m in group.members if not isinstance(m.term.effect, Handling)), term)
@@ -137,13 +137,13 @@ def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:
         ):  # a rival that is better beside the others replaces the effect, so that no other class contains it
             others = [t for t in model.terms if t is not term]
             model = Model(base.problem, [*others, best], near=model.noise)
-        found.append(group)
-    return sorted(found, key=lambda c: -c.size)
+        classes.append(group)
+    return sorted(classes, key=lambda c: -c.size)
 
 
 def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tuple[Named, ...]:
     """Errors after each class is added to those before it."""
-    found: list[Named] = []
+    named: list[Named] = []
     model = base
     before = left_out(base) if classes else None
     terms = [_first(group) for group in classes]
@@ -153,9 +153,9 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
         rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
         left = rms_of(residuals_of(problem, estimate(model))) if problem.lot.radial else fit_rms(problem, model.terms)
-        found.append(Named(group, left, *errors, carried=carried_by(rest, first)))
+        named.append(Named(group, left, *errors, carried=carried_by(rest, first)))
         before = after
-    return tuple(found)
+    return tuple(named)
 
 
 def _first(group: EffectClass) -> Term:

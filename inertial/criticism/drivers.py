@@ -56,18 +56,18 @@ class Misfit:
 def drivers_of(problem: Problem) -> list[Driver]:
     """Every driver that varies in a lot."""
     state = problem.lot.state
-    found = [
+    drivers = [
         Driver(name, partial(_by_block, problem, curve(values, knots)), values)
         for name, values, knots in quantities(state)
         if varies(values)
     ]
     pose = _pose_columns(state, most=max(4, (problem.n - 8) // 3))
     if pose.shape[-1]:
-        found.append(Driver("pose", partial(_by_block, problem, pose), None))
+        drivers.append(Driver("pose", partial(_by_block, problem, pose), None))
     approach = np.tanh(state.force_step / 0.05)
     if np.any(np.abs(approach) > 0.1):
-        found.append(Driver("approach", partial(_by_axis, problem, approach), None))
-    return found
+        drivers.append(Driver("approach", partial(_by_axis, problem, approach), None))
+    return drivers
 
 
 def quantities(state: State) -> list[tuple[str, Array, int]]:
@@ -105,7 +105,7 @@ def _natural(z: Array, knots: Array) -> list[Array]:
 
 def _pose_columns(state: State, most: int) -> Array:
     """Polynomials of the direction of gravity from second degree on, at most so many, (units, n, d)."""
-    found: list[Array] = []
+    columns: list[Array] = []
     f = np.moveaxis(state.force, -1, 0)
     for degree in (2, 3, 4):
         terms = [np.prod(f[list(c)], axis=0) for c in combinations_with_replacement(range(3), degree)]
@@ -113,10 +113,10 @@ def _pose_columns(state: State, most: int) -> Array:
         keep = [
             t for t, c in zip(terms, combinations_with_replacement(range(3), degree), strict=True) if c.count(2) < 2
         ]
-        if len(found) + len(keep) > most:
+        if len(columns) + len(keep) > most:
             break
-        found.extend(keep)
-    return np.stack(found, axis=-1) if found else np.zeros((*state.force.shape[:-1], 0))
+        columns.extend(keep)
+    return np.stack(columns, axis=-1) if columns else np.zeros((*state.force.shape[:-1], 0))
 
 
 def _by_block(problem: Problem, columns: Array) -> Candidate:
@@ -142,15 +142,15 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
     floor_variance : variance of an adequate model, in the unit of the space
     """
     excess = max(space.rss - space.dof * floor_variance, 1e-12)
-    found: list[Misfit] = []
+    misfits: list[Misfit] = []
     for driver in drivers:
         gain = space.gain(driver.candidate)
         drop, rank = float(gain.drop[0]), int(gain.rank[0])
         if rank:
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
-            found.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
-    return sorted(found, key=lambda p: (max(p.log_p, _CERTAIN), -p.share))
+            misfits.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
+    return sorted(misfits, key=lambda p: (max(p.log_p, _CERTAIN), -p.share))
 
 
 def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tuple[str, ...]:

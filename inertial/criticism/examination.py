@@ -96,18 +96,18 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
     """A run without bad dwells and handling errors, and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects))
     run.removed = bad_dwells(run.model())
-    found = mended(run)
+    searched = mended(run)
     for _ in range(_TURNS):
-        if not run.handled and not found.result.added:
+        if not run.handled and not searched.result.added:
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
-        whole = Problem(run.lot, slope=found.base.problem.slope)
-        kept = bad_dwells(Model(whole, found.model.terms, near=found.model.noise))
+        whole = Problem(run.lot, slope=searched.base.problem.slope)
+        kept = bad_dwells(Model(whole, searched.model.terms, near=searched.model.noise))
         if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
             break
         run.removed = kept
-        found = mended(run)
-    return run, found
+        searched = mended(run)
+    return run, searched
 
 
 @dataclass(frozen=True)
@@ -131,17 +131,17 @@ def mended(run: ExaminedRun) -> EffectSearch:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), alternatives())
         part = _part(fields, base)
-        found = search(part.field, part.base, stop=part.imitates)
-        if found.handling is None and part.field is not fields:
-            found = replace(search(fields, base, stop=part.imitates, start=found.added), ladder=found.ladder)
-        if found.handling is None or len(run.handled) >= _MENDED:
-            return EffectSearch(base, fields, part, found)
-        _mend(run, part.field, found, found.handling)
+        searched = search(part.field, part.base, stop=part.imitates)
+        if searched.handling is None and part.field is not fields:
+            searched = replace(search(fields, base, stop=part.imitates, start=searched.added), ladder=searched.ladder)
+        if searched.handling is None or len(run.handled) >= _MENDED:
+            return EffectSearch(base, fields, part, searched)
+        _mend(run, part.field, searched, searched.handling)
 
 
-def _mend(run: ExaminedRun, fields: Candidates, found: SearchResult, term: Term) -> None:
+def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
     """Remove a handling error from a run, and record it."""
-    model = found.model.with_term(term)
+    model = searched.model.with_term(term)
     group = class_of(fields, model, term)
     problem = fields.problem
     alternative, place = term.effect, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
@@ -149,11 +149,11 @@ def _mend(run: ExaminedRun, fields: Candidates, found: SearchResult, term: Term)
         raise TypeError(term.effect.id)
     size = model.shared_sizes(term)
     units = (int(place["unit"]),) if "unit" in place else ()
-    evidence, dwells = _happened(fields, found.model, term, alternative, size)
-    before, after = left_out(found.model), left_out(model)
+    evidence, dwells = _happened(fields, searched.model, term, alternative, size)
+    before, after = left_out(searched.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, evidence, carried_by(found.model, term)))
-    lot = alternative.settled(run.lot, size, _misfit(found.model, model), **place)
+    run.handled.append(Named(group, *errors, units, dwells, evidence, carried_by(searched.model, term)))
+    lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
     if lot is None:
         run.beside.append(term)
     else:

@@ -61,11 +61,11 @@ class Candidates:
 
     def gains(self, space: Space, leave: set[str], *, handling: bool = False) -> dict[str, Gain]:
         """Gain of every candidate that the model does not hold already."""
-        found: dict[str, Gain] = {}
+        gains: dict[str, Gain] = {}
         for effect in (*self.effects, *(self.handling if handling else ())):
             if effect.id not in leave:
-                found[effect.id] = self._gain(space, effect, None)
-        return found
+                gains[effect.id] = self._gain(space, effect, None)
+        return gains
 
     def _gain(self, space: Space, effect: AnyEffect | Handling, first: int | None) -> Gain:
         if isinstance(effect, OfOneDwell) and not self.problem.lot.radial:
@@ -89,9 +89,9 @@ class Candidates:
 
     def primary_gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
         """Gain of the leading column alone, for effects of several columns whose first is an effect of its own."""
-        found: dict[str, Gain] = {}
+        gains: dict[str, Gain] = {}
         for effect in self.effects:
             first = effect.primary
             if effect.id not in leave and first is not None:
-                found[effect.id] = self._gain(space, effect, first)
-        return found
+                gains[effect.id] = self._gain(space, effect, first)
+        return gains

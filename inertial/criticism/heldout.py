@@ -49,8 +49,8 @@ def fit_rms(problem: Problem, terms: Sequence[Term]) -> float:
 
 
 def _stacked(problem: Problem, terms: Sequence[Term]) -> Array:
-    found = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
-    return np.concatenate(found, axis=-1) if found else np.zeros((problem.blocks, problem.n, 0))
+    columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    return np.concatenate(columns, axis=-1) if columns else np.zeros((problem.blocks, problem.n, 0))
 
 
 class _solver:  # noqa: N801  # a function with a prepared factor

@@ -46,26 +46,26 @@ def influence(model: Model, term: Term | None) -> tuple[Influence, ...]:
     if term is not None and of_station(term):
         # what concerns all units is carried by a dwell in all of them: without it in one, the others say the same
         return _whole_dwells(each / whole)
-    found: list[Influence] = []
+    influences: list[Influence] = []
     for place in np.argsort(each, axis=None)[::-1][:_MOST].tolist():
         unit, dwell = divmod(place, model.problem.n)
         share = float(each[unit, dwell]) / whole
-        if share <= 0.0 or sum(f.share for f in found) > _CARRY:
+        if share <= 0.0 or sum(f.share for f in influences) > _CARRY:
             break
-        found.append(Influence(unit, dwell, share))
-    return tuple(found)
+        influences.append(Influence(unit, dwell, share))
+    return tuple(influences)
 
 
 def _whole_dwells(share: Array) -> tuple[Influence, ...]:
     """The dwells (units, n) that carry most over all units together, each in every unit."""
     total = share.sum(axis=0)
-    found: list[Influence] = []
+    influences: list[Influence] = []
     for dwell in np.argsort(total)[::-1][:_MOST_DWELLS].tolist():
-        if total[dwell] <= 0.0 or sum(f.share for f in found) > _CARRY:
+        if total[dwell] <= 0.0 or sum(f.share for f in influences) > _CARRY:
             break
         units = np.argsort(share[:, dwell])[::-1].tolist()
-        found += [Influence(unit, dwell, max(float(share[unit, dwell]), 0.0)) for unit in units]
-    return tuple(found)
+        influences += [Influence(unit, dwell, max(float(share[unit, dwell]), 0.0)) for unit in units]
+    return tuple(influences)
 
 
 @dataclass(frozen=True)

@@ -53,10 +53,10 @@ def left_out(model: Model) -> LeftOut:
         whole = np.full((model.problem.blocks, model.problem.n), np.nan)
         total, sound = 0.0, True
         for k in range(int(fold.max()) + 1):
-            found = parts.predicted(fold == k)
-            sound &= found is not None
-            if found is not None:
-                whole[:, fold == k], total = found[0], total + found[1]
+            predicted = parts.predicted(fold == k)
+            sound &= predicted is not None
+            if predicted is not None:
+                whole[:, fold == k], total = predicted[0], total + predicted[1]
         missed[kind] = whole
         if sound:
             density[kind] = total
@@ -157,15 +157,15 @@ def _folds(problem: Problem) -> dict[Kind, NDArray[np.intp]]:
     """Fold of every dwell, (n,), by kind."""
     state = problem.lot.state
     n = problem.n
-    found: dict[Kind, NDArray[np.intp]] = {"poses": _by_pose(problem)}
+    folds: dict[Kind, NDArray[np.intp]] = {"poses": _by_pose(problem)}
     number = soaks(state)
     if number.max() > 0:
-        found["soaks"] = number
+        folds["soaks"] = number
     order = np.argsort(state.time.reshape(-1, n)[0], kind="stable")
     stretch = np.empty(n, dtype=np.intp)
     stretch[order] = np.arange(n) * min(BLOCKS, n) // n
-    found["blocks of time"] = stretch
-    return found
+    folds["blocks of time"] = stretch
+    return folds
 
 
 def _by_pose(problem: Problem) -> NDArray[np.intp]:

@@ -80,8 +80,8 @@ def likelihood_ratio(model: Model, term: Term, places: int = 1) -> Ratio:
 
     def divided(shared: float) -> Ratio:
         by = max(shared, scatter)
-        found = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, places)
-        return replace(found, shared=shared, again=divided)
+        ratio = weighed(deviance * (1.0 - along * (1.0 - 1.0 / by)), rank, nonlinear, places)
+        return replace(ratio, shared=shared, again=divided)
 
     # by what the units share with the term inside: an effect common to all units is not noise
     return divided(shared_noise(richer))
@@ -117,8 +117,8 @@ def shared_noise(model: Model) -> float:
     if squares.size < 10:
         return 1.0
     lost = space.dof / max(int(model.problem.covariance.count.sum()), 1)
-    found = float(np.median(squares)) / _MEDIAN / max(lost, 0.1)
-    return found if found > 1.0 + TOGETHER * 2.33 / np.sqrt(squares.size) else 1.0
+    phi = float(np.median(squares)) / _MEDIAN / max(lost, 0.1)
+    return phi if phi > 1.0 + TOGETHER * 2.33 / np.sqrt(squares.size) else 1.0
 
 
 def of_station(term: Term) -> bool:
@@ -147,10 +147,10 @@ def scatter_of_poses(model: Model) -> float:
     largest = 1.0
     for quantile in _QUANTILES:
         expected = -2.0 * np.log1p(-quantile)
-        found = float(np.quantile(drop, quantile)) / expected
+        ratio = float(np.quantile(drop, quantile)) / expected
         # standard error of a quantile of exponential values, over the quantile
         error = 2.0 * np.sqrt(quantile / (1.0 - quantile) / drop.size) / expected
-        largest = max(largest, found if found > 1.0 + TOGETHER * error else 1.0)
+        largest = max(largest, ratio if ratio > 1.0 + TOGETHER * error else 1.0)
     return float(largest)
 
 

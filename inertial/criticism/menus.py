@@ -85,8 +85,8 @@ def pose_grid(reach: TableReach, temperature: float) -> list[SequenceStep]:
     named = [poses.plan(name) for name in ("twenty_six", "orthogonal24")]
     angles = np.radians(np.concatenate([poses.fibonacci(48), *named, *rings]))
     other = np.stack([-angles[:, 0], np.where(angles[:, 1] > 0.0, angles[:, 1] - np.pi, angles[:, 1] + np.pi)], axis=1)
-    found = [SequenceStep(float(o), float(i), temperature, reach.settle) for o, i in np.concatenate([angles, other])]
-    return [s for s in found if reach.allows(s)]
+    steps = [SequenceStep(float(o), float(i), temperature, reach.settle) for o, i in np.concatenate([angles, other])]
+    return [s for s in steps if reach.allows(s)]
 
 
 def _ring(axis: int, level: float) -> Array:
@@ -127,19 +127,19 @@ def courses(state: State, reach: TableReach, best: Sequence[SequenceStep], here:
     here : °C, present temperature of the chamber
     """
     chosen = _spread(best, reach, here)
-    found = [
+    sequences = [
         *_waits(here),
         *_approaches(state, reach, here, chosen),
         *_laters(chosen),
         *(_power_cycles(chosen) if reach.power and state.since_power is not None else ()),
     ]
     if reach.temperature is not None:
-        found += [
+        sequences += [
             *_excursions(reach, here, chosen),
             *_between(state, reach, here, chosen),
             *_ramps(reach, here, chosen),
         ]
-    return [c for c in found if c.steps and all(reach.allows(s) for s in c.steps)]
+    return [c for c in sequences if c.steps and all(reach.allows(s) for s in c.steps)]
 
 
 def _spread(best: Sequence[SequenceStep], reach: TableReach, here: float) -> list[SequenceStep]:
@@ -155,56 +155,56 @@ def _waits(here: float) -> list[StepSequence]:
         ((0.5 * np.pi, 0.0), (-0.5 * np.pi, 0.0)),
         ((0.5 * np.pi, 0.5 * np.pi), (0.5 * np.pi, -0.5 * np.pi)),
     )
-    found: list[StepSequence] = []
+    sequences: list[StepSequence] = []
     for waits in ((0.0, 20.0, 60.0), (0.0, 10.0, 30.0, 100.0, 300.0), (0.0, 0.0, 0.0, 120.0), (0.0, 600.0)):
         steps = [SequenceStep(o, i, here, w) for w in waits for pair in pairs for o, i in pair]
-        found.append(StepSequence("waits", tuple(steps)))
+        sequences.append(StepSequence("waits", tuple(steps)))
         short = [SequenceStep(o, i, here, w) for w in waits for o, i in pairs[0]]
-        found.append(StepSequence("waits", tuple(short)))
+        sequences.append(StepSequence("waits", tuple(short)))
     stay = [0.0, *[0.0] * 7]
     dwell_on = [SequenceStep(o, i, here, w) for pair in pairs for o, i in pair for w in stay]
-    found.append(
+    sequences.append(
         StepSequence("waits", tuple(dwell_on))
     )  # dwell after dwell at one pose: the whole settling is measured
-    return found
+    return sequences
 
 
 def _approaches(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """Poses reached from both sides of each axis; the poses of the run in the opposite order."""
-    found: list[StepSequence] = []
+    sequences: list[StepSequence] = []
     for count in (2, 4):
         steps: list[SequenceStep] = []
         for pose in chosen[:count]:
             for outer, inner in ((_DETOUR, 0.0), (-_DETOUR, 0.0), (0.0, _DETOUR), (0.0, -_DETOUR)):
                 steps += [replace(pose, outer=pose.outer + outer, inner=pose.inner + inner), pose]
-        found.append(StepSequence("approach", tuple(steps)))
+        sequences.append(StepSequence("approach", tuple(steps)))
     if state.outer is not None and state.inner is not None:
         last = range(n_of(state) - 2, max(n_of(state) - 26, -1), -1)
         outer, inner = np.atleast_2d(state.outer)[0], np.atleast_2d(state.inner)[0]
         back = [SequenceStep(float(outer[k]), float(inner[k]), here, reach.settle) for k in last]
-        found += [StepSequence("approach", tuple(back[:12])), StepSequence("approach", tuple(back))]
-    return found
+        sequences += [StepSequence("approach", tuple(back[:12])), StepSequence("approach", tuple(back))]
+    return sequences
 
 
 def _laters(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """The same poses again and again, with waiting time in between."""
-    found: list[StepSequence] = []
+    sequences: list[StepSequence] = []
     for wait, times in ((120.0, 3), (600.0, 1), (600.0, 3), (1800.0, 1), (1800.0, 2)):
         group = [replace(chosen[0], wait=wait), *chosen[1:], chosen[0]]
-        found.append(StepSequence("later", tuple(group * times)))
-    return found
+        sequences.append(StepSequence("later", tuple(group * times)))
+    return sequences
 
 
 def _power_cycles(chosen: Sequence[SequenceStep]) -> list[StepSequence]:
     """A pose before and after the devices were off for a while, and again as they warm up, with another opposite to it."""
     first, second = chosen[0], chosen[1]
-    found: list[StepSequence] = []
+    sequences: list[StepSequence] = []
     for off, later in product((300.0, 600.0, 1800.0), ((), (60.0,), (60.0, 300.0), (60.0, 300.0, 900.0))):
         before = [first, second, first, second]
         after = [replace(first, off=off), second, first, second]
         again = [step for wait in later for step in (replace(first, wait=wait), second, first, second)]
-        found.append(StepSequence("power", (*before, *after, *again)))
-    return found
+        sequences.append(StepSequence("power", (*before, *after, *again)))
+    return sequences
 
 
 def _excursions(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
@@ -219,12 +219,12 @@ def _excursions(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) 
         (up, here), (down, here), (up, down, here), (near_up, here), (near_down, here), (near_up, near_down, here),
         (high, middle), (low, middle), (high, middle, low), (low, middle, high), (high, low), (low, high),
     )  # fmt: skip
-    found: list[StepSequence] = []
+    sequences: list[StepSequence] = []
     for way, count in product(dict.fromkeys(ways), (2, 4)):
         stops = [t for k, t in enumerate(way) if abs(t - (way[k - 1] if k else here)) > 1.0]
         steps = [replace(pose, temperature=t) for t in stops for pose in chosen[:count]]
-        found.append(StepSequence("excursion", tuple(steps)))
-    return found
+        sequences.append(StepSequence("excursion", tuple(steps)))
+    return sequences
 
 
 def _between(state: State, reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
@@ -236,13 +236,13 @@ def _between(state: State, reach: TableReach, here: float, chosen: Sequence[Sequ
     halves = np.round(0.5 * (soaks[apart] + soaks[apart + 1]), 1)
     low, wide = soaks[apart], np.diff(soaks)[apart]
     quarters = np.round(np.concatenate([low + 0.25 * wide, low + 0.75 * wide]), 1)
-    found: list[StepSequence] = []
+    sequences: list[StepSequence] = []
     for stops in (halves, np.sort(quarters), np.sort(np.concatenate([halves, quarters]))):
         way = stops[:_STOPS] if abs(stops[0] - here) <= abs(stops[-1] - here) else stops[::-1][:_STOPS]
         for count in (2, 4):
             steps = [replace(pose, temperature=float(t)) for t in way for pose in chosen[:count]]
-            found.append(StepSequence("excursion", tuple(steps)))
-    return found
+            sequences.append(StepSequence("excursion", tuple(steps)))
+    return sequences
 
 
 def _ramps(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> list[StepSequence]:
@@ -250,11 +250,11 @@ def _ramps(reach: TableReach, here: float, chosen: Sequence[SequenceStep]) -> li
     if reach.temperature is None:
         return []
     low, high = reach.temperature
-    found: list[StepSequence] = []
+    sequences: list[StepSequence] = []
     for away, times in product((min(high, here + _EXCURSION_K), max(low, here - _EXCURSION_K)), (8, 20)):
         if abs(away - here) < 5.0:
             continue
         out = [replace(chosen[k % 2], temperature=away, soaked=False, wait=15.0) for k in range(times)]
         back = [replace(s, temperature=here) for s in out]
-        found += [StepSequence("ramp", tuple(out)), StepSequence("ramp", (*out, *back))]
-    return found
+        sequences += [StepSequence("ramp", tuple(out)), StepSequence("ramp", (*out, *back))]
+    return sequences

@@ -95,24 +95,24 @@ class Model:
     @cached_property
     def local(self) -> Array:
         """Columns with coefficients by block, (blocks, n, p)."""
-        found = [self._of(t) for t in self.terms if not t.shared]
-        found += [self._start(t) for t in self.terms if not t.shared]
+        columns = [self._of(t) for t in self.terms if not t.shared]
+        columns += [self._start(t) for t in self.terms if not t.shared]
         if self._curves is not None:
-            found.append(self._curves)
-        if not found:
+            columns.append(self._curves)
+        if not columns:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
-        return np.concatenate(found, axis=-1)
+        return np.concatenate(columns, axis=-1)
 
     @cached_property
     def shared(self) -> Array:
         """Columns with coefficients of all blocks, (blocks, n, q)."""
-        found = [self._of(t) for t in self.terms if t.shared]
+        columns = [self._of(t) for t in self.terms if t.shared]
         if self._shared_curves is not None:
-            found.append(self._shared_curves)
-        if not found:
+            columns.append(self._shared_curves)
+        if not columns:
             return np.zeros((self.problem.blocks, self.problem.n, 0))
-        found += [self._start(t) for t in self.terms if t.shared]
-        return np.concatenate(found, axis=-1)
+        columns += [self._start(t) for t in self.terms if t.shared]
+        return np.concatenate(columns, axis=-1)
 
     def _of(self, term: Term) -> Array:
         columns = self.problem.columns(term.effect, term.keywords)
@@ -235,8 +235,8 @@ class Model:
             count = self._of(other).shape[-1]
             if other is term:
                 space = self.space
-                found = np.linalg.lstsq(space.gram[1:, 1:], space.gram[1:, 0], rcond=1e-10)[0]
-                return found[at : at + count].astype(np.float64)
+                sizes = np.linalg.lstsq(space.gram[1:, 1:], space.gram[1:, 0], rcond=1e-10)[0]
+                return sizes[at : at + count].astype(np.float64)
             at += count
         return np.zeros(0)
 
@@ -273,14 +273,14 @@ class Model:
     def with_term(self, term: Term) -> "Model":
         """The model with one more term; the last few are kept, as a term is fitted, judged and sized one after the other."""
         key = (term.effect.id, term.values, term.first, term.rest)
-        found = self._richer.get(key)
-        if found is None:
-            found = self._variant([*self.terms, term], simpler=self)
+        richer = self._richer.get(key)
+        if richer is None:
+            richer = self._variant([*self.terms, term], simpler=self)
             if self.problem.y.size <= LARGE:
                 while len(self._richer) >= _RICHER:
                     del self._richer[next(iter(self._richer))]
-                self._richer[key] = found
-        return found
+                self._richer[key] = richer
+        return richer
 
     def with_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, sized by block."""

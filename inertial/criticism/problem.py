@@ -192,14 +192,14 @@ class Problem:
                 key = (effect.id, unit, len(each), *each[0].items(), *each[-1].items())
                 kept = self._kept.get(key)
                 if kept is None:
-                    found = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
+                    changes = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
                     blocks = None
                     if unit is None:
-                        found = [np.broadcast_to(f, (units, *f.shape[1:])) for f in found]
+                        changes = [np.broadcast_to(f, (units, *f.shape[1:])) for f in changes]
                     else:
                         blocks = 3 * int(on_axis({"unit": unit}, 0)["unit"]) + np.arange(3)
                     kept = Candidate(
-                        np.stack([by_block(f) for f in found], axis=2), shared=True, blocks=blocks, key=key
+                        np.stack([by_block(f) for f in changes], axis=2), shared=True, blocks=blocks, key=key
                     )
                     if kept.columns.size < self._room:
                         self._room -= kept.columns.size

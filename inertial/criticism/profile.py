@@ -98,12 +98,12 @@ class LikelihoodProfile:
                     for v in around(parameter, on_scale(parameter, _value(best[r], parameter, axis)), width)
                 ]
                 total, axes = self._over(wrong, tried)
-                found = total if axis is None or axes is None else axes[axis]
+                squares = total if axis is None or axes is None else axes[axis]
                 count = len(tried) // len(best)
                 for r in truths:
-                    place = r * count + int(np.argmin(found[r * count : (r + 1) * count, r]))
-                    if found[place, r] < least[r]:
-                        best[r], least[r] = tried[place], found[place, r]
+                    place = r * count + int(np.argmin(squares[r * count : (r + 1) * count, r]))
+                    if squares[place, r] < least[r]:
+                        best[r], least[r] = tried[place], squares[place, r]
                 width *= 0.4
         return best, least
 
@@ -119,10 +119,10 @@ class LikelihoodProfile:
             left = left / np.where(size > 0.0, size, 1.0)
             flat = self.targets.reshape(blocks * n, -1)
             shared = self.shared.reshape(blocks * n, -1)
-            found = [
+            squares = [
                 _after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
             ]
-            return np.array(found), None
+            return np.array(squares), None
         left = left / np.where(size > 0.0, size, 1.0)[:, None]
         return self._local(left)
 
@@ -153,10 +153,10 @@ class LikelihoodProfile:
 
 
 def _value(values: Values, parameter: Nonlinear, axis: int | None) -> float:
-    found = values[parameter.name]
-    if isinstance(found, tuple):
-        return float(np.mean(found)) if axis is None else found[axis]
-    return found
+    value = values[parameter.name]
+    if isinstance(value, tuple):
+        return float(np.mean(value)) if axis is None else value[axis]
+    return value
 
 
 def _after(columns: Array, targets: Array) -> Array:

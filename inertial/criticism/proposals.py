@@ -105,9 +105,13 @@ def proposal(
     if never[0, 1:].all():
         return None
     scores = np.array([m.score for m in group.members[:_MEMBERS]])
-    found = ProposalSearch(RivalDiscrimination(rivals, scores, every, never), around, already).best()
+    proposed = ProposalSearch(RivalDiscrimination(rivals, scores, every, never), around, already).best()
     # a measurement that may separate nothing is not worth its station time
-    return None if found is None or len(found.remaining) == len(rivals.terms) - 1 else replace(found, ids=rivals.ids)
+    return (
+        None
+        if proposed is None or len(proposed.remaining) == len(rivals.terms) - 1
+        else replace(proposed, ids=rivals.ids)
+    )
 
 
 def twins(model: Model, group: EffectClass, around: Circumstances | None = None) -> tuple[str, ...]:
@@ -136,8 +140,8 @@ def sighting(
     if not terms:
         return None
     rivals = rivals_of(model, [], model.terms)
-    found = ProposalSearch(Sighting(rivals, terms), around, already).best()
-    return None if found is None else replace(found, pair=())
+    proposed = ProposalSearch(Sighting(rivals, terms), around, already).best()
+    return None if proposed is None else replace(proposed, pair=())
 
 
 def _goes_on(model: Model) -> bool:
@@ -172,8 +176,8 @@ class ProposalSearch:
         self.pace, self.budget, self.least = around.pace, around.budget, aim.least
         # dwells during a ramp disturb every effect of temperature: only for effects that respond to its rate
         answers = [_drivers(self.state, t) for t in aim.terms]
-        self.rated = any("rate" in found for found in answers)
-        self.timed = any("since_power" in found for found in answers)
+        self.rated = any("rate" in drivers for drivers in answers)
+        self.timed = any("since_power" in drivers for drivers in answers)
 
     def best(self) -> Proposal | None:
         """Sequences in order, each the best after those before it, until the aim is reached or nothing more helps.

@@ -92,10 +92,10 @@ def robust_fit(force: Array, output: Array) -> Array:
     x = np.concatenate([np.ones((int(there.sum()), 1)), force[there]], axis=-1)
     y = output[there]
     weight = np.ones(len(y))
-    found = np.zeros((4, 3))
+    coefficients = np.zeros((4, 3))
     for turn in range(_ROUNDS):
-        found = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0].astype(np.float64)
-        size = np.linalg.norm(y - x @ found, axis=1)
+        coefficients = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0].astype(np.float64)
+        size = np.linalg.norm(y - x @ coefficients, axis=1)
         middle = float(np.median(size))
         if middle <= 0.0:
             break
@@ -105,7 +105,7 @@ def robust_fit(force: Array, output: Array) -> Array:
         )
         if np.count_nonzero(weight) < 5:
             break
-    return found.T
+    return coefficients.T
 
 
 def _biweight(u: Array) -> Array:
@@ -159,8 +159,8 @@ def find_split(force: Array, output: Array) -> Split | None:
 
 def _plain_fit(force: Array, output: Array) -> tuple[Array, float]:
     x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
-    found = np.linalg.lstsq(x, output, rcond=1e-9)[0].astype(np.float64)
-    return found, float(np.sum((output - x @ found) ** 2))
+    coefficients = np.linalg.lstsq(x, output, rcond=1e-9)[0].astype(np.float64)
+    return coefficients, float(np.sum((output - x @ coefficients) ** 2))
 
 
 def exchanged(one: Split, other: Split) -> bool:

@@ -67,13 +67,13 @@ def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) 
     for axis in range(3):
         values = parameter.grid()
         width, taken = cell(parameter), 0.0
-        found = float(values[0])
+        value = float(values[0])
         for _ in range(4):
             by_axis = space.gain(_varied(problem, term, parameter, values)).by_block[axis::3].sum(axis=0)
-            found = float(values[int(np.argmax(by_axis))])
+            value = float(values[int(np.argmax(by_axis))])
             taken = float(by_axis.max())
-            values, width = around(parameter, on_scale(parameter, found), width), 0.4 * width
-        best.append(found)
+            values, width = around(parameter, on_scale(parameter, value), width), 0.4 * width
+        best.append(value)
         total += taken
     if total - common < decisions.AXES_DIFFER * space.variance:
         return term
@@ -136,9 +136,9 @@ def settled(model: Model) -> Model:
     stay.
     """
     terms = list(model.terms)
-    for place, found in enumerate(model.terms):
-        term = found
-        for parameter in _continuous(model.problem, found):
+    for place, original in enumerate(model.terms):
+        term = original
+        for parameter in _continuous(model.problem, original):
             rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
             values, drop = _profile(rest.at(model.noise), model.problem, term, parameter)
             term = _with_value(term, parameter, float(values[int(np.argmax(drop))]))
@@ -152,16 +152,16 @@ def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
     Within it the sum of squares rises by less than one variance of the noise above its least value; an interval that ends at a
     bound of the parameter is open there.
     """
-    found: dict[str, dict[str, tuple[float, float]]] = {}
+    by_effect: dict[str, dict[str, tuple[float, float]]] = {}
     for place, term in enumerate(model.terms):
         for parameter in _continuous(model.problem, term):
             rest = Model(model.problem, [t for k, t in enumerate(model.terms) if k != place], near=model.noise)
             space = rest.at(model.noise)
             values, drop = _profile(space, model.problem, term, parameter)
             inside = values[drop >= drop.max() - space.variance]
-            own = found.setdefault(term.effect.id, {})
+            own = by_effect.setdefault(term.effect.id, {})
             own[parameter.name] = float(inside.min()), float(inside.max())
-    return found
+    return by_effect
 
 
 _PLACES = 81

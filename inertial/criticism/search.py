@@ -178,9 +178,9 @@ def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[fl
         return 0.0, place
     several = len(field.grids[name]) > 1 and field.places(name) == 1
     nonlinear = len(field.grids[name][0]) if several else 0
-    found = weighed(float(falls[place]), int(gain.rank[place]), nonlinear, field.places(name))
-    likely = found.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
-    return (0.0 if likely else found.score), place
+    ratio = weighed(float(falls[place]), int(gain.rank[place]), nonlinear, field.places(name))
+    likely = ratio.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW)
+    return (0.0 if likely else ratio.score), place
 
 
 def _exact(field: Candidates, model: Model, term: Term) -> Rival:

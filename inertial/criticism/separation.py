@@ -95,9 +95,9 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most:
 
 def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
     """Coefficients of the first term of a model: of some blocks, or shared."""
-    found = estimate(model)
+    fit = estimate(model)
     columns = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
-    return found.shared[:columns] if term.shared else found.local[list(blocks), :columns]
+    return fit.shared[:columns] if term.shared else fit.local[list(blocks), :columns]
 
 
 @dataclass(frozen=True)
@@ -160,12 +160,12 @@ def residual_squares(model: Model, targets: Array, noise: Noise) -> Array:
 
 def predictions(rivals: Rivals, problem: Problem) -> Array:
     """Contribution of each rival to the series of a problem of the same units, (blocks, n, r), g."""
-    found: list[Array] = []
+    contributions: list[Array] = []
     for term, coefficients in zip(rivals.terms, rivals.predicted, strict=True):
         columns = problem.columns(term.effect, term.keywords)[..., : term.first]
         own = np.einsum("bnp,bp->bn", columns, np.broadcast_to(coefficients, (columns.shape[0], columns.shape[-1])))
-        found.append(own)
-    return np.stack(found, axis=-1)
+        contributions.append(own)
+    return np.stack(contributions, axis=-1)
 
 
 def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | None) -> Problem:

@@ -36,19 +36,19 @@ def _together(model: Model, units: int) -> float:
     """Correlation of the residuals between units, on the same axis; zero if within chance."""
     problem = model.problem
     left = np.nan_to_num(residuals(problem, model.terms, np.ones(problem.n, dtype=bool)) / problem.error)
-    found = _pairwise(left.reshape(units, -1))
+    correlation = _pairwise(left.reshape(units, -1))
     chance = 1.0 / np.sqrt(left.size / units * units * (units - 1) / 2.0)
-    return found if found > decisions.UNITS_TOGETHER * chance else 0.0
+    return correlation if correlation > decisions.UNITS_TOGETHER * chance else 0.0
 
 
 def _alike(model: Model, term: Term, units: int) -> float:
     """Part of a term that is equal in every unit, 0 … 1."""
-    found = estimate(model)
+    fit = estimate(model)
     at = 0
     for other in (t for t in model.terms if not t.shared):
         columns = model.problem.columns(other.effect, other.keywords)[..., : other.first]
         if other.effect.id == term.effect.id:
-            series = np.einsum("bnp,bp->bn", columns, found.local[:, at : at + columns.shape[-1]])
+            series = np.einsum("bnp,bp->bn", columns, fit.local[:, at : at + columns.shape[-1]])
             series = (series - series.mean(axis=1, keepdims=True)) / model.problem.error
             return max(_pairwise(series.reshape(units, -1)), 0.0)
         at += columns.shape[-1]

@@ -21,7 +21,7 @@ def slope_of(model: Model) -> Array | None:
     state = lot.state
     if state.temperature is None or lot.radial:
         return None
-    found = estimate(model)
+    fit = estimate(model)
     ends: list[Array] = []
     for sign in (1.0, -1.0):
         history = (
@@ -29,10 +29,10 @@ def slope_of(model: Model) -> Array | None:
         )
         moved = replace(state, temperature=state.temperature + sign * _STEP, history=history, memory={})
         problem = Problem(replace(lot, state=moved))
-        local = [t for t in found.terms if not t.shared]
+        local = [t for t in fit.terms if not t.shared]
         columns = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in local]
         whole = np.concatenate(columns, axis=-1)
-        ends.append(np.einsum("bnp,bp->bn", whole, found.local[:, : whole.shape[-1]]))
+        ends.append(np.einsum("bnp,bp->bn", whole, fit.local[:, : whole.shape[-1]]))
     slope = (ends[0] - ends[1]) / (2.0 * _STEP)
     if float(np.max(np.abs(slope))) <= 0.0:
         return None

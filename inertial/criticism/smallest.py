@@ -38,13 +38,13 @@ def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
     spaces = model.at(noise), model.at(Noise(Shares(), noise.scale, noise.prior))
     least = MATERIAL * model.scatter()
     held = {t.effect.id for t in model.terms}
-    found: list[Smallest] = []
+    smallest: list[Smallest] = []
     for name in (e.id for e in field.effects if e.id not in held):
         sizes = _sizes(field, model, spaces, name, least)
         sizes = sizes[:, np.isfinite(sizes).all(axis=0) & (sizes > 0.0).all(axis=0)]
         if sizes.size:
-            found.append(Smallest(name, *np.median(sizes, axis=1).tolist()))
-    return sorted(found, key=lambda s: -s.size / s.without_slow)
+            smallest.append(Smallest(name, *np.median(sizes, axis=1).tolist()))
+    return sorted(smallest, key=lambda s: -s.size / s.without_slow)
 
 
 def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: str, least: float) -> Array:

@@ -34,8 +34,8 @@ def never_apart(rivals: Rivals, reach: TableReach | None, pace: StationPace) -> 
     steps = everything(state, reach or reach_of(state), pace)
     if not steps:
         return ~np.eye(len(rivals.terms), dtype=bool)
-    found = apart(rivals, steps, pace)
-    same = found.left < NOTHING * np.maximum(found.whole, 1e-300)[:, None]
+    separation = apart(rivals, steps, pace)
+    same = separation.left < NOTHING * np.maximum(separation.whole, 1e-300)[:, None]
     np.fill_diagonal(same, val=False)
     return same
 

@@ -45,22 +45,22 @@ class Suspect:
 def suspects(problem: Problem) -> list[Suspect]:
     """Every driver that varies in a lot, as columns of a flexible curve."""
     state = problem.lot.state
-    found: list[Suspect] = []
+    suspected: list[Suspect] = []
     for name, values, _ in quantities(state):
         if varies(values) and not (name == "chamber_C" and _alike_to(values, state.temperature)):
             knots = _TIME_KNOTS if is_clock(name) else _KNOTS
             each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
-            found.append(Suspect(name, _alike(problem, curve(values, knots)), each))
+            suspected.append(Suspect(name, _alike(problem, curve(values, knots)), each))
             # levels in time, one for each soak, could follow any memory of temperature: a dependence on time is smooth
             steps = None if is_clock(name) else _levels(values)
             if steps is not None:
-                found.append(Suspect(name, _alike(problem, steps)))
+                suspected.append(Suspect(name, _alike(problem, steps)))
     if not problem.lot.radial:
         own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
-        found.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
-        found += _table(problem)
-    found += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
-    return found
+        suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
+        suspected += _table(problem)
+    suspected += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
+    return suspected
 
 
 def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) -> tuple[CurveFit, list[Term]] | None:
@@ -205,11 +205,11 @@ def _table(problem: Problem) -> list[Suspect]:
     state = problem.lot.state
     if state.outer is None or state.inner is None:
         return []
-    found: list[Suspect] = []
+    suspected: list[Suspect] = []
     for name, angle in (("outer_deg", state.outer), ("inner_deg", state.inner)):
         if np.ptp(angle) > 0.1:
             turns = [h for k in range(1, _HARMONICS + 1) for h in (np.sin(k * angle), np.cos(k * angle))]
             tilts = [frames.to_fixture(v, state.outer, state.inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
             change = np.stack([t[..., None] * v for t in turns for v in tilts], axis=-1)
-            found.append(Suspect(name, _columns(problem.seen(change), shared=True)))
-    return found
+            suspected.append(Suspect(name, _columns(problem.seen(change), shared=True)))
+    return suspected

@@ -48,6 +48,6 @@ def _at(squares: Array, dof: Array, prior: float) -> tuple[float, float]:
         if abs(again / centre - 1.0) < 1e-5:
             break
         centre = again
-    found = (dof + prior) * np.log(squares + prior * centre) - prior * np.log(prior * centre)
-    found = found - 2.0 * gammaln(0.5 * (dof + prior)) + 2.0 * gammaln(0.5 * prior)
-    return float(np.sum(found)), centre
+    terms = (dof + prior) * np.log(squares + prior * centre) - prior * np.log(prior * centre)
+    terms = terms - 2.0 * gammaln(0.5 * (dof + prior)) + 2.0 * gammaln(0.5 * prior)
+    return float(np.sum(terms)), centre

@@ -78,10 +78,10 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     rng : draws the noise that adequacy is measured against
     """
     run, search = examined(lot, effects)
-    base, found = search.base, search.result
+    base, searched = search.base, search.result
     drivers = drivers_of(base.problem)
     log_p = adequacy(search.field, drivers, base, rng)
-    removed = tuple(with_tails(found.model, run.removed)) if run.removed else ()
+    removed = tuple(with_tails(searched.model, run.removed)) if run.removed else ()
     named_data = bool(run.handled) or any(not d.tail for d in removed)
     rms = _rms(base)
     unjudged = not_judged(base, rms)
@@ -90,14 +90,14 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
         unjudged = "the probability of the residuals is undefined; add poses in between"
     if unjudged:
         # data that cannot judge the model cannot identify missing effects either
-        found = SearchResult(base, (), found.ladder)
-    sound = passed is True and not found.added
-    final, unexplained = (found.model, None) if sound or unjudged else _beyond(search.part, base, found, drivers)
+        searched = SearchResult(base, (), searched.ladder)
+    sound = passed is True and not searched.added
+    final, unexplained = (searched.model, None) if sound or unjudged else _beyond(search.part, base, searched, drivers)
     return Verdict(
         run=run,
         search=search,
         drivers=drivers,
-        result=found,
+        result=searched,
         final=final,
         unexplained=unexplained,
         removed=removed,
@@ -124,16 +124,18 @@ def _rms(base: Model) -> float:
     return fit_rms(base.problem, base.terms)
 
 
-def _beyond(part: LotPart, base: Model, found: SearchResult, drivers: list[Driver]) -> tuple[Model, Unexplained | None]:
+def _beyond(
+    part: LotPart, base: Model, searched: SearchResult, drivers: list[Driver]
+) -> tuple[Model, Unexplained | None]:
     """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
-    instead = better_curve(part.base, found.added, part.suspected) if found.added else None
+    instead = better_curve(part.base, searched.added, part.suspected) if searched.added else None
     if instead is not None:
         fit, kept = instead
         before = part.base.at(fit.model.noise)
         drop = max(before.rss - fit.model.space.rss, 0.0)
         log_p = log_p_value(before, drop, fit.rank) + float(np.log(len(part.suspected)))
         return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
-    final = found.model
+    final = searched.model
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
     if not convincing:
         return final, None

@@ -132,8 +132,8 @@ def _rows(points: Spins, effects: Sequence[str]) -> Array:
 
 def _uncertain_radii(points: Spins) -> list[float]:
     """The radii whose errors are unknowns: those of several; the error of a single one is in the scale."""
-    found = np.unique(points.radius_m).tolist()
-    return found if len(found) > 1 and points.radius_error_m > 0.0 else []
+    radii = np.unique(points.radius_m).tolist()
+    return radii if len(radii) > 1 and points.radius_error_m > 0.0 else []
 
 
 def _verdict(

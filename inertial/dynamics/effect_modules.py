@@ -25,7 +25,7 @@ def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str
     IncompleteEffect
         A module does not define exactly one effect with its own name.
     """
-    found: dict[str, Found] = {}
+    effects: dict[str, Found] = {}
     for info in iter_modules(list(path)):
         if info.name == "base":
             continue
@@ -35,5 +35,5 @@ def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str
         ]
         if len(own) != 1 or own[0].id != info.name:
             raise IncompleteEffect(f"{package}.{info.name}: one effect with id '{info.name}' is needed; define it")
-        found[info.name] = own[0]()
-    return found
+        effects[info.name] = own[0]()
+    return effects

@@ -47,10 +47,10 @@ def missing_classes(
     best, current = base, list(effects)
     while len(classes) < MOST_ADDED and not adequate(best):
         left = [name for name in candidates if name not in current]
-        found = _next_class(best, current, left, fit_of)
-        if found is None:
+        next_class = _next_class(best, current, left, fit_of)
+        if next_class is None:
             break
-        one, best = found
+        one, best = next_class
         classes.append(one)
         current.append(one.effects[0])
     return tuple(classes), best

@@ -162,9 +162,9 @@ def short_noise(record: Array, rate_hz: float, *, trend: int = 0) -> ShortNoise:
     place = np.linspace(-1.0, 1.0, means.size)
     kernel = toeplitz(logarithmic_kernel(means.size) + np.log(means.size) + 1.0)
     known = white / size * np.eye(means.size) + 1e-12 * float(np.var(means)) * np.eye(means.size)
-    found = wander(np.vander(place, trend + 1), means, known, kernel)
+    flicker = wander(np.vander(place, trend + 1), means, known, kernel)
     octave = 2.0 * np.log(2.0)
-    return ShortNoise(white / rate_hz, octave * found.variance, octave * found.error)
+    return ShortNoise(white / rate_hz, octave * flicker.variance, octave * flicker.error)
 
 
 def difference_variance(window_s: float, apart_s: float = 0.0) -> float:

@@ -94,10 +94,10 @@ def diagnose_transfer(
     classes: list[EffectClass] = []
     best, current = base, list(effects)
     while len(classes) < MOST_ADDED and goodness.adequate(best) is False:
-        found = _next_class(points, best, current)
-        if found is None:
+        next_class = _next_class(points, best, current)
+        if next_class is None:
             break
-        one, best = found
+        one, best = next_class
         classes.append(one)
         current.append(one.effects[0])
     unexplained = goodness.adequate(best) is False
@@ -172,12 +172,12 @@ def _where(points: Points, fit: TransferFit) -> tuple[Failure, ...]:
     order = np.argsort(points.conditions.frequency)
     squares = {"magnitude": fit.residual[:n] ** 2, "phase": fit.residual[n:] ** 2}
     total = float(sum(one.sum() for one in squares.values()))
-    found: list[Failure] = []
+    failures: list[Failure] = []
     for part, one in squares.items():
         for rows in np.array_split(order, 3):
             f = points.conditions.frequency[rows]
-            found.append(Failure(float(f.min()), float(f.max()), part, float(one[rows].sum()) / total))
-    return tuple(sorted((one for one in found if one.share > 1.0 / 6.0), key=lambda one: -one.share))
+            failures.append(Failure(float(f.min()), float(f.max()), part, float(one[rows].sum()) / total))
+    return tuple(sorted((one for one in failures if one.share > 1.0 / 6.0), key=lambda one: -one.share))
 
 
 def _left_out(points: Points, effects: Sequence[str]) -> float:

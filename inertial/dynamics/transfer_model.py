@@ -210,12 +210,12 @@ def _starts(parameters: Sequence[Parameter], near: Mapping[str, float], log: NDA
     choices = [(near[p.name],) if p.name in near else p.starts for p in parameters]
     whole = list(product(*choices))
     step = max(1, -(-len(whole) // MOST_STARTS))
-    found: list[Array] = []
+    starts: list[Array] = []
     for one in whole[::step]:
         clipped = [
             min(max(value, p.low * (1.0 + 1e-9) if p.log else p.low), p.high)
             for value, p in zip(one, parameters, strict=True)
         ]
         x = np.array(clipped, dtype=np.float64)
-        found.append(np.where(log, np.log(np.where(log, x, 1.0)), x) if len(x) else x)
-    return found
+        starts.append(np.where(log, np.log(np.where(log, x, 1.0)), x) if len(x) else x)
+    return starts

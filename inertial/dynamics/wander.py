@@ -53,8 +53,8 @@ def wander(rows: Array, output: Array, known: Array, kernel: Array) -> Wander:
         rest = y - x @ np.linalg.solve(normal, x.T @ y)
         return float(2.0 * np.sum(np.log(np.diag(root))) + np.linalg.slogdet(normal)[1] + rest @ rest)
 
-    found: Any = minimize_scalar(cost, bounds=(np.log(1e-6 * size), np.log(1e3 * size)), method="bounded")
-    variance = float(np.exp(found.x))
+    minimum: Any = minimize_scalar(cost, bounds=(np.log(1e-6 * size), np.log(1e3 * size)), method="bounded")
+    variance = float(np.exp(minimum.x))
     inverse = np.linalg.inv(known + variance * kernel)
     free = inverse - inverse @ rows @ np.linalg.solve(rows.T @ inverse @ rows, rows.T @ inverse)
     own = free @ kernel
@@ -119,8 +119,8 @@ class Posterior:
         def outside(half: float) -> float:
             return float(2.0 * self.probability @ norm.cdf(-half / np.maximum(each, 1e-300)) - 0.05)
 
-        found: Any = brentq(outside, 0.0, FARTHEST * top)
-        return float(found / norm.ppf(0.975))
+        half_width: Any = brentq(outside, 0.0, FARTHEST * top)
+        return float(half_width / norm.ppf(0.975))
 
 
 def wander_posterior(rows: Array, output: Array, white: float, kernel: Array) -> Posterior:

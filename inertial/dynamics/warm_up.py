@@ -72,10 +72,10 @@ def entered(time: Array, record: Array, *, band: float, window_s: float) -> Warm
         tries = (
             (start, reach) for reach in reaches for start in starts
         )  # noise has left the band late: it crosses before
-        found = next((one for start, reach in tries if (one := _crossing(time, away, band, start, reach))), None)
-        if found is None:
+        crossing = next((one for start, reach in tries if (one := _crossing(time, away, band, start, reach))), None)
+        if crossing is None:
             break
-        at, slope, weights, of_slope = found
+        at, slope, weights, of_slope = crossing
         shares = weights - tail
         over = variance_of_sum(shares) / (2.0 * np.log(2.0))  # variance over F², h = F²/(2 ln 2)
         variance = noise.flicker * over + noise.white / step * float(np.sum(shares**2))

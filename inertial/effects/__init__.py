@@ -40,15 +40,15 @@ class BrokenEffect(InertialError):
 
 @cache
 def _built_in() -> dict[str, AnyEffect]:
-    found: dict[str, AnyEffect] = {}
+    effects: dict[str, AnyEffect] = {}
     for info in pkgutil.iter_modules(__path__):
-        _collect(importlib.import_module(f"{__name__}.{info.name}"), found)
+        _collect(importlib.import_module(f"{__name__}.{info.name}"), effects)
     for point in entry_points(group="tumbleline.effects"):
-        _collect_point(point, found)
-    return found
+        _collect_point(point, effects)
+    return effects
 
 
-def _collect_point(point: EntryPoint, found: dict[str, AnyEffect]) -> None:
+def _collect_point(point: EntryPoint, effects: dict[str, AnyEffect]) -> None:
     """The effects of an installed package: its entry point names a module that defines them, or one effect class."""
     try:
         loaded = point.load()
@@ -57,24 +57,24 @@ def _collect_point(point: EntryPoint, found: dict[str, AnyEffect]) -> None:
             f"entry point {point.name} = {point.value}: does not load ({error}); mend or remove that package"
         ) from error
     if isinstance(loaded, type) and issubclass(loaded, Effect) and hasattr(loaded, "id"):
-        if loaded.id in found:
+        if loaded.id in effects:
             raise BrokenEffect(f"{point.value}: effect id '{loaded.id}' is taken already; choose another id")
-        found[loaded.id] = loaded()  # type: ignore[assignment]  # an Effect with an id is one of its two kinds
-    elif not isinstance(loaded, ModuleType) or not _collect(loaded, found):
+        effects[loaded.id] = loaded()  # type: ignore[assignment]  # an Effect with an id is one of its two kinds
+    elif not isinstance(loaded, ModuleType) or not _collect(loaded, effects):
         raise BrokenEffect(
             f"entry point {point.name} = {point.value}: holds no effect; name a module or class that does"
         )
 
 
-def _collect(module: ModuleType, found: dict[str, AnyEffect]) -> list[str]:
-    """Instances of the effect classes that a module defines, added to ``found`` by id."""
+def _collect(module: ModuleType, effects: dict[str, AnyEffect]) -> list[str]:
+    """Instances of the effect classes that a module defines, added to ``effects`` by id."""
     added: list[str] = []
     for item in vars(module).values():
         own = isinstance(item, type) and issubclass(item, Effect) and item.__module__ == module.__name__
         if own and hasattr(item, "id"):
-            if item.id in found:
+            if item.id in effects:
                 raise BrokenEffect(f"{module.__name__}: effect id '{item.id}' is taken already; choose another id")
-            found[item.id] = item()  # type: ignore[assignment]  # an Effect with an id is one of its two kinds
+            effects[item.id] = item()  # type: ignore[assignment]  # an Effect with an id is one of its two kinds
             added.append(item.id)
     return added
 
@@ -146,12 +146,12 @@ def add_file(path: str | Path) -> list[str]:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever a user's file raises is reported with the file's name
         raise BrokenEffect(f"effect file {source}: does not import ({error}); mend the file") from error
-    found = dict(catalogue())
-    added = _collect(module, found)
+    known = dict(catalogue())
+    added = _collect(module, known)
     if not added:
         raise BrokenEffect(
             f"effect file {source}: holds no effect; define a subclass of SensorEffect or StationEffect with an id"
         )
     for name in added:
-        register(found[name])
+        register(known[name])
     return added

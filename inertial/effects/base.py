@@ -174,7 +174,7 @@ def stack(state: State, columns: Sequence[Array]) -> Array:
     shape = np.broadcast_shapes(state.force.shape[:-1], *(c.shape for c in columns))
     if len(columns) == 1:
         return np.broadcast_to(columns[0], shape)[..., None]
-    found = np.empty((*shape, len(columns)))
+    stacked = np.empty((*shape, len(columns)))
     for place, column in enumerate(columns):
-        found[..., place] = column
-    return found
+        stacked[..., place] = column
+    return stacked

@@ -133,8 +133,8 @@ class Series:
         blocks = self.sound.tobytes()
         if blocks not in self._grids:
             h = np.broadcast_to(self._h, (*self._z.shape, self._h.shape[-1]))
-            found = Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels)
-            self._grids = {blocks: found.on_grid}
+            restricted = Restricted(h[self.sound], self._z[self.sound], self.white, self.kernels)
+            self._grids = {blocks: restricted.on_grid}
         return self._grids[blocks]
 
     def _pair_by_pair(self, first: Array, second: Array) -> Array:
@@ -152,7 +152,7 @@ class Series:
         if coarse[0, 0] - coarse.min() < _CHARGE:
             return 0.0, 0.0
         rows, columns = np.nonzero(coarse - coarse.min() < _FAR)
-        flicker, walk = (_around(shares[found]) for found in (rows, columns))
+        flicker, walk = (_around(shares[places]) for places in (rows, columns))
         deviance = deviances(flicker**2, walk**2)
         rows, columns = np.nonzero(deviance - deviance.min() < _FAR)
         flicker, walk = _between(flicker[rows] ** 2), _between(walk[columns] ** 2)

@@ -196,8 +196,8 @@ class _Solution(NamedTuple):
 def felt_force(force: Array, output: Array) -> Array:
     """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of bias and response."""
     x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
-    found = np.linalg.pinv(x, rcond=1e-9) @ output
-    k = np.swapaxes(found[..., 1:, :], -1, -2)
+    coefficients = np.linalg.pinv(x, rcond=1e-9) @ output
+    k = np.swapaxes(coefficients[..., 1:, :], -1, -2)
     own = np.diagonal(k, axis1=-2, axis2=-1)
     return np.einsum("...ij,...nj->...ni", k / np.where(own == 0.0, 1.0, own)[..., :, None], force)
 

@@ -131,8 +131,8 @@ def inverses(gram: Array) -> Array:
     for i in range(p):
         out[i, : i + 1] = np.einsum("kb,kjb->jb", back[i:, i], back[i:, : i + 1])
         out[: i + 1, i] = out[i, : i + 1]
-    found = np.ascontiguousarray(out.transpose(2, 0, 1)).reshape(gram.shape)
-    return found if np.all(np.isfinite(found)) else np.linalg.inv(gram).astype(np.float64)
+    inverse = np.ascontiguousarray(out.transpose(2, 0, 1)).reshape(gram.shape)
+    return inverse if np.all(np.isfinite(inverse)) else np.linalg.inv(gram).astype(np.float64)
 
 
 def _apply(matrices: Array, vectors: Array) -> Array:

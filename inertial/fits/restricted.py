@@ -113,15 +113,15 @@ class Restricted:
 def _common(h: Array) -> tuple[Array, Array]:
     """Columns (n, c) that every block has, wherever they stand in it, and the others of each block, (b, n, p − c)."""
     kept = np.ones((h.shape[0], h.shape[2]), dtype=bool)
-    found: list[Array] = []
+    common: list[Array] = []
     blocks = np.arange(len(h))
     for column in h[0].T:
         same = np.all(h == column[:, None], axis=1) & kept
         if same.any(axis=1).all():
             kept[blocks, same.argmax(axis=1)] = False
-            found.append(column)
+            common.append(column)
     own = np.swapaxes(np.swapaxes(h, 1, 2)[kept].reshape(len(h), -1, h.shape[1]), 1, 2)
-    return np.stack(found, axis=1) if found else np.zeros((h.shape[1], 0)), own
+    return np.stack(common, axis=1) if common else np.zeros((h.shape[1], 0)), own
 
 
 def _left(h: Array, z: Array) -> Array:

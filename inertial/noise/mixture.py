@@ -166,14 +166,14 @@ def deviance(
     points of a curve exactly, and a walk only as well as so few independent differences allow. With one covariance for both the
     one that it was taken under always wins. The best of all rounds counts: the strengths solve for a covariance that is given.
     """
-    best, found, strengths = np.inf, start, start
+    best, likeliest, strengths = np.inf, start, start
     for _ in range(rounds + 1):
         task = problem(variance, moments, strengths)
         now = task.cost(strengths) + task.volume
         if now < best:
-            best, found = now, strengths
+            best, likeliest = now, strengths
         strengths, _ = task.solve(free, strengths)
-    return best, found
+    return best, likeliest
 
 
 def _root(covariance: Array) -> Array:

@@ -138,10 +138,10 @@ def _replaced(slots: PlanSlots, choice: Choice, slot: int, value: Callable[[Arra
     tried += slots.weight[slot, slot] * delta[..., :, None] * delta[..., None, :]
     seconds = slots.duration(choice) + _detours(slots, choice, slot)
     cost = value(tried) + np.log(seconds)
-    found = choice.copy()
+    changed = choice.copy()
     if cost[choice[slot]] - cost.min() > _GAIN / choice.size:
-        found[slot] = int(np.argmin(cost))
-    return found
+        changed[slot] = int(np.argmin(cost))
+    return changed
 
 
 def _detours(slots: PlanSlots, choice: Choice, slot: int) -> Array:

@@ -37,7 +37,7 @@ def unseen_ranges(effect: AnyEffect, state: State, seen: Sequence[bool]) -> tupl
     grid = grid_of(effect, state)
     if not any(seen) or all(seen):
         return ()
-    found: list[UnseenRange] = []
+    ranges: list[UnseenRange] = []
     for parameter in effect.parameters(state):
         if parameter.choices:
             continue
@@ -49,6 +49,6 @@ def unseen_ranges(effect: AnyEffect, state: State, seen: Sequence[bool]) -> tupl
             if not there:
                 begun.append(value)
             elif begun:
-                found.append(UnseenRange(parameter.name, parameter.unit, begun[0], begun[-1]))
+                ranges.append(UnseenRange(parameter.name, parameter.unit, begun[0], begun[-1]))
                 begun = []
-    return tuple(found)
+    return tuple(ranges)

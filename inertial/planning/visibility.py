@@ -151,9 +151,9 @@ def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | Non
     try:
         for values in _values(effect, state):
             columns = _columns(effect, state, values)
-            found = _measured(columns, _after(span, columns, _start(effect, state, values)))
-            seen.append(found.remaining_fraction > SEEN)
-            best = found if best is None else _better(best, found)
+            remainder = _measured(columns, _after(span, columns, _start(effect, state, values)))
+            seen.append(remainder.remaining_fraction > SEEN)
+            best = remainder if best is None else _better(best, remainder)
     except MissingInput:
         return None
     return None if best is None else replace(best, unseen=unseen_ranges(effect, state, seen))
@@ -251,9 +251,9 @@ def _visibility(
 def alias_cosines(seen: Mapping[str, _Remainder]) -> dict[str, dict[str, float]]:
     """Cosine of each effect's remaining columns with the span of every other's: the smallest over directions and axes."""
     spans: dict[str, Array] = {}
-    for name, found in seen.items():
-        size = np.linalg.norm(found.columns, axis=-2, keepdims=True)
-        u, s, _ = np.linalg.svd(found.columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
+    for name, remainder in seen.items():
+        size = np.linalg.norm(remainder.columns, axis=-2, keepdims=True)
+        u, s, _ = np.linalg.svd(remainder.columns / np.where(size > 0.0, size, 1.0), full_matrices=False)
         spans[name] = u * (s > SEEN)[..., None, :]
     return {name: {o: _inside(spans[name], spans[o]) for o in spans if o != name} for name in spans}
 

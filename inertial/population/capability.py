@@ -83,5 +83,5 @@ def independent(values: Array, groups: Codes) -> tuple[float, float]:
 
 def fraction_interval(count: int, total: int) -> Index:
     """Share of a count with the exact interval of Clopper and Pearson (e-Handbook 7.2.4.1)."""
-    found = binomtest(count, total).proportion_ci(CONFIDENCE, "exact")
-    return Index(count / total, float(found.low), float(found.high))
+    interval = binomtest(count, total).proportion_ci(CONFIDENCE, "exact")
+    return Index(count / total, float(interval.low), float(interval.high))

@@ -66,8 +66,8 @@ def change_points(values: Array, level: float = 1e-3) -> list[ChangePoint]:
     for number, place in enumerate(places):
         low = places[number - 1] if number else 0
         high = places[number + 1] if number + 1 < len(places) else left.size
-        found = _best(left[low:high])
-        out.append(_described(left[low:high], low + skipped, place - low if found is None else found, noise))
+        offset = _best(left[low:high])
+        out.append(_described(left[low:high], low + skipped, place - low if offset is None else offset, noise))
     return out
 
 

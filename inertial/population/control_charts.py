@@ -113,14 +113,14 @@ def false_alarms(n: int, first: int, counted: int, memory: float = 0.0, tail: fl
     """
     code = [n, first, counted, round(100.0 * memory), 0 if np.isinf(tail) else round(tail)]
     rng = np.random.default_rng(np.random.SeedSequence(code[:3] if code[3:] == [0, 0] else code))
-    found: list[NDArray[np.int64]] = []
+    counts: list[NDArray[np.int64]] = []
     for _ in range(10):
         values = _in_control(rng, (CHARTS_SIMULATED // 10, n), memory, tail)
         sigma = np.mean(np.abs(np.diff(values)), axis=-1, keepdims=True) / D2_OF_TWO
         rules, moving = signals((values - values[:, :first].mean(axis=-1, keepdims=True)) / sigma, Baseline(0.0, 1.0))
         signalled, outside = np.any(rules, axis=0)[..., n - counted :], moving.outside[..., n - counted :]
-        found.append(np.count_nonzero(signalled, axis=-1) + np.count_nonzero(outside, axis=-1))
-    numbers = np.sort(np.concatenate(found)).astype(np.int64)
+        counts.append(np.count_nonzero(signalled, axis=-1) + np.count_nonzero(outside, axis=-1))
+    numbers = np.sort(np.concatenate(counts)).astype(np.int64)
     return FalseAlarms(float(np.mean(numbers)), numbers)
 
 

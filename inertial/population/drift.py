@@ -97,7 +97,7 @@ def prudent(kind: DeviceDrift, change: Array, years: Array, known: Array) -> Dev
     alike = 0.5 * (_parts(columns, target, [1]) + _parts(columns, target, [2]))
     bearable = _left(columns, target, best) + SPREAD_OF_SQUARES * LIKELY
     tried = (alike, _parts(columns, target, [1, 2]), best)
-    parts = next(found for found in tried if found is best or _left(columns, target, found) < bearable)
+    parts = next(trial for trial in tried if trial is best or _left(columns, target, trial) < bearable)
     mount, walk, slope = np.sqrt(parts)
     error = 1.0 / np.sqrt(np.sum((years**2 / expected)[keep]) + 1e-300)
     return replace(kind, slope_sd=float(np.hypot(slope, error)), walk_sd=float(walk), mount_sd=float(mount))
@@ -238,8 +238,8 @@ def in_tolerance(mean: Array, deviation: Array, tolerance: float) -> Array:
 
 def first_time(condition: NDArray[np.bool_], ahead: Array) -> Array:
     """The first of the times (times,) at which a condition (units, times) holds; infinity where it never does."""
-    found = np.argmax(condition, axis=1)
-    return np.where(condition.any(axis=1), ahead[found], np.inf)
+    first = np.argmax(condition, axis=1)
+    return np.where(condition.any(axis=1), ahead[first], np.inf)
 
 
 def leaves(mean: Array, deviation: Array, tolerance: float, ahead: Array) -> tuple[Array, Array, Array]:
@@ -259,6 +259,6 @@ def last_reliable(probability: NDArray[np.floating[Any]], target: float, ahead: 
     The reliability target of an interval (NCSL RP-1, chapter 2): the interval ends where the probability falls to it.
     """
     bad = probability < target
-    found = np.argmax(bad, axis=1)
-    before = ahead[np.maximum(found - 1, 0)]
-    return np.where(bad.any(axis=1), np.where(found == 0, 0.0, before), ahead[-1])
+    first = np.argmax(bad, axis=1)
+    before = ahead[np.maximum(first - 1, 0)]
+    return np.where(bad.any(axis=1), np.where(first == 0, 0.0, before), ahead[-1])

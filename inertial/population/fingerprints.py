@@ -47,8 +47,8 @@ class ChangeScale:
         t = np.asarray(years, dtype=float)
         change = self.change[:, self.telling]
         inside = np.clip(t, self.years[0], self.years[-1])
-        found = np.stack([np.interp(inside, self.years, own) for own in change.T], axis=-1)
-        return found * np.maximum(t / max(float(self.years[-1]), _SHORTEST), 1.0)[..., None]
+        usual = np.stack([np.interp(inside, self.years, own) for own in change.T], axis=-1)
+        return usual * np.maximum(t / max(float(self.years[-1]), _SHORTEST), 1.0)[..., None]
 
 
 def change_scale(

@@ -31,12 +31,12 @@ def unit_and_place(values: Array, units: Codes, places: Codes) -> tuple[Array, A
     in_units, in_places = _groups(units), _groups(places)
     for _ in range(ROUNDS):
         unit = _medians(values - place[places], in_units)
-        found = _medians(values - unit[units], in_places)
-        found -= np.median(found)
-        if np.max(np.abs(found - place)) < SETTLED * (np.ptp(values) + 1e-300):
-            place = found
+        refined = _medians(values - unit[units], in_places)
+        refined -= np.median(refined)
+        if np.max(np.abs(refined - place)) < SETTLED * (np.ptp(values) + 1e-300):
+            place = refined
             break
-        place = found
+        place = refined
     return unit, place
 
 

@@ -38,9 +38,9 @@ class NormDesign:
 
     def coefficient_errors(self, changes: Array) -> Array:
         """Errors of the coefficients, (3, p, q), of changes of the outputs of all dwells (n, 3, q)."""
-        found = np.zeros((*self.free.shape, changes.shape[-1]))
-        found[self.free] = -self.gain @ self._shown(changes)[self.used]
-        return found
+        errors = np.zeros((*self.free.shape, changes.shape[-1]))
+        errors[self.free] = -self.gain @ self._shown(changes)[self.used]
+        return errors
 
     def visible_share(self, changes: Array) -> Array:
         """Share (q,) of the influences on the norms that the residuals of the fit can show."""

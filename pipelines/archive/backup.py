@@ -81,13 +81,13 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
 
 def _sealed(root: Place, entries: set[str]) -> dict[str, str]:
     """Hashes of files by their names, as the newest entry of the chain that names each states it."""
-    found: dict[str, str] = {}
+    hashes: dict[str, str] = {}
     for name in sorted(entries):
         try:
-            found.update(files.read_json(root / name).get("files", {}))
+            hashes.update(files.read_json(root / name).get("files", {}))
         except ArchiveUnusable:  # 'tumbleline verify' reports it
             continue
-    return found
+    return hashes
 
 
 def _as_stated(root: Place, name: str, sealed: Mapping[str, str]) -> bool | None:
@@ -129,12 +129,12 @@ def _is_readable(place: Place) -> bool:
 
 def _names(folder: Place, prefix: str) -> set[str]:
     """Names, below the root, of the files of a folder that are copied."""
-    found: set[str] = set()
+    names: set[str] = set()
     for path, name in _walk(folder, prefix):
         if PurePosixPath(name).parts[0] not in {INDEX, packs.FOLDER}:
-            found.add(name)
+            names.add(name)
         del path
-    return found
+    return names
 
 
 def _walk(folder: Place, prefix: str) -> Iterator[tuple[Place, str]]:

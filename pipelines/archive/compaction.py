@@ -206,10 +206,10 @@ def _single(folder: Path, prefix: str = "") -> Iterator[tuple[str, tuple[int, in
                 yield f"{prefix}{one.name}", (about.st_size, about.st_mtime_ns)
 
 
-def _pack(root: Path, what: str, found: Iterable[Found], done: Compacted) -> None:
+def _pack(root: Path, what: str, folders: Iterable[Found], done: Compacted) -> None:
     """Write packs of the folders, each up to :data:`LARGEST` bytes."""
     portion, size = list[Found](), 0
-    for one in found:
+    for one in folders:
         portion.append(one)
         size += sum(length for length, _ in one.files.values())
         if size >= LARGEST:

@@ -47,11 +47,11 @@ class PackedPath(Base):
         try:
             return os.stat(self, follow_symlinks=follow_symlinks)
         except (FileNotFoundError, NotADirectoryError):
-            found = self._packed()
-            if isinstance(found, packs.Member):
-                return _stated(S_IFREG | 0o444, found.size, found.mtime_ns)
-            if found is not None:
-                return _stated(S_IFDIR | 0o555, 0, found)
+            packed = self._packed()
+            if isinstance(packed, packs.Member):
+                return _stated(S_IFREG | 0o444, packed.size, packed.mtime_ns)
+            if packed is not None:
+                return _stated(S_IFDIR | 0o555, 0, packed)
             raise
 
     def exists(self, *, follow_symlinks: bool = True) -> bool:
@@ -82,10 +82,10 @@ class PackedPath(Base):
         try:
             return open(self, mode, *arguments, **options)
         except (FileNotFoundError, NotADirectoryError):
-            found = self._packed() if mode in {"r", "rb"} else None
-            if not isinstance(found, packs.Member):
+            packed = self._packed() if mode in {"r", "rb"} else None
+            if not isinstance(packed, packs.Member):
                 raise
-            data = io.BytesIO(packs.read(found))
+            data = io.BytesIO(packs.read(packed))
             return data if mode == "rb" else io.TextIOWrapper(data, options.get("encoding") or "utf-8")
 
     def read_bytes(self) -> bytes:
@@ -144,14 +144,14 @@ class PackedPath(Base):
         if parts is None:
             return 0 if self.known.below(name) else None
         folder, rest = parts
-        found = self.known.folder(folder)
-        if found is None:
+        packed = self.known.folder(folder)
+        if packed is None:
             return None
         if not rest:
-            return found.mtime_ns
-        if rest in found.files:
-            return found.files[rest]
-        return found.mtime_ns if any(one.startswith(f"{rest}/") for one in found.files) else None
+            return packed.mtime_ns
+        if rest in packed.files:
+            return packed.files[rest]
+        return packed.mtime_ns if any(one.startswith(f"{rest}/") for one in packed.files) else None
 
     def _packed_names(self) -> set[str]:
         """Names of what is packed directly below."""
@@ -161,9 +161,9 @@ class PackedPath(Base):
         parts = packs.split(name)
         if parts is None:
             return self.known.below(name)
-        found = self.known.folder(parts[0])
+        packed = self.known.folder(parts[0])
         start = f"{parts[1]}/" if parts[1] else ""
-        own = found.files if found is not None else ()
+        own = packed.files if packed is not None else ()
         return {one[len(start) :].partition("/")[0] for one in own if one.startswith(start)}
 
 
@@ -181,8 +181,8 @@ def member_of(place: object) -> packs.Member | None:
     """The packed file of a place that has none by itself; None for any other place."""
     if not isinstance(place, PackedPath) or os.path.exists(place):
         return None
-    found = place._packed()  # noqa: SLF001 - the question of this module
-    return found if isinstance(found, packs.Member) else None
+    packed = place._packed()  # noqa: SLF001 - the question of this module
+    return packed if isinstance(packed, packs.Member) else None
 
 
 @cache

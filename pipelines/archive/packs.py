@@ -66,13 +66,13 @@ class Contents:
 
     def folders(self) -> Iterator[tuple[str, PackedFolder]]:
         """Every folder with its name, in the order of the pack."""
-        for found in BEGINNING.finditer(self._lines):
-            yield self._at(found.start() + 1)
+        for match in BEGINNING.finditer(self._lines):
+            yield self._at(match.start() + 1)
 
     def names(self) -> Iterator[str]:
         """Names of the folders."""
-        for found in BEGINNING.finditer(self._lines):
-            yield json.loads(found.group(1))
+        for match in BEGINNING.finditer(self._lines):
+            yield json.loads(match.group(1))
 
     def about(self) -> dict[str, Any]:
         """The line about the zip: its hash and its size."""
@@ -136,10 +136,10 @@ class Packs:
         """
         tables = self.contents(name.partition("/")[0])
         if name not in self._folders:
-            found = [one for contents in tables if (one := contents.folder(name))]
+            parts = [one for contents in tables if (one := contents.folder(name))]
             if len(self._folders) >= LATELY:
                 self._folders.clear()
-            self._folders[name] = _together(found) if found else None
+            self._folders[name] = _together(parts) if parts else None
         return self._folders.get(name)
 
     def folders(self, kind: str) -> dict[str, PackedFolder]:
@@ -214,9 +214,9 @@ def _is_contents(place: Path) -> bool:
     return named and place.with_suffix(CONTAINER).is_file() and place.stat().st_size > 0
 
 
-def _together(found: list[PackedFolder]) -> PackedFolder:
+def _together(parts: list[PackedFolder]) -> PackedFolder:
     """A folder of several packs, the newest last."""
     files: dict[str, Member] = {}
-    for one in found:
+    for one in parts:
         files |= one.files
-    return PackedFolder(max(one.mtime_ns for one in found), files)
+    return PackedFolder(max(one.mtime_ns for one in parts), files)

@@ -59,10 +59,10 @@ def strangers(calibrations: Calibrations, rules: Rules | None = None) -> list[St
         before = _before(calibrations.histories[own], np.ones(own.size, dtype=bool))
         pairs = np.flatnonzero(before >= 0)
         if pairs.size < FEWEST_PAIRS:
-            found = exchanged_pairs(calibrations, own, before, rules) if rules is not None else []
+            exchanged = exchanged_pairs(calibrations, own, before, rules) if rules is not None else []
             out += [
                 Stranger(int(own[k]), far, str(calibrations.unit[own[other]]), exchanged=True)
-                for k, other, far in found
+                for k, other, far in exchanged
             ]
             continue
         years = (calibrations.day[own] - calibrations.day[own][before]) / YEAR_D
@@ -132,9 +132,9 @@ def _fits(k: int, values: Array, foreign: Flags, histories: Index, days: Array, 
     if not candidates.size:
         return -1, -1
     years = (days[k] - days[candidates]) / YEAR_D
-    best, found = nearest(values[k], values[candidates], scale, years)
+    best, least = nearest(values[k], values[candidates], scale, years)
     fitting = histories[candidates[distance(values[k], values[candidates], scale, years) <= foreign_above(scale)]]
-    if not found <= alike_below(scale) or np.any(fitting != histories[candidates[best]]):
+    if not least <= alike_below(scale) or np.any(fitting != histories[candidates[best]]):
         return -1, -1
     return int(candidates[best]), int(histories[candidates[best]])
 

@@ -130,8 +130,8 @@ def up_to_date(archive: Archive, distribute: Distributor | None = None, workers:
         return AuditIndex((), 0, 0)
     try:
         with alone(place, wait=True):
-            found = _refreshed(archive, place, distribute, workers)
-            return replace(found, holder=_Reading(place)) if isinstance(place, Path) else found
+            index = _refreshed(archive, place, distribute, workers)
+            return replace(index, holder=_Reading(place)) if isinstance(place, Path) else index
     except ArchiveUnusable:
         if isinstance(archive.root, Path) and os.access(archive.root, os.W_OK):
             raise
@@ -165,9 +165,9 @@ def make_part(portion: Portion) -> str:
     """Make and publish a part of the index from the files of its runs; return its name."""
     root = Archive(portion.archive).root
     runs, place = root / "runs", Path(portion.place) if portion.place else root / FOLDER
-    found = rows_of_runs(read_runs(runs, portion.runs))
+    tables = rows_of_runs(read_runs(runs, portion.runs))
     # ``runs`` last: it shows that all others exist
-    content = {f"{name}.parquet": _encoded(found[name], portion.version) for name in reversed(TABLES)}
+    content = {f"{name}.parquet": _encoded(tables[name], portion.version) for name in reversed(TABLES)}
     hashes = {file: files.hash_of(data) for file, data in content.items()}
     content = {SEAL: files.json_bytes(derived.seal(hashes)), **content}
     text = "\n".join([portion.version, *(f"{run} {stamp}" for run, stamp in portion.runs)])
@@ -207,11 +207,11 @@ def standing_of(part: Place) -> str:
     if not all((part / name).is_file() for name in (*names, SEAL)):
         return derived.OTHERS
     try:
-        found = json.loads((part / SEAL).read_bytes())
+        seal = json.loads((part / SEAL).read_bytes())
         hashes = {name: files.sha256(part / name) for name in names}
     except (OSError, ValueError, RecursionError):
         return derived.EDITED
-    return derived.standing(found, hashes)
+    return derived.standing(seal, hashes)
 
 
 def part_folders(place: Place) -> list[Place]:

@@ -112,19 +112,19 @@ def figures_of(index: AuditIndex, calibrations: Calibrations, chosen: Flags) -> 
     run_index, unit_index = (_numbers_in(frame[n], known) for n, known in (("run", runs), ("unit", units)))
     key = run_index * max(units.size, 1) + unit_index
     place = np.minimum(np.searchsorted(own[order], key), max(own.size - 1, 0))
-    found = (run_index >= 0) & (unit_index >= 0)
+    kept = (run_index >= 0) & (unit_index >= 0)
     if own.size:
-        found &= own[order][place] == key
+        kept &= own[order][place] == key
         row = order[place]
-        found &= chosen[row]
+        kept &= chosen[row]
     else:
         row = place
     return Figures(
-        row[found],
-        frame["figure"].astype(str).to_numpy(object)[found],
-        frame["value"].to_numpy(float)[found],
-        frame["limit"].to_numpy(float)[found],
-        frame["unit_text"].astype(str).to_numpy(object)[found],
+        row[kept],
+        frame["figure"].astype(str).to_numpy(object)[kept],
+        frame["value"].to_numpy(float)[kept],
+        frame["limit"].to_numpy(float)[kept],
+        frame["unit_text"].astype(str).to_numpy(object)[kept],
     )
 
 
@@ -157,21 +157,21 @@ def abilities(calibrations: Calibrations, figures: Figures) -> tuple[list[Abilit
             if np.isfinite(limit).any():
                 able.append(_ability(kind, name, figures, own[np.isfinite(limit)], lot))
             for by, numbers in groups.items():
-                found = _compared(figures.value[own], numbers[own] - numbers[own].min(), lot[own], by)
-                if found is not None:
-                    differences.append(Difference(kind, name, by, found, found.rank_p))
+                comparison = _compared(figures.value[own], numbers[own] - numbers[own].min(), lot[own], by)
+                if comparison is not None:
+                    differences.append(Difference(kind, name, by, comparison, comparison.rank_p))
     adjusted = holm(np.array([d.p for d in differences])) if differences else []
     return able, [replace(d, p=float(p)) for d, p in zip(differences, adjusted, strict=True)]
 
 
 def _compared(values: Array, groups: Numbers, lot: Numbers, by: str) -> Comparison | None:
     """Groups of values compared; stations by the means of their lots: lots differ, and each is on one station."""
-    found = compare(values, groups)
-    if found is None or by != "station":
-        return found
+    comparison = compare(values, groups)
+    if comparison is None or by != "station":
+        return comparison
     _, first, number = np.unique(lot, return_index=True, return_inverse=True)
     means = compare(np.bincount(number, values) / np.bincount(number), groups[first])
-    return None if means is None else replace(found, f_p=means.f_p, rank_p=means.rank_p)
+    return None if means is None else replace(comparison, f_p=means.f_p, rank_p=means.rank_p)
 
 
 def _first_of_each(calibrations: Calibrations, figures: Figures) -> Figures:

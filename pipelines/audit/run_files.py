@@ -66,8 +66,8 @@ def stamps_of(root: Place) -> dict[str, str]:
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
     out: dict[str, str] = {}
     with ThreadPoolExecutor(READERS) as pool:
-        for found in pool.map(lambda group: _stamps(str(runs), group, packed), groups):
-            out |= found
+        for stamps in pool.map(lambda group: _stamps(str(runs), group, packed), groups):
+            out |= stamps
     return out
 
 
@@ -83,15 +83,15 @@ def in_order_of_disk(root: Place, runs: Sequence[str]) -> list[str]:
 def stamps_among(root: Path, names: Sequence[str]) -> dict[str, str]:
     """Stamps of some runs of a local archive."""
     folders = {run: root.known.folder(f"runs/{run}") for run in names} if isinstance(root, PackedPath) else {}
-    return _stamps(str(root / "runs"), names, {run: _marks(found) for run, found in folders.items() if found})
+    return _stamps(str(root / "runs"), names, {run: _marks(folder) for run, folder in folders.items() if folder})
 
 
 def _read(path: Place, stamp: str) -> RunFiles:
     content: dict[str, bytes] = {}
     single = None
-    if isinstance(path, PackedPath) and (found := path.known.folder(f"runs/{path.name}")) is not None:
+    if isinstance(path, PackedPath) and (folder := path.known.folder(f"runs/{path.name}")) is not None:
         single = set(_names(str(path)))
-        packed = {name: found.files[name] for name in WATCHED if name in found.files and name not in single}
+        packed = {name: folder.files[name] for name in WATCHED if name in folder.files and name not in single}
         try:
             content = read_together(packed)
         except OSError as trouble:
@@ -130,15 +130,15 @@ def _packed_marks(root: Place) -> dict[str, dict[str, str]]:
     """Sizes and times of the packed files of runs, as they were before they were packed."""
     out: dict[str, dict[str, str]] = {}
     for contents in root.known.contents("runs") if isinstance(root, PackedPath) else ():
-        for folder, found in contents.folders():
+        for folder, packed in contents.folders():
             kind, _, run = folder.partition("/")
             if kind == "runs":
-                out.setdefault(run, {}).update(_marks(found))
+                out.setdefault(run, {}).update(_marks(packed))
     return out
 
 
-def _marks(found: PackedFolder) -> dict[str, str]:
-    there = {name: found.files[name] for name in WATCHED if name in found.files}
+def _marks(packed: PackedFolder) -> dict[str, str]:
+    there = {name: packed.files[name] for name in WATCHED if name in packed.files}
     return {name: f"{one.size}.{one.mtime_ns}" for name, one in there.items()}
 
 
@@ -151,10 +151,10 @@ def _names(folder: str) -> list[str]:
 
 def _mark(path: str) -> str:
     try:
-        found = os.stat(path)  # noqa: PTH116 - a hundred thousand of these
+        status = os.stat(path)  # noqa: PTH116 - a hundred thousand of these
     except OSError:
         return ""
-    return f"{found.st_size}.{found.st_mtime_ns}"
+    return f"{status.st_size}.{status.st_mtime_ns}"
 
 
 def _stamps_of_objects(runs: ObjectPath) -> dict[str, str]:

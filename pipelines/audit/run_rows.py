@@ -192,9 +192,9 @@ def _parameters(runs: Sequence[_Run]) -> pa.Table:
     rank[order] = np.arange(order.size)
     columns = {name: _coded(table, name) for name in ("effect", "name", "axis")}
     numbers = [table.column(name).to_numpy() for name in ("value", "standard_error")]
-    found = parameters_of(rank[row], columns, numbers[0], numbers[1], np.array(zeros)[run[first[order]]])
+    parameters = parameters_of(rank[row], columns, numbers[0], numbers[1], np.array(zeros)[run[first[order]]])
     names = [runs[k].id for k in run[first[order]]], [units[k] for k in unit[first[order]]]
-    return pa.table({"run": names[0], "unit": names[1], **found}, schema=schema)
+    return pa.table({"run": names[0], "unit": names[1], **parameters}, schema=schema)
 
 
 def _station(run: _Run) -> list[tuple[Any, ...]]:
@@ -210,9 +210,9 @@ def _station(run: _Run) -> list[tuple[Any, ...]]:
     order = np.lexsort((np.array([AXES.index(text) for text in axes])[axis], frame["dwell"], frame["unit"]))
     frame = {name: values[order] for name, values in frame.items()}
     model = _coded(coefficients, "effect")[0]
-    found = station_values({**frame, "pose": np.array(poses, dtype=object)[frame["pose"]]}, recipe, model)
+    estimates = station_values({**frame, "pose": np.array(poses, dtype=object)[frame["pose"]]}, recipe, model)
     known = _of_the_model(coefficients)
-    return [(run.id, v.effect, v.name, v.value + known.get((v.effect, v.name), 0.0), v.error) for v in found]
+    return [(run.id, v.effect, v.name, v.value + known.get((v.effect, v.name), 0.0), v.error) for v in estimates]
 
 
 def _of_the_model(coefficients: pa.Table) -> dict[tuple[str, str], float]:

@@ -111,13 +111,15 @@ def _plan_projection(exact: State, model: Sequence[str]) -> _PlanProjection:
     key = (tuple(model), *(b"" if part is None else np.asarray(part).tobytes() for part in parts))
     if key not in _projections:
         bases = _bases(state, model)
-        found: list[tuple[StationEffect, Array, Array]] = []
+        projected: list[tuple[StationEffect, Array, Array]] = []
         for effect in followed():
             columns = _projected(effect, state, bases)
-            if columns is not None and not any(_alike(columns, other) for _, other, _ in found):
+            if columns is not None and not any(_alike(columns, other) for _, other, _ in projected):
                 inverse = np.asarray(np.linalg.inv(columns.T @ columns), dtype=np.float64)
-                found.append((effect, columns, inverse))
-        _projections[key] = _PlanProjection(bases, found, 3 * state.time.size - sum(base.shape[1] for base in bases))
+                projected.append((effect, columns, inverse))
+        _projections[key] = _PlanProjection(
+            bases, projected, 3 * state.time.size - sum(base.shape[1] for base in bases)
+        )
     return _projections[key]
 
 

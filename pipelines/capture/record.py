@@ -124,12 +124,12 @@ class Record:
 
         In a static dwell an outlier was changed in transmission, or the unit was knocked.
         """
-        found = first_outlier(self._outputs(serial), lsb, full_scale)
-        if found is None:
+        first = first_outlier(self._outputs(serial), lsb, full_scale)
+        if first is None:
             return ""
         return (
-            f"sample {self.stored.get(serial, 0) + found.row} is {found.value:g} on {AXES[found.axis]}, the median of the dwell "
-            f"is {found.median:g}"
+            f"sample {self.stored.get(serial, 0) + first.row} is {first.value:g} on {AXES[first.axis]}, the median of the dwell "
+            f"is {first.median:g}"
         )
 
     def _outputs(self, serial: str) -> NDArray[np.float64]:

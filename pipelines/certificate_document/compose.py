@@ -257,7 +257,7 @@ def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
 
 def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[Condition]:
     dwells = run.table("dwells")
-    own, found = dwells[dwells["unit"] == serial], []
+    own, conditions = dwells[dwells["unit"] == serial], []
     for column, name, unit in (
         ("unit_C", "temperature of the item", "°C"),
         ("chamber_C", "temperature of the chamber", "°C"),
@@ -265,11 +265,11 @@ def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[Condition
     ):
         values = own[column].dropna() if column in own else []
         if len(values):
-            found.append(Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
+            conditions.append(Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
     gravity = recipe.get("local_gravity_m_s2") or (run.about.get("mapping") or {}).get("local_gravity_m_s2")
     if gravity:
-        found.append(Condition(name="local gravity", low=float(gravity), high=float(gravity), unit="m/s²"))
-    return found
+        conditions.append(Condition(name="local gravity", low=float(gravity), high=float(gravity), unit="m/s²"))
+    return conditions
 
 
 def _amendment(one: Calibration, known: list[Calibration]) -> Amendment:

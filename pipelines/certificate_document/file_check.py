@@ -144,11 +144,11 @@ def _signature(data: bytes, done: CheckedFile, against: Against) -> Any | None:
 
 
 def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
-    found = attachments(data)
-    if len(found) != 1:
-        done.add("attachment", "bad", f"the PDF has {len(found)} attachments {ATTACHMENT}, one is needed")
+    attached = attachments(data)
+    if len(attached) != 1:
+        done.add("attachment", "bad", f"the PDF has {len(attached)} attachments {ATTACHMENT}, one is needed")
         return None
-    root = parsed(found[0])
+    root = parsed(attached[0])
     try:
         signers = pdf_signers(data)
     except SignatureBroken as problem:
@@ -163,7 +163,7 @@ def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
             done.add("signature", "not checked", "the PDF is not signed: nothing shows that its pages are unchanged")
     beside = done.path.with_suffix(".xml")
     if beside.is_file():
-        same = _read(beside) == found[0]
+        same = _read(beside) == attached[0]
         done.add(
             "attachment",
             "good" if same else "bad",
@@ -213,20 +213,20 @@ def _archive(done: CheckedFile, against: Against) -> None:
             "archive", "not checked", "without --archive: whether the certificate was revoked or replaced is not known"
         )
         return
-    found, place = compare(done.facts, against.archive), against.archive.root
-    if not found.known:
+    compared, place = compare(done.facts, against.archive), against.archive.root
+    if not compared.known:
         named = f"certificate {done.facts.number} of unit {done.facts.serial}"
         done.add("archive", "bad" if against.demanded else "not checked", f"archive {place} has no {named}")
         return
-    for text in found.different:
+    for text in compared.different:
         done.add("archive", "bad", text)
-    if found.ended:
-        done.add("state", "bad", found.ended)
+    if compared.ended:
+        done.add("state", "bad", compared.ended)
     else:
-        done.add("state", "good", found.until or "neither revoked nor replaced, by the ledger of the archive")
-    if found.reason:
-        done.add("archive", "not checked", f"the numbers were not compared: {found.reason}")
-    elif not found.different:
-        done.add("archive", "good", f"{found.count} numbers, dates and decisions are those of archive {place}")
+        done.add("state", "good", compared.until or "neither revoked nor replaced, by the ledger of the archive")
+    if compared.reason:
+        done.add("archive", "not checked", f"the numbers were not compared: {compared.reason}")
+    elif not compared.different:
+        done.add("archive", "good", f"{compared.count} numbers, dates and decisions are those of archive {place}")
         if done.path.suffix.lower() != ".pdf":  # the pages of an unsigned PDF may say anything
             done.proven_by = (*done.proven_by, "archive")

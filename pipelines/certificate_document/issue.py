@@ -93,18 +93,18 @@ def _write(parts: dict[Path, bytes]) -> None:
 
 def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibration, list[Calibration]]], Issued]:
     ledger, done = Ledger(archive), Issued()
-    found: dict[str, tuple[Calibration, list[Calibration]]] = {}
+    chosen: dict[str, tuple[Calibration, list[Calibration]]] = {}
     for name in names:
         serial, _, number = name.rpartition("/") if "/" in name else (name, "", "")
         known = ledger.calibrations(serial)
         if known:
             one = _of_unit(serial, known, number)
-            found[one.certificate] = one, known
+            chosen[one.certificate] = one, known
         elif number or name in _units(archive):
             raise WrongUse(f"certificate: unit {serial} has no certificate, one is needed; {_why(archive, serial)}")
         else:
-            found |= _of_run(ledger, archive.run(name), done)
-    return list(found.values()), done
+            chosen |= _of_run(ledger, archive.run(name), done)
+    return list(chosen.values()), done
 
 
 def _of_unit(serial: str, known: list[Calibration], number: str) -> Calibration:
@@ -121,18 +121,18 @@ def _of_unit(serial: str, known: list[Calibration], number: str) -> Calibration:
 def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibration, list[Calibration]]]:
     """The last certificate of every unit of a run; the units that have none are left out with the reason."""
     reasons = _reasons(run)
-    found: dict[str, tuple[Calibration, list[Calibration]]] = {}
+    certificates: dict[str, tuple[Calibration, list[Calibration]]] = {}
     for serial, reason in reasons.items():
         known = ledger.calibrations(serial)
         own = [one for one in known if one.run == run.id and one.state != "revoked"]
         if own:
-            found[own[-1].certificate] = own[-1], known
+            certificates[own[-1].certificate] = own[-1], known
         else:
             done.left_out[serial] = reason or f"passed and not certified; certify it with 'tumbleline certify {run.id}'"
-    if not found:
+    if not certificates:
         listed = "; ".join(f"{serial}: {why}" for serial, why in done.left_out.items()) or "it has no grades"
         raise WrongUse(f"certificate: no unit of run {run.id} has a certificate, one is needed ({listed})")
-    return found
+    return certificates
 
 
 def _reasons(run: Run) -> dict[str, str]:

@@ -99,13 +99,13 @@ class LaboratoryFile(Strict):
 
 
 def _texts(content: dict[str, Any], before: str = "") -> list[tuple[str, str]]:
-    found: list[tuple[str, str]] = []
+    texts: list[tuple[str, str]] = []
     for name, value in content.items():
         if isinstance(value, dict):
-            found += _texts(value, f"{before}{name}.")
+            texts += _texts(value, f"{before}{name}.")
         elif isinstance(value, str):
-            found.append((before + name, value))
-    return found
+            texts.append((before + name, value))
+    return texts
 
 
 def read_laboratory(path: Path) -> LaboratoryFile:

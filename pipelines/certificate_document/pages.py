@@ -31,17 +31,17 @@ def page_content(c: CertificateContent) -> dict[str, Any]:
 
 
 def _notices(c: CertificateContent) -> list[str]:
-    found: list[str] = []
+    notices: list[str] = []
     if c.simulated:
-        found.append("SIMULATED. The station that these results come from is a simulation: no device was measured.")
+        notices.append("SIMULATED. The station that these results come from is a simulation: no device was measured.")
     if c.amendment.replaced_by:
-        found.append(f"This certificate was replaced by certificate {c.amendment.replaced_by}.")
+        notices.append(f"This certificate was replaced by certificate {c.amendment.replaced_by}.")
     if c.amendment.replaces:
         changed = c.amendment.reason or "reason not stated"
-        found.append(
+        notices.append(
             f"This certificate amends and replaces certificate {', '.join(c.amendment.replaces)}. Change: {changed}"
         )
-    return found
+    return notices
 
 
 def _head(c: CertificateContent) -> list[list[Any]]:

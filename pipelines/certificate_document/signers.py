@@ -49,16 +49,16 @@ def read_trusted(paths: Sequence[Path]) -> tuple[Certificate, ...]:
     WrongUse
         A file cannot be read or holds no certificate.
     """
-    found: list[Certificate] = []
+    trusted: list[Certificate] = []
     for path in paths:
         try:
-            found += load_pem_x509_certificates(path.read_bytes())
+            trusted += load_pem_x509_certificates(path.read_bytes())
         except (OSError, ValueError) as problem:
             raise WrongUse(
                 f"--trust: {path} holds no certificate that can be read ({problem}); give a PEM file with the certificate of "
                 "the laboratory or of its authority"
             ) from None
-    return tuple(found)
+    return tuple(trusted)
 
 
 def not_trusted(signer: Signer, trusted: Sequence[Certificate], issued: str) -> str:

@@ -88,18 +88,18 @@ def _matched(pattern: re.Pattern[str], lines: list[str]) -> str:
 
 
 def _numbers(root: Any) -> dict[str, tuple[str, ...]]:
-    found: dict[str, tuple[str, ...]] = {}
+    numbers: dict[str, tuple[str, ...]] = {}
     for result in _all(root, "//dcc:result"):
         head = _first(result, "dcc:name/dcc:content/text()")
         for real in _all(result, ".//si:real"):
             quantity = _first(real, "../dcc:name/dcc:content/text()")
             own = [part for part in (head, quantity, _first(real, "si:label/text()")) if part]
             key, count = "; ".join(own), 1
-            while key in found:  # a second number of the same name does not hide the first
+            while key in numbers:  # a second number of the same name does not hide the first
                 count += 1
                 key = f"{'; '.join(own)} ({count})"
-            found[key] = tuple(
+            numbers[key] = tuple(
                 _first(real, f"{path}/text()")
                 for path in ("si:value", "si:unit", "si:expandedUnc/si:uncertainty", "si:expandedUnc/si:coverageFactor")
             )
-    return found
+    return numbers

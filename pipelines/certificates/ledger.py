@@ -71,10 +71,10 @@ class Ledger:
             histories_of,  # needs a table library; the look-up of one unit does not
         )
 
-        found = histories_of(self.root)
-        for folder, problem in found.problems.items():
+        histories = histories_of(self.root)
+        for folder, problem in histories.problems.items():
             raise ArchiveUnusable(f"calibrations: {folder} {problem}")
-        return found.units
+        return histories.units
 
     def add(self, event: LedgerEntry, *, supersede: bool = False) -> tuple[LedgerEntry, bool]:
         """The event that certifies a calibration, and whether it existed before.
@@ -175,14 +175,14 @@ class Ledger:
         return f"{folder_of(serial)}/{sequence:06d}.json"
 
     def _read(self, serial: str) -> list[tuple[LedgerEntry, str]]:
-        found = _events(self._folder(serial))
-        for event, _ in found:
+        events = _events(self._folder(serial))
+        for event, _ in events:
             if event.serial != serial:
                 where = self._folder(serial)
                 raise ArchiveUnusable(
                     f"calibrations: {where} holds unit {event.serial!r}, {serial!r} is needed; restore it from a copy"
                 )
-        return found
+        return events
 
 
 def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
@@ -192,7 +192,7 @@ def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
     else:
         names = sorted(path.name for path in folder.iterdir())
     names = [name for name in names if name.endswith(".json") and hash_chain.is_number(name.removesuffix(".json"))]
-    found: list[tuple[LedgerEntry, str]] = []
+    events: list[tuple[LedgerEntry, str]] = []
     for count, name in enumerate(names, 1):
         place = folder / name
         data = place.read_bytes()
@@ -201,8 +201,8 @@ def _events(folder: Place) -> list[tuple[LedgerEntry, str]]:
             raise ArchiveUnusable(
                 f"calibrations: {folder} has event {name} where number {count} is needed; restore the missing file from a copy"
             )
-        found.append((event, hashlib.sha256(data).hexdigest()))
-    return found
+        events.append((event, hashlib.sha256(data).hexdigest()))
+    return events
 
 
 def _stamped(event: LedgerEntry, known: Sequence[tuple[LedgerEntry, str]]) -> LedgerEntry:

@@ -58,16 +58,16 @@ class Histories:
 
 def histories_of(root: Place) -> Histories:
     """The events of all units of an archive, from the index where it is up to date."""
-    found = Histories()
+    histories = Histories()
     stamps = stamps_of(root / FOLDER)
     for digit in DIGITS:
         own = stamps.get(digit, {})
         if own:
-            _gather(found, root, _events(found, root, digit, own))
-    return found
+            _gather(histories, root, _events(histories, root, digit, own))
+    return histories
 
 
-def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
+def _events(histories: Histories, root: Place, digit: str, stamps: Mapping[str, str]) -> dict[str, LedgerEntry | str]:
     """Events by the places of their files, or the fault of a file; new events are added to the index."""
     place = root / INDEX_FOLDER / f"{digit}.noted"
     before, state = indexed_events(place)
@@ -76,7 +76,7 @@ def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]
     known = {name: one for name, one in before.items() if stamps.get(name) == one.stamp}
     missing = [name for name in stamps if name not in known]
     read = all_read(root / FOLDER, missing)
-    found.read += len(read)
+    histories.read += len(read)
     new = {name: IndexedEvent(stamps[name], event) for name, event in read.items() if isinstance(event, LedgerEntry)}
     if len(new) + len(before) - len(known) >= FEWEST_NEW or state == derived.EDITED:
         with suppress(ArchiveUnusable):  # a reader without write permission does without the index
@@ -84,7 +84,7 @@ def _events(found: Histories, root: Place, digit: str, stamps: Mapping[str, str]
     return {name: known[name].event if name in known else read[name] for name in stamps}
 
 
-def _gather(found: Histories, root: Place, events: Mapping[str, LedgerEntry | str]) -> None:
+def _gather(histories: Histories, root: Place, events: Mapping[str, LedgerEntry | str]) -> None:
     """Collect the events of every unit; a unit with a missing, foreign or unreadable event is a problem."""
     by_unit: dict[str, list[str]] = {}
     for name in sorted(events):
@@ -95,11 +95,11 @@ def _gather(found: Histories, root: Place, events: Mapping[str, LedgerEntry | st
             event = events[name]
             wrong = event if isinstance(event, str) else _wrong(event, folder, count, name)
             if wrong or isinstance(event, str):
-                found.problems[str(root / FOLDER / folder)] = wrong
+                histories.problems[str(root / FOLDER / folder)] = wrong
                 break
             own.append(event)
         else:
-            found.units.append(own)
+            histories.units.append(own)
 
 
 def _wrong(event: LedgerEntry, folder: str, count: int, name: str) -> str:
@@ -117,8 +117,8 @@ def all_read(top: Place, names: Sequence[str]) -> dict[str, LedgerEntry | str]:
     groups = [names[k : k + AT_ONCE] for k in range(0, len(names), AT_ONCE)]
     out: dict[str, LedgerEntry | str] = {}
     with ThreadPoolExecutor(READERS) as pool:
-        for group, found in zip(groups, pool.map(lambda own: [_read(top, name) for name in own], groups), strict=True):
-            out |= zip(group, found, strict=True)
+        for group, events in zip(groups, pool.map(lambda own: [_read(top, name) for name in own], groups), strict=True):
+            out |= zip(group, events, strict=True)
     return out
 
 
@@ -204,8 +204,8 @@ def stamps_of(top: Place) -> dict[str, dict[str, str]]:
         return {}
     shards = [name for name in sorted(os.listdir(top)) if name[0] in DIGITS]  # noqa: PTH208 - names are enough
     with ThreadPoolExecutor(READERS) as pool:
-        for name, found in zip(shards, pool.map(lambda shard: _of_shard(top, shard), shards), strict=True):
-            out.setdefault(name[0], {}).update(found)
+        for name, stamps in zip(shards, pool.map(lambda shard: _of_shard(top, shard), shards), strict=True):
+            out.setdefault(name[0], {}).update(stamps)
     for name, stamp in _packed(top):
         out.setdefault(name[0], {}).setdefault(name, stamp)
     return out
@@ -213,9 +213,9 @@ def stamps_of(top: Place) -> dict[str, dict[str, str]]:
 
 def _packed(top: Path) -> Iterable[tuple[str, str]]:
     """Places of the packed events, with their sizes and times before they were packed."""
-    for folder, found in top.known.folders(FOLDER).items() if isinstance(top, PackedPath) else ():
+    for folder, packed in top.known.folders(FOLDER).items() if isinstance(top, PackedPath) else ():
         start = folder.removeprefix(f"{FOLDER}/")
-        for name, one in found.files.items():
+        for name, one in packed.files.items():
             yield f"{start}/{name}", f"{one.size}.{one.mtime_ns}"
 
 
@@ -224,8 +224,8 @@ def _of_shard(top: Path, shard: str) -> dict[str, str]:
     with os.scandir(top / shard) as units:
         for unit in units:
             if unit.is_dir():
-                with os.scandir(unit.path) as found:
-                    events = [one for one in found if one.name.endswith(".json") and one.name[0] != "."]
+                with os.scandir(unit.path) as entries:
+                    events = [one for one in entries if one.name.endswith(".json") and one.name[0] != "."]
                 for one in events:
                     about = one.stat()
                     out[f"{shard}/{unit.name}/{one.name}"] = f"{about.st_size}.{about.st_mtime_ns}"

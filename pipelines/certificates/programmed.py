@@ -42,14 +42,14 @@ def programming(root: Place, serial: str) -> list[dict[str, Any]]:
         return []
     numbered = [place.name.removesuffix(".json") for place in folder.iterdir() if place.name.endswith(".json")]
     names = sorted(name for name in numbered if hash_chain.is_number(name))
-    found = [files.read_json(folder / f"{name}.json") for name in names]
-    for count, (name, entry) in enumerate(zip(names, found, strict=True), 1):
+    entries = [files.read_json(folder / f"{name}.json") for name in names]
+    for count, (name, entry) in enumerate(zip(names, entries, strict=True), 1):
         if name != f"{count:06d}" or entry.get("serial") != serial:
             raise ArchiveUnusable(
                 f"programming: {folder} has entry {name} of unit {entry.get('serial')!r} where entry {count} of {serial!r} is "
                 "needed; restore it from a copy"
             )
-    return found
+    return entries
 
 
 def add(root: Place, serial: str, event: Event, content: Mapping[str, Any]) -> dict[str, Any]:

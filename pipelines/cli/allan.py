@@ -70,9 +70,9 @@ def command(
 
     if spacing not in SPACINGS:
         raise WrongUse(f"--spacing: found '{spacing[:40]}', octave or decade is needed; correct it")
-    found = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
+    series = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
     with error_console().status("averaging"):
-        document = allan_of_run(Archive(archive).run(source)) if found is None else allan_document(found, spacing)
+        document = allan_of_run(Archive(archive).run(source)) if series is None else allan_document(series, spacing)
     write_pictures(document, plot, page)
     if as_json:
         print_json(document)
@@ -159,12 +159,12 @@ def allan_of_run(run: Run) -> dict[str, Any]:
     curves, noise = run.table("allan"), run.table("noise")
     readings = run.table("readings")
     static = readings[readings["kind"] == "allan"]
-    found = []
+    channels = []
     for (unit, axis), own in curves.groupby(["unit", "axis"], sort=False):
         columns = ("tau_s", "deviation_ug", "low_ug", "high_ug")
         tau, deviation, low, high = (own[name].tolist() for name in columns)
         fitted = own["fitted_ug"].tolist() if own["fitted_ug"].notna().all() else None
-        found.append(
+        channels.append(
             {
                 "channel": f"{unit} {axis}",
                 "tau_s": tau,
@@ -190,7 +190,7 @@ def allan_of_run(run: Run) -> dict[str, Any]:
         "samples": int(static["n"].max()),
         "confidence": 0.6827,
         "term_confidence": 0.95,
-        "curves": found,
+        "curves": channels,
         "terms": rows,
         "notes": notes,
     }

@@ -66,58 +66,58 @@ def command(
 
     store, scope = Archive(archive), scope_of(since, until, device, station)
     count = workers or processors()
-    found = audit(store, load_rules(rules), scope, distribute=on_dask(dask, count), workers=count)
-    _refuse_nothing(found, str(store.root))
-    audit_findings = findings(found)
+    audited = audit(store, load_rules(rules), scope, distribute=on_dask(dask, count), workers=count)
+    _refuse_nothing(audited, str(store.root))
+    audit_findings = findings(audited)
     if page is not None:
-        _write_page(page, found, audit_findings, str(store.root))
+        _write_page(page, audited, audit_findings, str(store.root))
     if as_json:
-        print_json(document(found, audit_findings, str(store.root)))
+        print_json(document(audited, audit_findings, str(store.root)))
     else:
-        _show(found, audit_findings, page)
+        _show(audited, audit_findings, page)
     raise typer.Exit(PART_FAILED if audit_findings else DONE)
 
 
-def _refuse_nothing(found: Audit, root: str) -> None:
+def _refuse_nothing(audited: Audit, root: str) -> None:
     """Refuse an unknown name, and an archive without calibrations before the day."""
     import numpy as np
 
     from schemas.errors import did_you_mean
 
     for option, name, there in (
-        ("--device", found.scope.device.upper(), found.all.device),
-        ("--station", found.scope.station, found.all.station),
+        ("--device", audited.scope.device.upper(), audited.all.device),
+        ("--station", audited.scope.station, audited.all.station),
     ):
-        if name and len(found.all) and name not in there:
+        if name and len(audited.all) and name not in there:
             known = [str(one) for one in np.unique(there.astype(str))]
             raise WrongUse(f"audit: {option} '{name}' has no calibration in {root}; {did_you_mean(name, known)}")
-    if not len(found.all) and not found.problems:
+    if not len(audited.all) and not audited.problems:
         raise WrongUse(
             f"audit: {root} has no calibration in this time, one at least is needed; make a run, or give another --until"
         )
 
 
-def _write_page(page: Path, found: Audit, audit_findings: list[AuditFinding], root: str) -> None:
+def _write_page(page: Path, audited: Audit, audit_findings: list[AuditFinding], root: str) -> None:
     from pipelines.archive.files import ELSEWHERE, publish
     from pipelines.audit.page import render
 
-    publish(page, render(found, audit_findings, root).encode(), "audit", ELSEWHERE)
+    publish(page, render(audited, audit_findings, root).encode(), "audit", ELSEWHERE)
 
 
-def _show(found: Audit, audit_findings: list[AuditFinding], page: Path | None) -> None:
+def _show(audited: Audit, audit_findings: list[AuditFinding], page: Path | None) -> None:
     from inertial.counts import number_of
     from pipelines.audit.calibrations import date_of
     from pipelines.audit.document import counts
     from pipelines.audit.finding import WHO
 
-    out, number = console(), counts(found)
-    period = f"{date_of(found.scope.since)} to {date_of(found.scope.until - 1)}" if found.scope.since > _BEGINNING else (
-        f"all until {date_of(found.scope.until - 1)}"
+    out, number = console(), counts(audited)
+    period = f"{date_of(audited.scope.since)} to {date_of(audited.scope.until - 1)}" if audited.scope.since > _BEGINNING else (
+        f"all until {date_of(audited.scope.until - 1)}"
     )  # fmt: skip
     counted = ", ".join(number_of(number[f"{noun}s"], noun) for noun in ("calibration", "unit", "run", "station"))
     out.print(f"{counted}; {period}", markup=False, soft_wrap=True)
-    _show_yield(found)
-    out.print(_certificates(found), markup=False, soft_wrap=True)
+    _show_yield(audited)
+    out.print(_certificates(audited), markup=False, soft_wrap=True)
     for who, words in WHO.items():
         own = [finding for finding in audit_findings if finding.who == who]
         if own:
@@ -133,14 +133,12 @@ def _show(found: Audit, audit_findings: list[AuditFinding], page: Path | None) -
 _BEGINNING = -700000.0  # days before any calibration
 
 
-def _certificates(found: Audit) -> str:
+def _certificates(audited: Audit) -> str:
     """The state of the ledger in one line."""
-    if not len(found.certificates):
+    if not len(audited.certificates):
         return "ledger  nothing is certified: units are due an interval after their last pass"
-    valid = (
-        f"{int(found.due.valid.sum())} of {found.due.row.size} units have one that is valid on {found.certificates.day}"
-    )
-    return f"ledger  {len(found.certificates)} certificates; {valid}"
+    valid = f"{int(audited.due.valid.sum())} of {audited.due.row.size} units have one that is valid on {audited.certificates.day}"
+    return f"ledger  {len(audited.certificates)} certificates; {valid}"
 
 
 def _show_kind(own: list[AuditFinding]) -> None:
@@ -150,8 +148,8 @@ def _show_kind(own: list[AuditFinding]) -> None:
         console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page list all", style="dim")
 
 
-def _show_yield(found: Audit) -> None:
-    shares: list[Any] = [share for share in found.yields if share.of in {"all", "station"}]
+def _show_yield(audited: Audit) -> None:
+    shares: list[Any] = [share for share in audited.yields if share.of in {"all", "station"}]
     parts = [f"{share.name} {short(100.0 * share.interval.value)} %" for share in shares if share.total]
     if parts:
         console().print(f"yield   {', '.join(parts)}", markup=False, soft_wrap=True)

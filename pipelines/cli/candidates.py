@@ -45,10 +45,10 @@ def _completer(names: Callable[[Context], Iterable[str]]) -> Callable[[Context, 
         before, comma, last = incomplete.rpartition(",") if listed else ("", "", incomplete)
         given = set(before.split(","))
         try:
-            found = sorted({*names(ctx)})
+            known = sorted({*names(ctx)})
         except (TumblelineError, OSError, ValueError):  # an error belongs to the command, not to a press of the tab key
             return []
-        return [f"{before}{comma}{name}" for name in found if name.startswith(last) and name not in given]
+        return [f"{before}{comma}{name}" for name in known if name.startswith(last) and name not in given]
 
     return complete
 

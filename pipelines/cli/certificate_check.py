@@ -63,9 +63,9 @@ def _archive(name: str | None) -> Archive | None:
 
     if name is None and not os.environ.get("TUMBLELINE_ARCHIVE") and not Path("archive").is_dir():
         return None
-    found = Archive(name)
-    found.refuse_none()
-    return found
+    archive = Archive(name)
+    archive.refuse_none()
+    return archive
 
 
 def _document(one: CheckedFile) -> dict[str, Any]:

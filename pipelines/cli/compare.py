@@ -139,8 +139,8 @@ def _parameters(document: dict[str, Any]) -> None:
 
 def _interval(document: dict[str, Any], effect: str, parameter: str) -> str:
     """The interval of a nonlinear parameter; values that differ between the axes, or are chosen from a few, have none."""
-    found = document["nonlinear_interval"].get(effect, {}).get(parameter)
-    return f"{short(found[0])} to {short(found[1])}" if found else "not estimated"
+    interval = document["nonlinear_interval"].get(effect, {}).get(parameter)
+    return f"{short(interval[0])} to {short(interval[1])}" if interval else "not estimated"
 
 
 def _around(row: dict[str, Any]) -> str:

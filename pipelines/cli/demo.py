@@ -130,7 +130,7 @@ class _Game:
         diagnosis = self._diagnose()
         added = self._extend(diagnosis["recommended"])
         after = self._compare("4. How good is the extended model?", first=False) if added else before
-        found = {name for group in diagnosis["classes"] for name in group["effects"]}
+        named = {name for group in diagnosis["classes"] for name in group["effects"]}
         several = [group["effects"] for group in diagnosis["classes"] if len(group["effects"]) > 1]
         document = {
             "hidden": {"kind": self.hidden.kind, "effect": self.hidden.effect, "physics": self.hidden.truth},
@@ -138,7 +138,7 @@ class _Game:
             "recommended": diagnosis["recommended"],
             "unseen": diagnosis["unseen"],
             "added": added,
-            "found": self.hidden.effect in found,
+            "found": self.hidden.effect in named,
             "told_apart": [self.hidden.effect] in [group["effects"] for group in diagnosis["classes"]],
             "not_told_apart": several,
             "next_measurements": diagnosis["next_measurements"] if several else [],

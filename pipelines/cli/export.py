@@ -21,7 +21,7 @@ EXAMPLES = (
 BINARY = ".mat"
 
 _FOLDER = Path(__file__).parent.parent / "export" / "formats"
-_FORMATS = {found.name: "" for found in iter_modules([str(_FOLDER)])}  # their names, without importing them
+_FORMATS = {module.name: "" for module in iter_modules([str(_FOLDER)])}  # their names, without importing them
 for _name in _FORMATS:  # the first line of a module says what it writes
     _line = (_FOLDER / f"{_name}.py").read_text(encoding="utf-8").partition("\n")[0]
     _FORMATS[_name] = _line.strip('"').partition(": ")[2].replace("``", "")

@@ -48,13 +48,13 @@ def command(
     from pipelines.jobs.job import job_of_run
 
     store = Archive(archive)
-    found = store.run(run)
-    if not found.about.get("capture"):
+    stored = store.run(run)
+    if not stored.about.get("capture"):
         from pipelines.cli.imported_fit import fit_import
 
-        raise typer.Exit(fit_import(found, (effects, model, limits), leave_out, as_json=as_json))
+        raise typer.Exit(fit_import(stored, (effects, model, limits), leave_out, as_json=as_json))
     if leave_out:
-        raise WrongUse(f"run {found.id}: --leave-out is for imports, this run was captured; measure the dwell again")
+        raise WrongUse(f"run {stored.id}: --leave-out is for imports, this run was captured; measure the dwell again")
     listed = [name.strip() for name in effects.split(",")] if effects else []
     job = job_of_run(store.run(run), effects=listed, model=model, limits=limits)
     runner = Runner(job, store)

@@ -57,25 +57,25 @@ def command(
     from pipelines.jobs.model_files import read_model, versions
 
     add_effect_files(effect_file)
-    found = read_model(model)
+    model_file = read_model(model)
     _refuse_picture(picture, dwells)
     if dwells:
         tables = both_runs(dwells, history, fresh, fresh_history, archive)
-        rows = evolution(versions(found), lambda effects, before: compared(effects, *tables, before=before))
+        rows = evolution(versions(model_file), lambda effects, before: compared(effects, *tables, before=before))
     else:
         rows = [
             {**change_row(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}
-            for version in versions(found)
+            for version in versions(model_file)
         ]
     if picture is not None:
         from pipelines.report.evolution import draw_evolution
 
-        draw_evolution(rows, picture, found.model.name)
+        draw_evolution(rows, picture, model_file.model.name)
         error_console().print(f"picture: {picture}", markup=False, soft_wrap=True)
     if as_json:
-        print_json({"model": found.model.name, "file": str(model), "versions": rows})
+        print_json({"model": model_file.model.name, "file": str(model), "versions": rows})
     else:
-        _print(rows, found.model.name, model)
+        _print(rows, model_file.model.name, model)
 
 
 def _refuse_picture(picture: Path | None, dwells: str) -> None:

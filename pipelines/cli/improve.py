@@ -266,10 +266,10 @@ class _Improvement:
         others = {choice["effect"]: choice["not_separated_from"] for choice in choices}
         steps = [model_step(name, self._reason(others[name]), self.by, self.data) for name in added]
         text = model_text(self.model) if self.model else self._begun(new_model, effects, steps[0])
-        found = None
+        model = None
         for step in steps:
-            text, found = extended(text, step, f"model {self.target.name}")
-        return (versions(found)[-len(added) - 1 :] if found else [judged]), text
+            text, model = extended(text, step, f"model {self.target.name}")
+        return (versions(model)[-len(added) - 1 :] if model else [judged]), text
 
     def _begun(self, new_model: Any, effects: list[str], step: Any) -> str:
         """The first version of a new model file."""

@@ -29,11 +29,11 @@ def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
         return ""
     store = Archive(archive)
     run = store.run(source)
-    found = fresh_run_of(store, run)
-    if found is not None:
-        text = f"fresh run: {found.id}, the same units measured again"
+    fresh = fresh_run_of(store, run)
+    if fresh is not None:
+        text = f"fresh run: {fresh.id}, the same units measured again"
         error_console().print(text, markup=False, soft_wrap=True)
-        return found.id
+        return fresh.id
     if measure is False or not repeatable(run):
         return ""
     return _measured(store, run, ask=measure is None)

@@ -54,12 +54,12 @@ def command(
     sets = [files] if join or len(files) == 1 else [[path] for path in files]
     if len(sets) > 1 and (picture or page):
         raise WrongUse(f"inspect: {len(sets)} recordings, --picture and --page show one; name one file, or add --join")
-    found: list[Inspection] = []
+    inspections: list[Inspection] = []
     for paths in sets:
         with error_console().status(f"reading {paths[0].name}"):
-            found.append(inspect(paths, join=join, group=group))
-    _write(found[0], picture, page)
-    documents = [one.document for one in found]
+            inspections.append(inspect(paths, join=join, group=group))
+    _write(inspections[0], picture, page)
+    documents = [one.document for one in inspections]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"inspections": documents})
     else:
@@ -74,15 +74,15 @@ def command(
     raise typer.Exit(PART_FAILED if any(document["open"] for document in documents) else DONE)
 
 
-def _write(found: Inspection, picture: Path | None, page: Path | None) -> None:
+def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> None:
     if picture is None and page is None:
         return
     from pipelines.report import recording
 
-    if picture is not None and not recording.save_picture(found, picture):
+    if picture is not None and not recording.save_picture(inspection, picture):
         raise WrongUse("inspect: no columns of acceleration were recognised, nothing can be drawn; leave out --picture")
     if page is not None:
-        page.write_text(recording.page(found), encoding="utf-8")
+        page.write_text(recording.page(inspection), encoding="utf-8")
 
 
 def _print(one: InspectDocument) -> None:

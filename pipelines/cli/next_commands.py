@@ -82,9 +82,9 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     if not repeatable(run):
         return JudgedData(run.id, history, archive=archive)
     refusal = partial(fit_refusal, run)
-    found = fresh_run_of(store, run)
-    if found is not None:
-        return JudgedData(run.id, history, found.id, archive=archive, refusal=refusal)
+    fresh_run = fresh_run_of(store, run)
+    if fresh_run is not None:
+        return JudgedData(run.id, history, fresh_run.id, archive=archive, refusal=refusal)
     repeat = fresh_repeat(store, run)
     job = measured_again(job_of_run(run), repeat)
     words = ("run", f"{OF_RUN}{run.id}", "--repeat", str(repeat), *archive_words(archive))

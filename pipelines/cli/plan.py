@@ -135,12 +135,14 @@ def command(
     from schemas.station import load_station
 
     config = load_station(station)
-    found = with_moved_poses(
+    planned_recipe = with_moved_poses(
         with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
     )
-    context = plan_context(found, config, noise_of(found, device or found.device, noise, wander))
-    limits = _limits(found, folder_of(recipe))
-    document = plan(context, planned_terms(found, config, limits), limits)
+    context = plan_context(
+        planned_recipe, config, noise_of(planned_recipe, device or planned_recipe.device, noise, wander)
+    )
+    limits = _limits(planned_recipe, folder_of(recipe))
+    document = plan(context, planned_terms(planned_recipe, config, limits), limits)
     if page is not None:
         _write(page, document, context)
         document["page"] = str(page)
@@ -317,8 +319,8 @@ def with_model(recipe: str, effects: str, model: Path | None, archive: str | Non
         use_formulas(keys["formulas"], "the line's model")
         return keys
 
-    found = load_recipe(recipe, line)
-    return found.model_copy(update={"effects": list(chosen)}) if chosen else found
+    loaded = load_recipe(recipe, line)
+    return loaded.model_copy(update={"effects": list(chosen)}) if chosen else loaded
 
 
 def _write(page: Path, document: dict[str, Any], context: PlanContext) -> None:

@@ -70,13 +70,13 @@ def command(
     from pipelines.cli.series_options import even_series
     from pipelines.cli.series_pictures import write_pictures
 
-    found = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
-    if found is None:
+    series = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
+    if series is None:
         raise WrongUse(
             f"psd: run {source} was captured, a file or an import is needed; export its samples, or see 'tumbleline allan'"
         )
     with error_console().status("averaging"):
-        document = psd_document(found, segment)
+        document = psd_document(series, segment)
     write_pictures(document, plot, page)
     if as_json:
         print_json(document)

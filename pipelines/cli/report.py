@@ -20,14 +20,14 @@ def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_js
     from pipelines.archive import Archive
     from pipelines.report import make_report
 
-    found = Archive(archive).run(run)
-    if found.about.get("capture") or found.about.get("parents"):
-        make_report(found)
+    stored = Archive(archive).run(run)
+    if stored.about.get("capture") or stored.about.get("parents"):
+        make_report(stored)
     else:
         from pipelines.cli.imported_report import make_imported_report
 
-        make_imported_report(found)
+        make_imported_report(stored)
     if as_json:
-        print_json({"run": found.id, "report": str(found.report)})
+        print_json({"run": stored.id, "report": str(stored.report)})
     else:
-        typer.echo(found.report)
+        typer.echo(stored.report)

@@ -119,24 +119,26 @@ def _listed(document: dict[str, Any]) -> list[tuple[str, str]]:
     """Figures of procedures that have a limit, with their heads."""
     from pipelines.procedures import FIGURES
 
-    found: dict[str, str] = {}
+    heads: dict[str, str] = {}
     for unit in document["units"]:
         for name, figure in unit["figures"].items():
             if name in FIGURES and figure["outcome"] != "no limit":
                 unit_text = "" if figure["unit_text"] == "1" else figure["unit_text"]
-                found[name] = f"{name.replace('_', ' ')}\n{unit_text}"
-    return list(found.items())
+                heads[name] = f"{name.replace('_', ' ')}\n{unit_text}"
+    return list(heads.items())
 
 
-def _interrupted(found: Interruptions | None) -> list[str]:
+def _interrupted(interrupted: Interruptions | None) -> list[str]:
     """The interruptions of a run as lines; empty if there were none."""
-    if not found or not found["events"]:
+    if not interrupted or not interrupted["events"]:
         return []
-    door = f", the door was opened {number_of(found['door_opened'], 'time')}" if found["door_opened"] else ""
-    head = f"  station: {number_of(found['pauses'], 'pause')} ({found['paused_s'] / 60.0:.1f} min waited){door}"
+    door = (
+        f", the door was opened {number_of(interrupted['door_opened'], 'time')}" if interrupted["door_opened"] else ""
+    )
+    head = f"  station: {number_of(interrupted['pauses'], 'pause')} ({interrupted['paused_s'] / 60.0:.1f} min waited){door}"
     dwells = [
         f"  dwell {one['record']} (pose {one['pose']}) measured again {number_of(one['times'], 'time')}: "
         f"{'; '.join(one['reasons'])}"
-        for one in found["repeated_dwells"]
+        for one in interrupted["repeated_dwells"]
     ]
     return [head, *dwells]

@@ -34,17 +34,17 @@ def import_and_print(
         raise WrongUse("import: no serial number, the recordings of a test need one; add --unit SN")
     columns, units, rate, group = stated
     layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
-    found = import_waveforms(paths, procedure, part, unit, layout, archive)
+    imported = import_waveforms(paths, procedure, part, unit, layout, archive)
     if as_json:
-        print_json(dict(found))
+        print_json(dict(imported))
     else:
         out = console()
-        out.print(f"{found['unit']}: {found['records']} recordings, kept as run {found['run']}", markup=False)
+        out.print(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}", markup=False)
         rows = [
             [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
-            for one in found["figures"]
+            for one in imported["figures"]
         ]
         print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
-        for line in found["text"]:
+        for line in imported["text"]:
             out.print(f"  {line}", markup=False, soft_wrap=True)
-    return DONE if all(one["identified"] for one in found["figures"]) else PART_FAILED
+    return DONE if all(one["identified"] for one in imported["figures"]) else PART_FAILED

@@ -48,9 +48,9 @@ def command(
 
     if form not in WRITERS:
         raise WrongUse(f"waveforms: no format is called '{form}'; {did_you_mean(form, WRITERS)}")
-    found = Archive(archive).run(run)
-    channels = channels_of(found, record, unit)
-    place = output or Path(f"{found.id[:12]}-record{record}{WRITERS[form].SUFFIX}")
+    stored = Archive(archive).run(run)
+    channels = channels_of(stored, record, unit)
+    place = output or Path(f"{stored.id[:12]}-record{record}{WRITERS[form].SUFFIX}")
     for path in write_waveforms(form, channels, place):
         console().print(f"{path}: {', '.join(one.name for one in channels)}", markup=False)
 

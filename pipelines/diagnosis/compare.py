@@ -64,17 +64,17 @@ def compare(
 
 
 def _compared(
-    found: Measured, effects: Sequence[str], fresh: Measured | None, before: Sequence[str] | None
+    measurement: Measured, effects: Sequence[str], fresh: Measured | None, before: Sequence[str] | None
 ) -> dict[str, Any]:
     square = "misalignment" not in effects
-    problem = Problem(lot_of(found, square=square))
+    problem = Problem(lot_of(measurement, square=square))
     model = Model(problem, terms_of(catalogue.get_all(effects), problem))
     refuse_without_freedom(model)
     model = settled(model)
     fitted = estimate(model)
     left = residuals_of(problem, fitted)
     out = left_out(model)
-    units = _by_unit(found, left)
+    units = _by_unit(measurement, left)
     answer: dict[str, Any] = {
         "effects": [t.effect.id for t in model.terms],
         "rms_ug": MICRO * rms(left),
@@ -83,27 +83,27 @@ def _compared(
         "heldout": {kind: MICRO * rms(out.missed[kind]) for kind in out.density},
         "fresh_rms_ug": None,
         "by_unit": {
-            u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None} for u, r in zip(found.units, units, strict=True)
+            u: {"rms_ug": MICRO * rms(r), "fresh_rms_ug": None} for u, r in zip(measurement.units, units, strict=True)
         },
         "by_axis": _by_axis(left, radial=problem.lot.radial),
-        "by_pose": _by_pose(found, left),
+        "by_pose": _by_pose(measurement, left),
         "nonlinear": {t.effect.id: t.keywords for t in model.terms if t.keywords},
         "nonlinear_interval": intervals(model),
         "station": _station(fitted),
-        "warnings": without_history(found, model.terms),
+        "warnings": without_history(measurement, model.terms),
         "progress": None,
     }
     again: Measured | None = None
     if fresh is not None:
-        again = _same_units(found, fresh)
-        on_fresh = residuals_of(Problem(lot_of(again, like=found, square=square)), fitted)
+        again = _same_units(measurement, fresh)
+        on_fresh = residuals_of(Problem(lot_of(again, like=measurement, square=square)), fitted)
         answer["fresh_rms_ug"] = MICRO * rms(on_fresh)
         for unit, values in zip(again.units, _by_unit(again, on_fresh), strict=True):
             answer["by_unit"][unit]["fresh_rms_ug"] = MICRO * rms(values)
         answer["fresh_by_pose"] = _by_pose(again, on_fresh)
     if before is not None:
         lesser = Model(problem, terms_of(catalogue.get_all(list(before)), problem))
-        lot = None if again is None else lot_of(again, like=found, square=square)
+        lot = None if again is None else lot_of(again, like=measurement, square=square)
         answer["progress"] = progress(lesser, model, out, lot)
         if again is not None and _remember(again, [t for t in model.terms if t.effect.id not in set(before)]):
             answer["progress"]["confirmed"] = None  # its prediction cannot be computed
@@ -116,21 +116,21 @@ def _compared(
     return answer
 
 
-def without_history(found: Measured, terms: Sequence[Term]) -> list[str]:
+def without_history(measurement: Measured, terms: Sequence[Term]) -> list[str]:
     """A warning for every effect that depends on the temperature between the dwells if its history is missing."""
     return [
         f"{name} depends on the temperature between the dwells, and no history was given: its size is unreliable; give "
         "--history FILE"
-        for name in _remember(found, terms)
+        for name in _remember(measurement, terms)
     ]
 
 
-def _remember(found: Measured, terms: Sequence[Term]) -> list[str]:
+def _remember(measurement: Measured, terms: Sequence[Term]) -> list[str]:
     """The effects that depend on the temperature between the dwells; none if its history is given."""
-    if found.state.temperature is None or found.state.history is not None:
+    if measurement.state.temperature is None or measurement.state.history is not None:
         return []
     own = [t.effect for t in terms if not isinstance(t.effect, Handling)]
-    return [e.id for e in own if e.memory and "temperature" in drivers_of(found.state, e)]
+    return [e.id for e in own if e.memory and "temperature" in drivers_of(measurement.state, e)]
 
 
 def _station(fitted: Estimate) -> list[dict[str, Any]]:
@@ -155,8 +155,8 @@ def _same_units(first: Measured, again: Measured) -> Measured:
     return again.pick([again.units.index(u) for u in first.units])
 
 
-def _by_unit(found: Measured, left: Array) -> Array:
-    return left.reshape(len(found.units), -1)
+def _by_unit(measurement: Measured, left: Array) -> Array:
+    return left.reshape(len(measurement.units), -1)
 
 
 def _by_axis(left: Array, *, radial: bool) -> dict[str, float]:
@@ -165,11 +165,11 @@ def _by_axis(left: Array, *, radial: bool) -> dict[str, float]:
     return {axis: MICRO * rms(left[i::3]) for i, axis in enumerate("xyz")}
 
 
-def _by_pose(found: Measured, left: Array) -> list[dict[str, Any]]:
+def _by_pose(measurement: Measured, left: Array) -> list[dict[str, Any]]:
     """RMS residual of each pose over all units and axes, worst first."""
-    if found.reference == "norm":
+    if measurement.reference == "norm":
         return []
-    force = np.round(found.state.force[0], 2) + 0.0
+    force = np.round(measurement.state.force[0], 2) + 0.0
     poses, place = np.unique(force, axis=0, return_inverse=True)
     place = place.reshape(-1)
     rows = [

@@ -40,22 +40,22 @@ def progress(before: Model, after: Model, out: LeftOut, fresh: Lot | None) -> di
 
 def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str, Any]:
     old, new = estimate(before), estimate(after)
-    found = reproduced_change(fresh, old, new)
+    change = reproduced_change(fresh, old, new)
     problem = Problem(fresh)
     rises = None
-    if found.confirmed is True:
+    if change.confirmed is True:
         unchanged = tuple(rms(residuals_of(problem, one)) for one in (old, new))
         rises = _rise("the error on the fresh run", *unchanged)
         rises = rises or _rise("the error on dwells left out", *_worst(before, out))
     return {
         "judged_by": "fresh run",
-        "confirmed": None if rises else found.confirmed,
+        "confirmed": None if rises else change.confirmed,
         "rises": rises,
-        "part": known(found.part),
-        "part_u": known(found.error),
-        "fall_ug": MICRO * found.fall,
-        "fall_u_ug": known(MICRO * found.fall_error),
-        "estimated_again": found.again,
+        "part": known(change.part),
+        "part_u": known(change.error),
+        "fall_ug": MICRO * change.fall,
+        "fall_u_ug": known(MICRO * change.fall_error),
+        "estimated_again": change.again,
         "log_density": None,
     }
 

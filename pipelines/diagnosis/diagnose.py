@@ -104,19 +104,19 @@ def examined(
     """
     model = list(effects) if effects else default_model(dwells)
     catalogue.get_all(model)
-    found, faults, lot = sound_lot(dwells, history, model, left_out)
+    measurement, faults, lot = sound_lot(dwells, history, model, left_out)
     if lot is None:
-        return found, faults, None
+        return measurement, faults, None
     try:
         # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
         with threadpool_limits(1):
-            return found, faults, diagnose_lot(lot, model, generator())
+            return measurement, faults, diagnose_lot(lot, model, generator())
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
 
 def document(
-    found: Measured, faults: list[Fault], diagnosis: Diagnosis | None, following: Proposed | None = None
+    measurement: Measured, faults: list[Fault], diagnosis: Diagnosis | None, following: Proposed | None = None
 ) -> dict[str, Any]:
     """The document of a diagnosis; if every unit has a data fault, no effect is judged.
 
@@ -124,7 +124,7 @@ def document(
     ----------
     following : what to measure next; by the capabilities of the station that the run shows if None
     """
-    blocked = [_fault(found, f) for f in faults]
+    blocked = [_fault(measurement, f) for f in faults]
     if diagnosis is None:
         return {
             "adequate": None,
@@ -146,10 +146,10 @@ def document(
             "next_measurements": [],
         }
     faulty = {f.unit for f in faults}
-    units = tuple(u for k, u in enumerate(found.units) if k not in faulty)
-    names = Names(units, tuple(int(d) for d in found.dwells))
+    units = tuple(u for k, u in enumerate(measurement.units) if k not in faulty)
+    names = Names(units, tuple(int(d) for d in measurement.dwells))
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
-    warnings = without_history(found, terms)
+    warnings = without_history(measurement, terms)
     return {
         "adequate": diagnosis.adequate,
         "reason": diagnosis.unjudged or None,
@@ -185,10 +185,10 @@ def document(
     }
 
 
-def _fault(found: Measured, fault: Fault) -> dict[str, Any]:
+def _fault(measurement: Measured, fault: Fault) -> dict[str, Any]:
     return {
         "fault": fault.name,
-        "units": [found.units[fault.unit]],
-        "dwells": [int(found.dwells[k]) for k in fault.dwells],
+        "units": [measurement.units[fault.unit]],
+        "dwells": [int(measurement.dwells[k]) for k in fault.dwells],
         "evidence": fault.evidence,
     }

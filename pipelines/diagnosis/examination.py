@@ -46,9 +46,9 @@ def examination(
     left_out : ``UNIT:DWELL``, which were removed from ``table`` on purpose
     """
     effects = list(judged) if judged else default_model(table)
-    found, faults, diagnosis = examined(table, history, effects, left_out)
-    whole = {**document(found, faults, diagnosis), **_extras(found.units, effects, diagnosis)}
-    return Examination(whole, found, diagnosis)
+    measurement, faults, diagnosis = examined(table, history, effects, left_out)
+    whole = {**document(measurement, faults, diagnosis), **_extras(measurement.units, effects, diagnosis)}
+    return Examination(whole, measurement, diagnosis)
 
 
 def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:

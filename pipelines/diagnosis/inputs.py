@@ -53,8 +53,8 @@ def _beside(source: str, what: str) -> str:
     if dwells.stem.endswith("dwells"):
         stems.append(f"{dwells.stem.removesuffix('dwells')}{what}")
     endings = dict.fromkeys((dwells.suffix, ".parquet", ".csv"))
-    found = (dwells.with_name(stem + ending) for stem in stems for ending in endings)
-    return next((str(path) for path in found if path.is_file()), "")
+    paths = (dwells.with_name(stem + ending) for stem in stems for ending in endings)
+    return next((str(path) for path in paths if path.is_file()), "")
 
 
 def judged_effects(source: str, archive: str | None, listed: str, model: Path | None, where: str) -> list[str] | None:

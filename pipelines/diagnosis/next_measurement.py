@@ -105,12 +105,12 @@ def _no_measurement(alike: Sequence[str]) -> dict[str, Any]:
     return {"outer_deg": outer, "inner_deg": inner, "chamber_C": temperature, "why": why, "measurable": False}
 
 
-def rows_of(found: Proposal) -> list[dict[str, Any]]:
+def rows_of(suggestion: Proposal) -> list[dict[str, Any]]:
     """Rows of one proposal: consecutive equal steps are one row with their number."""
     rows: list[dict[str, Any]] = []
     before: dict[str, Any] | None = None
-    about = " | ".join(found.pair) or f"not seen so far: {', '.join(found.ids)}"
-    for step in found.steps:
+    about = " | ".join(suggestion.pair) or f"not seen so far: {', '.join(suggestion.ids)}"
+    for step in suggestion.steps:
         row = {
             "outer_deg": _degrees(step.outer),
             "inner_deg": _degrees(step.inner),
@@ -126,11 +126,11 @@ def rows_of(found: Proposal) -> list[dict[str, Any]]:
             rows.append({**row, "repeats": 1})
         before = row
     whole = {
-        "minutes": round(found.minutes, 1),
-        "separation_before": round(found.before, 2),
-        "separation_after": round(found.after, 2),
-        **({"separation_if": {name: round(chi, 2) for name, chi in found.if_true}} if found.if_true else {}),
-        **({"not_parted": list(found.remaining)} if found.remaining else {}),
+        "minutes": round(suggestion.minutes, 1),
+        "separation_before": round(suggestion.before, 2),
+        "separation_after": round(suggestion.after, 2),
+        **({"separation_if": {name: round(chi, 2) for name, chi in suggestion.if_true}} if suggestion.if_true else {}),
+        **({"not_parted": list(suggestion.remaining)} if suggestion.remaining else {}),
     }
     return [{**row, **whole} for row in rows]
 

@@ -91,22 +91,22 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
     return row
 
 
-def _bad_dwell(diagnosis: Diagnosis, found: BadDwell, names: Names) -> dict[str, Any]:
-    size = float(np.linalg.norm(found.off))
+def _bad_dwell(diagnosis: Diagnosis, bad: BadDwell, names: Names) -> dict[str, Any]:
+    size = float(np.linalg.norm(bad.off))
     return {
         "effects": [BAD_DWELL],
         "scope": "data",
         "rms_after_ug": MICRO * diagnosis.rms,
         "heldout_after_ug": None,
-        "p_value": probability(-0.5 * found.deviations**2),
+        "p_value": probability(-0.5 * bad.deviations**2),
         "size_ug": MICRO * size,
         "nonlinear": {},
         "plausible": True,
-        "units": [names.units[found.unit]],
-        "dwells": [names.dwells[found.dwell]],
-        "influence": [{"unit": names.units[found.unit], "dwell": names.dwells[found.dwell], "share": 1.0}],
+        "units": [names.units[bad.unit]],
+        "dwells": [names.dwells[bad.dwell]],
+        "influence": [{"unit": names.units[bad.unit], "dwell": names.dwells[bad.dwell], "share": 1.0}],
         "without_influence": {"dwells": 1, "p_value": 1.0},
-        "evidence": f"{MICRO * size:.0f} µg off, {found.deviations:.1f} standard deviations; the dwell is left out",
+        "evidence": f"{MICRO * size:.0f} µg off, {bad.deviations:.1f} standard deviations; the dwell is left out",
     }
 
 
@@ -137,22 +137,22 @@ def smallest_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 def evidence_of(diagnosis: Diagnosis, names: Names) -> dict[str, Any] | None:
     """The basis of the verdict: degrees of freedom, condition, the bias without single dwells, the smallest cubic detected."""
-    found = diagnosis.evidence
-    if found is None:
+    evidence = diagnosis.evidence
+    if evidence is None:
         return None
     row: dict[str, Any] = {
-        "degrees_of_freedom": found.dof,
-        "condition": known(found.condition),
-        "bias_jackknife_ug": None if found.bias_spread is None else known(MICRO * found.bias_spread),
-        "bias_change_ug": None if found.bias_change is None else known(MICRO * found.bias_change),
+        "degrees_of_freedom": evidence.dof,
+        "condition": known(evidence.condition),
+        "bias_jackknife_ug": None if evidence.bias_spread is None else known(MICRO * evidence.bias_spread),
+        "bias_change_ug": None if evidence.bias_change is None else known(MICRO * evidence.bias_change),
         "bias_change_by": None,
         "largest_residual": None,
-        "smallest_cubic_ug": None if found.cubic is None else known(MICRO * found.cubic),
+        "smallest_cubic_ug": None if evidence.cubic is None else known(MICRO * evidence.cubic),
     }
-    if found.carrier is not None:
-        row["bias_change_by"] = {"unit": names.units[found.carrier[0]], "dwell": names.dwells[found.carrier[1]]}
-    if found.largest is not None:
-        size, unit, dwell = found.largest
+    if evidence.carrier is not None:
+        row["bias_change_by"] = {"unit": names.units[evidence.carrier[0]], "dwell": names.dwells[evidence.carrier[1]]}
+    if evidence.largest is not None:
+        size, unit, dwell = evidence.largest
         row["largest_residual"] = {
             "unit": names.units[unit],
             "dwell": names.dwells[dwell],

@@ -45,8 +45,8 @@ def _values(name: str, state: State) -> np.ndarray | None:
     if name not in NAMES or name not in QUANTITIES:
         return None
     attribute, factor, _ = QUANTITIES[name]
-    found = getattr(state, attribute)
-    return None if found is None else factor * found
+    values = getattr(state, attribute)
+    return None if values is None else factor * values
 
 
 def _cubic(name: str, values: np.ndarray) -> list[str]:

@@ -45,8 +45,8 @@ def shipped(name: str) -> Path | None:
     """A file or folder of the deployment: of the source tree, else of ``share/tumbleline``; None where it is in neither."""
     tree = Path(__file__).resolve().parents[2]
     places = [tree] if (tree / "pyproject.toml").is_file() else []
-    found = [place / name for place in (*places, Path(sysconfig.get_path("data")) / "share" / PRODUCT)]
-    return next((path for path in found if path.exists()), None)
+    paths = [place / name for place in (*places, Path(sysconfig.get_path("data")) / "share" / PRODUCT)]
+    return next((path for path in paths if path.exists()), None)
 
 
 def _python() -> Check:
@@ -66,7 +66,7 @@ def _product() -> Check:
 
 def _libraries() -> list[Check]:
     """Libraries that are missing or outside the ranges of the product or of one another: a check each, the product's first."""
-    found: dict[str, Check] = {}
+    checks: dict[str, Check] = {}
     count = 0
     for needed in _closure():
         count += 1
@@ -75,13 +75,13 @@ def _libraries() -> list[Check]:
         try:
             version = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found.setdefault(name, Check(PART, name, "fault", "not installed", f"{by} needs it", remedy))
+            checks.setdefault(name, Check(PART, name, "fault", "not installed", f"{by} needs it", remedy))
             continue
         if not needed.requirement.specifier.contains(version, prereleases=True):
             state = "fault" if by == PRODUCT else "warning"
             check = Check(PART, name, state, version, f"{needed.requirement.specifier} for {by}", remedy)
-            found.setdefault(name, check)
-    return list(found.values()) or [Check(PART, "libraries", "good", f"{count} requirements are met")]
+            checks.setdefault(name, check)
+    return list(checks.values()) or [Check(PART, "libraries", "good", f"{count} requirements are met")]
 
 
 def _closure() -> Iterator[Needed]:

@@ -213,7 +213,7 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
     flicker = flicker_of_steps(per / rate, max(1000.0 * per / rate, float(time[-1] - time[0])))
     limits = LikelyTerms(*(noise.value[symbol] / MICRO for symbol in ("N", "B", "K")))
     terms = limits if fit.curve is None else _likely(fit.curve, limits, noise.identified["B"])
-    found, at_limits = (
+    bias_track, at_limits = (
         track(
             bias_model(one.white, one.instability, one.walk, tracking.turn_on_ug / MICRO, flicker),
             middle, force, known, magnitude, per / rate,
@@ -221,18 +221,18 @@ def _tracked(recording: CorrectableRecording, fit: FitOfUnit, tracking: Tracking
         for one in (terms, limits)
     )  # fmt: skip
     last = np.arange(len(time)) // per
-    bias, own = found.expected[last], found.expected_covariance[last]
+    bias, own = bias_track.expected[last], bias_track.expected_covariance[last]
     covariance = plain.covariance + own + np.diag(_within_a_step(terms, per, rate))
     return replace(
-        plain, force=plain.force - bias, covariance=covariance, track=found, bias=bias, bias_covariance=own,
-        updated=found.updated[last], flicker=flicker, at_limits=at_limits,
+        plain, force=plain.force - bias, covariance=covariance, track=bias_track, bias=bias, bias_covariance=own,
+        updated=bias_track.updated[last], flicker=flicker, at_limits=at_limits,
     )  # fmt: skip
 
 
 def _likely(curve: UnitCurve, limits: LikelyTerms, identified: NDArray[np.bool_]) -> LikelyTerms:
     """The likeliest terms in g; where white noise hides B, what is to be expected below its limit, as no bias is constant."""
-    found = likely_terms(curve.deviation / MICRO, curve.m, curve.n, curve.rate_hz)
-    return replace(found, instability=np.where(identified, found.instability, HIDDEN * limits.instability))
+    likely = likely_terms(curve.deviation / MICRO, curve.m, curve.n, curve.rate_hz)
+    return replace(likely, instability=np.where(identified, likely.instability, HIDDEN * limits.instability))
 
 
 def _within_a_step(terms: LikelyTerms, per: int, rate: float) -> Array:
@@ -262,8 +262,8 @@ def _references(
     magnitude = np.full(len(stated), np.nan)
     if tracking.magnitude is not None:
         rest = np.zeros(len(force))
-        found = static_intervals.find(force, rate)
-        for start, stop in zip(found.start, found.stop, strict=True):
+        intervals = static_intervals.find(force, rate)
+        for start, stop in zip(intervals.start, intervals.stop, strict=True):
             rest[start:stop] = 1.0
         magnitude[_means(rest, per) == 1.0] = tracking.magnitude
     return stated, magnitude

@@ -162,8 +162,8 @@ def revoked_units(run: Run) -> dict[str, Stated]:
     """Units of a run whose calibration was revoked; they are exported only on request."""
     if "grades" not in run.tables():
         return {}
-    found = stated(run, tuple(run.table("grades")["unit"]))
-    return {unit: one for unit, one in found.items() if one.state == "revoked"}
+    states = stated(run, tuple(run.table("grades")["unit"]))
+    return {unit: one for unit, one in states.items() if one.state == "revoked"}
 
 
 def _not_revoked(run: Run, chosen: list[str], certificates: Mapping[str, Stated], *, named: bool) -> list[str]:

@@ -68,7 +68,7 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
     """
     if not text.strip():
         return {}
-    found: dict[str, int] = {}
+    ids: dict[str, int] = {}
     parts = [part.strip() for part in text.split(",") if part.strip()]
     for part in parts:
         unit, equals, number = part.rpartition("=")
@@ -80,13 +80,13 @@ def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:
         unit = unit.strip() if equals else units[0]
         if unit not in units:
             raise WrongUse(f"--device-id: unit '{shown(unit)}' is not exported; {did_you_mean(unit, units)}")
-        found[unit] = _number(number.strip() if equals else part)
-    if len(set(found.values())) < len(found):
+        ids[unit] = _number(number.strip() if equals else part)
+    if len(set(ids.values())) < len(ids):
         raise WrongUse(
             f"--device-id: found '{shown(text)}', a different number for each unit is needed; an autopilot "
             "identifies its sensors by it; correct it"
         )
-    return found
+    return ids
 
 
 def _number(text: str) -> int:

@@ -49,13 +49,13 @@ def noise_of_units(run: Run) -> dict[str, UnitNoise]:
     if table.empty or rates.empty:
         return {}
     rows = {(str(r["unit"]), str(r["term"]), str(r["axis"])): r for r in rows_of(table)}
-    found: dict[str, UnitNoise] = {}
+    noises: dict[str, UnitNoise] = {}
     for unit in dict.fromkeys(key[0] for key in rows):
         own = {symbol: [rows[unit, symbol, axis] for axis in AXES] for symbol in TERMS}
         value = {s: np.array([float(r["value"] if r["identified"] else r["high"]) for r in own[s]]) for s in TERMS}
         identified = {s: np.array([bool(r["identified"]) for r in own[s]]) for s in TERMS}
-        found[unit] = UnitNoise(value, identified, float(rates.iloc[0]))
-    return found
+        noises[unit] = UnitNoise(value, identified, float(rates.iloc[0]))
+    return noises
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ def have_automation() -> None:
 def keep(automation: AutomationCore) -> None:
     """Make an automation, or update the existing one of the same name; further ones of the name are removed."""
     with get_client(sync_client=True) as client:
-        same = [found.id for found in client.read_automations_by_name(automation.name)]
+        same = [existing.id for existing in client.read_automations_by_name(automation.name)]
         if not same:
             client.create_automation(automation)
             return

@@ -88,11 +88,11 @@ def reached(archive: Archive, meanwhile: Callable[[], None] = lambda: None) -> G
 @contextmanager
 def own_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Generator[None]:
     """A block in which this process is a client of a server of our own; the environment is restored afterwards."""
-    with local_server(home, meanwhile) as found, with_environment(found):
+    with local_server(home, meanwhile) as environment, with_environment(environment):
         from prefect.settings import temporary_settings
 
         # Prefect reads the environment when it is imported, which an earlier block may have done for another server
-        own: dict[Any, str] = {name: found[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
+        own: dict[Any, str] = {name: environment[name] for name in ("PREFECT_API_URL", "PREFECT_HOME", CLIENT_KEY)}
         with temporary_settings(updates=own):
             yield
 
@@ -157,8 +157,8 @@ def local_server(home: Path, meanwhile: Callable[[], None] = lambda: None) -> Ge
 def environment_of(archive: Archive) -> dict[str, str]:
     """The environment of the server that runs beside an archive; empty where none runs."""
     home = _home(archive)
-    found = _running(home)
-    return settings(home, *found) if found else {}
+    running = _running(home)
+    return settings(home, *running) if running else {}
 
 
 def _refuse_foreign(home: Path) -> None:

@@ -87,9 +87,9 @@ def recognised(numbers: NDArray[np.float64], name: str, stated: str = "") -> Rec
     epoch = _epoch(numbers)
     if epoch:
         return Recognised(epoch, f"Unix time, in {epoch}", (epoch,))
-    found = _NAMED.search(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name))
-    own = unit_stated(found[1]) if found else ""
-    if own and found and found[0].strip() != name.strip():
+    match = _NAMED.search(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name))
+    own = unit_stated(match[1]) if match else ""
+    if own and match and match[0].strip() != name.strip():
         return Recognised(own, f"the name '{shown(name)}'", (own,))
     return _by_steps(numbers)
 
@@ -152,14 +152,14 @@ def stamps(column: pd.Series, where: str) -> NDArray[np.float64]:
         if parsed is not None:
             return values.seconds(parsed, where)
     first = [one for one in (_first(text, forms) for forms in (_DAY_FIRST, _MONTH_FIRST)) if one is not None]
-    found = [values.seconds(one, where) for one in first]
-    if len(found) == 2 and not np.allclose(found[0], found[1]):
+    candidates = [values.seconds(one, where) for one in first]
+    if len(candidates) == 2 and not np.allclose(candidates[0], candidates[1]):
         raise DataRejected(
             f"{where}: column '{name}': '{shown(column.iloc[0])}': day and month are ambiguous, and the date changes; "
             "write the dates as 2026-12-31"
         )
-    if found:
-        return found[0]
+    if candidates:
+        return candidates[0]
     row = _first_bad(text)
     raise DataRejected(
         f"{where}: row {row + 1}, column '{name}': found {shown(column.iloc[row])!r}, a time is needed: a number, ISO 8601 "
@@ -208,40 +208,44 @@ def clock(numbers: NDArray[np.float64], name: str, claimed: str, stated: str, wh
     WrongUse
         Several units are possible, or the one given contradicts the file.
     """
-    found = recognised(numbers, name, stated)
+    recognition = recognised(numbers, name, stated)
     column, step = f"column '{shown(name)}'", typical_step(numbers)
-    if not claimed and not found.unit and step > 0.0:
-        rates = ", ".join(f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in found.possible or tuple(TIME_UNITS))
+    if not claimed and not recognition.unit and step > 0.0:
+        rates = ", ".join(
+            f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in recognition.possible or tuple(TIME_UNITS)
+        )
         raise WrongUse(
             f"{where}: {column}: steps of {step:.6g}: {rates}; the unit is needed; add --units time="
-            f"{'|'.join(found.possible or tuple(TIME_UNITS))}"
+            f"{'|'.join(recognition.possible or tuple(TIME_UNITS))}"
         )
-    if claimed and found.unit and claimed != found.unit and not found.reason.startswith("steps"):
+    if claimed and recognition.unit and claimed != recognition.unit and not recognition.reason.startswith("steps"):
         raise WrongUse(
-            f"{where}: {column}: {found.reason}, but --units time={claimed} was given; leave it out, or correct it"
+            f"{where}: {column}: {recognition.reason}, but --units time={claimed} was given; leave it out, or correct it"
         )
-    unit = claimed or found.unit or "s"
+    unit = claimed or recognition.unit or "s"
     seconds = (numbers - numbers[0]) * TIME_UNITS[unit]  # the difference keeps the digits of Unix time in ns
     return RecordingClock(
         seconds,
         unit,
-        _doubts(step, unit, found, column) if claimed else (_reading(column, unit, found, step, len(numbers)),),
+        _doubts(step, unit, recognition, column)
+        if claimed
+        else (_reading(column, unit, recognition, step, len(numbers)),),
     )
 
 
-def _reading(column: str, unit: str, found: Recognised, step: float, count: int) -> str:
+def _reading(column: str, unit: str, recognition: Recognised, step: float, count: int) -> str:
     """The interpretation of time, as text."""
     seconds = step * TIME_UNITS[unit]
     rate = f", {1.0 / seconds:.4g} Hz for {seconds * (count - 1):.5g} s" if seconds > 0.0 else ""
-    return f"{column}: time in {unit} ({found.reason}){rate}"
+    return f"{column}: time in {unit} ({recognition.reason}){rate}"
 
 
-def _doubts(step: float, unit: str, found: Recognised, column: str) -> tuple[str, ...]:
+def _doubts(step: float, unit: str, recognition: Recognised, column: str) -> tuple[str, ...]:
     """A remark if the given unit leads to an unusual rate and another unit to a usual one."""
     if not step > 0.0:
         return ()
     rate = 1.0 / (step * TIME_UNITS[unit])
-    if USUAL_HZ[0] <= rate <= USUAL_HZ[1] or not found.possible:
+    if USUAL_HZ[0] <= rate <= USUAL_HZ[1] or not recognition.possible:
         return ()
-    others = " or ".join(f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in found.possible)
+    others = " or ".join(f"{1.0 / (step * TIME_UNITS[u]):.4g} Hz in {u}" for u in recognition.possible)
     return (f"CHECK THE UNIT OF TIME: {column} in {unit} gives {rate:.4g} Hz; other units give {others}",)

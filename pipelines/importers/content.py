@@ -52,8 +52,8 @@ def row_of(row: int, content: Content | None) -> str:
 
 def unit_in(name: str) -> str:
     """The unit in brackets at the end of a column's name; empty if there is none."""
-    found = _BRACKETS.search(name)
-    return found[1] if found else ""
+    match = _BRACKETS.search(name)
+    return match[1] if match else ""
 
 
 def chosen(groups: Sequence[tuple[str, int]], group: str, where: str) -> str:

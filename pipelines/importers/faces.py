@@ -32,16 +32,16 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
     dwells = imported_dwells(data)
     gravity = gravity_of(mapping)
     up, down, error = _by_face(dwells, mapping)
-    published, found = ferraris(up, down, gravity), faces(up, down, gravity, error)
-    per_g = np.linalg.norm(found.response, axis=1)
-    adequate, why = _verdict(found, per_g * gravity)
+    published, fit = ferraris(up, down, gravity), faces(up, down, gravity, error)
+    per_g = np.linalg.norm(fit.response, axis=1)
+    adequate, why = _verdict(fit, per_g * gravity)
     document = {
         "adequate": adequate,
         "reason": why or None,
         "error": {
-            "rms_ug": (MICRO * found.rms / per_g).tolist(),
-            "floor_ug": (MICRO * found.pure_error / per_g).tolist(),
-            "p_value": found.p_value.tolist(),
+            "rms_ug": (MICRO * fit.rms / per_g).tolist(),
+            "floor_ug": (MICRO * fit.pure_error / per_g).tolist(),
+            "p_value": fit.p_value.tolist(),
         },
         "published": {
             "scale_per_m_s2": (np.diagonal(published.scale) / STANDARD_GRAVITY_M_S2).tolist(),
@@ -49,16 +49,16 @@ def six_faces(data: Imported, mapping: Mapping) -> FitAnswer:
             "bias": published.bias.tolist(),
         },
         "least_squares": {
-            "bias": found.bias.tolist(),
-            "bias_error": found.bias_error.tolist(),
-            "response_per_g": found.response.tolist(),
-            "response_error": found.response_error.tolist(),
-            "residuals": found.residuals.tolist(),
+            "bias": fit.bias.tolist(),
+            "bias_error": fit.bias_error.tolist(),
+            "response_per_g": fit.response.tolist(),
+            "response_error": fit.response_error.tolist(),
+            "residuals": fit.residuals.tolist(),
         },
     }
-    lines = tuple(_face_line(k, found, float(published.bias[k]), data.out_unit) for k in range(3))
+    lines = tuple(_face_line(k, fit, float(published.bias[k]), data.out_unit) for k in range(3))
     lines = (*lines, why) if why else lines
-    rows = _face_coefficients(str(dwells["unit"].iloc[0]), found, data)
+    rows = _face_coefficients(str(dwells["unit"].iloc[0]), fit, data)
     return FitAnswer("faces", adequate, document, lines, rows, MODEL, {"covariance": _covariance(rows)})
 
 
@@ -66,31 +66,31 @@ def _covariance(rows: list[dict[str, Any]]) -> pd.DataFrame:
     """The covariance of the coefficients as the archive's long table: six opposite faces make them independent of each other."""
     import pandas as pd
 
-    found: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
     for axis in AXES:
         own = [row for row in rows if row["axis"] == axis]
         for row in range(len(own)):
             for column in range(row + 1):
                 square = float(np.nan_to_num(own[row]["standard_error"])) ** 2 if row == column else 0.0
-                found.append({"unit": own[row]["unit"], "axis": axis, "row": row, "column": column, "value": square})
-    return pd.DataFrame(found)
+                entries.append({"unit": own[row]["unit"], "axis": axis, "row": row, "column": column, "value": square})
+    return pd.DataFrame(entries)
 
 
-def _verdict(found: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
+def _verdict(fit: Faces, size: NDArray[np.float64]) -> tuple[bool | None, str]:
     """Whether the fit describes six faces, and the reason if that cannot be judged or needs no probability.
 
     Parameters
     ----------
     size : (3,), response of each output to gravity, output unit.
     """
-    share = found.rms / size
+    share = fit.rms / size
     if not bool(np.all(share <= GROSS)):
         worst = float(np.max(share)) if np.isfinite(share).all() else float("nan")
         return (
             False,
             f"the faces disagree by {100.0 * worst:.3g} % of gravity, far beyond noise; check the labels of the faces",
         )
-    passed = passes(found.p_value, UNLIKELY)
+    passed = passes(fit.p_value, UNLIKELY)
     if passed is not None:
         return passed, ""
     return (
@@ -118,22 +118,20 @@ def _by_face(
     return up, down, np.sqrt(np.mean(variance / dwells["n"].to_numpy(dtype=np.float64)[:, None], axis=0))
 
 
-def _face_line(k: int, found: Faces, published: float, unit: str) -> str:
-    bias = f"{AXES[k]}: bias {found.bias[k]:.5g} ± {found.bias_error[k]:.2g} {unit} (published method {published:.5g})"
-    misfit = f"lack of fit {found.rms[k]:.3g}"
-    if not np.isfinite(found.p_value[k]):
+def _face_line(k: int, fit: Faces, published: float, unit: str) -> str:
+    bias = f"{AXES[k]}: bias {fit.bias[k]:.5g} ± {fit.bias_error[k]:.2g} {unit} (published method {published:.5g})"
+    misfit = f"lack of fit {fit.rms[k]:.3g}"
+    if not np.isfinite(fit.p_value[k]):
         return f"{bias}; {misfit} {unit}"
-    return f"{bias}; {misfit}, the samples allow {found.pure_error[k]:.2g} {unit} (p = {found.p_value[k]:.1g})"
+    return f"{bias}; {misfit}, the samples allow {fit.pure_error[k]:.2g} {unit} (p = {fit.p_value[k]:.1g})"
 
 
-def _face_coefficients(unit: str, found: Faces, data: Imported) -> list[dict[str, Any]]:
+def _face_coefficients(unit: str, fit: Faces, data: Imported) -> list[dict[str, Any]]:
     per_g, rows = f"{data.out_unit}/g", []
     for i in range(3):
-        rows.append(coefficient(unit, i, "bias", "K0", found.bias[i], found.bias_error[i], data.out_unit))
-        rows.append(coefficient(unit, i, "scale", "K1", found.response[i, i], found.response_error[i, i], per_g))
+        rows.append(coefficient(unit, i, "bias", "K0", fit.bias[i], fit.bias_error[i], data.out_unit))
+        rows.append(coefficient(unit, i, "scale", "K1", fit.response[i, i], fit.response_error[i, i], per_g))
         for j in ((i + 1) % 3, (i + 2) % 3):
             name = f"K{AXES[i]}{AXES[j]}"
-            rows.append(
-                coefficient(unit, i, "misalignment", name, found.response[i, j], found.response_error[i, j], per_g)
-            )
+            rows.append(coefficient(unit, i, "misalignment", name, fit.response[i, j], fit.response_error[i, j], per_g))
     return rows

@@ -69,23 +69,23 @@ class Guesses:
 def guesses(content: Content) -> Guesses:
     """Guesses of what the columns of a file mean, by names, units and numbers."""
     table = content.table
-    found: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
+    guessed: dict[str, Guess] = {str(name): Guess("", "") for name in table.columns}
     numeric = {str(name): one for name in table.columns if (one := _numbers(table[name])) is not None}
-    _time(table, numeric, found)
-    _axes(content, numeric, found)
-    _others(content, table, numeric, found)
-    sheet = _sheet(table, numeric, found)
-    return Guesses(found, _time_unit(content, numeric, found), _output(content, numeric, found), sheet)
+    _time(table, numeric, guessed)
+    _axes(content, numeric, guessed)
+    _others(content, table, numeric, guessed)
+    sheet = _sheet(table, numeric, guessed)
+    return Guesses(guessed, _time_unit(content, numeric, guessed), _output(content, numeric, guessed), sheet)
 
 
-def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> bool:
+def _sheet(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> bool:
     """Whether the rows are positions, each with a label of its own; the labels are then those of the dwells."""
-    meanings = {one.meaning for one in found.values()}
+    meanings = {one.meaning for one in guessed.values()}
     if "time" in meanings or not {"x", "y", "z"} <= meanings or len(table) > _MOST_POSITIONS:
         return False
     for name in table.columns:
         if str(name) not in numeric and table[name].notna().all() and table[name].nunique() == len(table) > 1:
-            found[str(name)] = Guess("dwell", "a label of its own in each row")
+            guessed[str(name)] = Guess("dwell", "a label of its own in each row")
             return True
     return False
 
@@ -107,19 +107,19 @@ def _grows(numbers: NDArray[np.float64]) -> bool:
     return steps.size > 1 and bool(np.mean(steps >= 0.0) > 0.99) and bool(np.any(steps > 0.0))
 
 
-def _time(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> None:
-    for name in found:
+def _time(table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> None:
+    for name in guessed:
         if values.is_moment(table[name]) or (name not in numeric and _reads_as_time(table[name])):
-            found[name] = Guess("time", "stamps of date or time")
+            guessed[name] = Guess("time", "stamps of date or time")
             return
     growing = [name for name, numbers in numeric.items() if _grows(numbers)]
     named = [name for name in growing if _TIME.search(name) and not _COUNT.search(name)]
     if named:
-        found[named[0]] = Guess("time", "its name, and it only increases")
+        guessed[named[0]] = Guess("time", "its name, and it only increases")
         return
     even = [name for name in growing if not _COUNT.search(name) and not _AXIS.search(name)]
     if even:
-        found[even[0]] = Guess("time", "the first column that only increases")
+        guessed[even[0]] = Guess("time", "the first column that only increases")
 
 
 def _reads_as_time(column: pd.Series) -> bool:
@@ -133,8 +133,8 @@ def _reads_as_time(column: pd.Series) -> bool:
     return True
 
 
-def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> None:
-    free = [name for name in numeric if not found[name].meaning][:_MOST_COLUMNS]
+def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> None:
+    free = [name for name in numeric if not guessed[name].meaning][:_MOST_COLUMNS]
     named: dict[str, dict[str, str]] = {}
     for name in free:
         axis = _AXIS.search(name)
@@ -148,17 +148,17 @@ def _axes(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict
     )
     if triples:
         for axis, name in triples[0].items():
-            found[name] = Guess(axis, "its name")
+            guessed[name] = Guess(axis, "its name")
         return
     stated = [name for name in free if output_unit(content.units.get(name, ""))]
     if len(stated) == 3:
         for axis, name in zip("xyz", stated, strict=True):
-            found[name] = Guess(axis, f"one of three columns in {content.units[name]}")
+            guessed[name] = Guess(axis, f"one of three columns in {content.units[name]}")
         return
     live = [name for name in free if not _OTHER.search(name) and not _HEAT.search(name) and not _COUNT.search(name)]
     best = _steadiest(numeric, live)
     for axis, name in zip("xyz", best, strict=False):
-        found[name] = Guess(axis, "the three columns whose norm changes least, as gravity's does")
+        guessed[name] = Guess(axis, "the three columns whose norm changes least, as gravity's does")
 
 
 def _steadiest(numeric: dict[str, NDArray[np.float64]], names: list[str]) -> tuple[str, ...]:
@@ -177,26 +177,26 @@ def _steadiest(numeric: dict[str, NDArray[np.float64]], names: list[str]) -> tup
 
 
 def _others(
-    content: Content, table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]
+    content: Content, table: pd.DataFrame, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]
 ) -> None:
-    for name in list(found):
-        if found[name].meaning:
+    for name in list(guessed):
+        if guessed[name].meaning:
             continue
         spread = _SPREAD.match(name)
         if name in numeric and spread:
-            found[name] = Guess(f"sd_{spread[1].lower()}", "its name")
+            guessed[name] = Guess(f"sd_{spread[1].lower()}", "its name")
         elif name in numeric and (_HEAT.search(name) or TEMPERATURE.get(content.units.get(name, "").lower())):
             middle = float(np.nanmedian(numeric[name]))
-            if -100.0 < middle < 500.0 and "temperature" not in {one.meaning for one in found.values()}:
-                found[name] = Guess("temperature", "its name or unit")
-        elif name not in numeric and "dwell" not in {one.meaning for one in found.values()}:
+            if -100.0 < middle < 500.0 and "temperature" not in {one.meaning for one in guessed.values()}:
+                guessed[name] = Guess("temperature", "its name or unit")
+        elif name not in numeric and "dwell" not in {one.meaning for one in guessed.values()}:
             distinct = int(table[name].nunique())
             if 1 < distinct <= max(2, len(table) // 10):
-                found[name] = Guess("dwell", f"{distinct} labels")
+                guessed[name] = Guess("dwell", f"{distinct} labels")
 
 
-def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]) -> Guess:
-    name = next((one for one, guess in found.items() if guess.meaning == "time"), "")
+def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]) -> Guess:
+    name = next((one for one, guess in guessed.items() if guess.meaning == "time"), "")
     if not name or name not in numeric:
         return Guess("", "")
     numbers = numeric[name][np.isfinite(numeric[name])]
@@ -204,7 +204,7 @@ def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], found:
     if seen.unit or not seen.possible:
         return Guess(seen.unit, seen.reason)
     step, possible = typical_step(numbers), seen.possible
-    heat = next((one for one, guess in found.items() if guess.meaning == "temperature"), "")
+    heat = next((one for one, guess in guessed.items() if guess.meaning == "temperature"), "")
     if heat:
         change, span = float(np.nanmax(numeric[heat]) - np.nanmin(numeric[heat])), float(numbers[-1] - numbers[0])
         slow = tuple(unit for unit in possible if change <= _FASTEST_K_S * span * clocks.TIME_UNITS[unit])
@@ -219,9 +219,9 @@ def _time_unit(content: Content, numeric: dict[str, NDArray[np.float64]], found:
 
 
 def _output(  # noqa: PLR0911 - one answer per reason
-    content: Content, numeric: dict[str, NDArray[np.float64]], found: dict[str, Guess]
+    content: Content, numeric: dict[str, NDArray[np.float64]], guessed: dict[str, Guess]
 ) -> Guess:
-    names = [name for axis in "xyz" for name, guess in found.items() if guess.meaning == axis]
+    names = [name for axis in "xyz" for name, guess in guessed.items() if guess.meaning == axis]
     if len(names) != 3:
         return Guess("", "")
     stated = {output_unit(content.units.get(name, "")) for name in names}

@@ -163,8 +163,8 @@ def _output(content: Content, guessed: Guesses) -> NDArray[np.float64] | None:
 def _intervals(output: NDArray[np.float64], time: NDArray[np.float64] | None, rate: float) -> list[IntervalDocument]:
     if time is None or len(output) < 3 * max(3, round(rate)) or not np.isfinite(rate):
         return []
-    found = static_intervals.find(output, rate)
-    pairs = list(zip(found.start.tolist(), found.stop.tolist(), strict=True))[:_MOST_INTERVALS]
+    intervals = static_intervals.find(output, rate)
+    pairs = list(zip(intervals.start.tolist(), intervals.stop.tolist(), strict=True))[:_MOST_INTERVALS]
     return [
         {
             "start_s": float(time[a] - time[0]),
@@ -179,7 +179,7 @@ def _intervals(output: NDArray[np.float64], time: NDArray[np.float64] | None, ra
 
 
 def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
-    found: list[ColumnDocument] = []
+    columns: list[ColumnDocument] = []
     for number, (name, guess) in enumerate(guessed.columns.items(), start=1):
         column = content.table[name]
         unit = content.units.get(name, "")
@@ -190,7 +190,7 @@ def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
         numbers = measurable(column.to_numpy(dtype=np.float64)) if column.dtype.kind in "fiu" else np.zeros(0)
         there = numbers[np.isfinite(numbers)]
         axis = there if guess.meaning in {"x", "y", "z"} and there.size else None
-        found.append(
+        columns.append(
             {
                 "name": name,
                 "number": number,
@@ -204,7 +204,7 @@ def _columns(content: Content, guessed: Guesses) -> list[ColumnDocument]:
                 "clipped": 0 if axis is None else record_faults.clipped(axis)[2],
             }
         )
-    return found
+    return columns
 
 
 def _command(

@@ -173,8 +173,8 @@ class Mapping(BaseModel):
     @property
     def likely_slips(self) -> dict[str, tuple[str, ...]]:
         """Covariates whose names are close to known ones, with these: possibly misspelt, but allowed."""
-        found = {name: close_matches(name, KNOWN) for name in self.columns if name not in KNOWN and len(name) > 1}
-        return {name: close for name, close in found.items() if close}
+        similar = {name: close_matches(name, KNOWN) for name in self.columns if name not in KNOWN and len(name) > 1}
+        return {name: close for name, close in similar.items() if close}
 
     @property
     def norm_g(self) -> float | None:
@@ -209,15 +209,15 @@ def from_file(path: Path) -> dict[str, Any]:
 
 def pairs(text: str, option: str) -> dict[str, str]:
     """name=value pairs of an option, divided by commas."""
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not (name and equals and value):
             raise WrongUse(f"{option}: found '{shown(part)}', name=value is needed, divided by commas; correct it")
-        if name in found:
+        if name in by_name:
             raise WrongUse(f"{option}: '{name}' is there twice, once is needed; remove one")
-        found[name] = value
-    return found
+        by_name[name] = value
+    return by_name
 
 
 def _one_of(value: str, known: Any, what: str) -> str:

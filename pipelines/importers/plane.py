@@ -38,8 +38,8 @@ GROSS = 0.02
 
 def known_force(dwells: pd.DataFrame) -> Array | None:
     """The force (n, 3), g, of the first unit's dwells with known poses; None where they are not known."""
-    found = measured(dwells)
-    return None if found.reference == "norm" else found.state.force[0]
+    measurement = measured(dwells)
+    return None if measurement.reference == "norm" else measurement.state.force[0]
 
 
 def axis_of_plane(dwells: pd.DataFrame) -> int | None:
@@ -74,11 +74,11 @@ def shown_turn(data: Imported, mapping: Mapping) -> FitAnswer | None:
         return None
     gravity = gravity_of(mapping) if known_force(dwells) is None else 1.0
     try:
-        found = _fitted(dwells, across, gravity)
+        fit = _fitted(dwells, across, gravity)
     except DataRejected:
         return None
-    enough = known_force(dwells) is not None or found.dof >= SHOWN_DOF
-    return _answer(found, dwells, data.out_unit) if enough and found.misfit < GROSS else None
+    enough = known_force(dwells) is not None or fit.dof >= SHOWN_DOF
+    return _answer(fit, dwells, data.out_unit) if enough and fit.misfit < GROSS else None
 
 
 def plane_answer(dwells: pd.DataFrame, across: int, gravity: float, out_unit: str) -> FitAnswer:
@@ -109,30 +109,30 @@ def _fitted(dwells: pd.DataFrame, across: int, gravity: float) -> PlaneFit:
         raise DataRejected(f"import: {problem}") from None
 
 
-def _answer(found: PlaneFit, dwells: pd.DataFrame, out_unit: str) -> FitAnswer:
+def _answer(fit: PlaneFit, dwells: pd.DataFrame, out_unit: str) -> FitAnswer:
     known = known_force(dwells) is not None
-    adequate, reason = _verdict(found)
-    opened = _opened(found, known=known)
+    adequate, reason = _verdict(fit)
+    opened = _opened(fit, known=known)
     document = {
         "adequate": adequate,
         "reason": reason or None,
-        "across": AXES[found.across],
+        "across": AXES[fit.across],
         "open": opened,
-        "error": {"rms_ug": MICRO * found.rms, "p_value": found.p_value, "dof": found.dof, "coverage_factor": 2.0},
-        "bias": found.bias.tolist(),
-        "bias_u": found.bias_error.tolist(),
-        "response_per_g": found.response.tolist(),
-        "response_u": found.response_error.tolist(),
+        "error": {"rms_ug": MICRO * fit.rms, "p_value": fit.p_value, "dof": fit.dof, "coverage_factor": 2.0},
+        "bias": fit.bias.tolist(),
+        "bias_u": fit.bias_error.tolist(),
+        "response_per_g": fit.response.tolist(),
+        "response_u": fit.response_error.tolist(),
     }
     unit = str(dwells["unit"].iloc[0])
     lines = [
-        _head(found),
-        *(_line(found, k, out_unit) for k in (*found.inside, found.across)),
+        _head(fit),
+        *(_line(fit, k, out_unit) for k in (*fit.inside, fit.across)),
         f"open: {'; '.join(opened)}",
     ]
     if reason:
         lines.append(reason)
-    return FitAnswer("plane", adequate, document, tuple(lines), _rows(found, unit, out_unit, known=known))
+    return FitAnswer("plane", adequate, document, tuple(lines), _rows(fit, unit, out_unit, known=known))
 
 
 def _errors(dwells: pd.DataFrame, output: Array) -> Array:
@@ -147,19 +147,19 @@ def _errors(dwells: pd.DataFrame, output: Array) -> Array:
     return np.clip(np.where(np.isfinite(own), own, typical), typical / 20.0, typical * 20.0)
 
 
-def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
+def _verdict(fit: PlaneFit) -> tuple[bool | None, str]:
     """Whether the model describes the dwells, by harmonics of the angle beside it; None where this cannot be judged."""
-    if found.misfit > GROSS:
+    if fit.misfit > GROSS:
         return (
             False,
-            f"the residual is {100.0 * found.misfit:.3g} % of gravity: the poses lie in no plane, or an axis is dead",
+            f"the residual is {100.0 * fit.misfit:.3g} % of gravity: the poses lie in no plane, or an axis is dead",
         )
-    if found.dof < FEWEST_DOF:
+    if fit.dof < FEWEST_DOF:
         return None, (
-            f"cannot be judged: {number_of(found.dof, 'degree')} of freedom, {FEWEST_DOF} are needed; measure "
-            f"{number_of(FEWEST_DOF - found.dof, 'more pose')}"
+            f"cannot be judged: {number_of(fit.dof, 'degree')} of freedom, {FEWEST_DOF} are needed; measure "
+            f"{number_of(FEWEST_DOF - fit.dof, 'more pose')}"
         )
-    passed = passes(found.p_value, UNLIKELY)
+    passed = passes(fit.p_value, UNLIKELY)
     if passed is None:
         return None, "cannot be judged: the probability of the residuals is no number; add poses"
     return (
@@ -168,10 +168,10 @@ def _verdict(found: PlaneFit) -> tuple[bool | None, str]:
     )
 
 
-def _opened(found: PlaneFit, *, known: bool) -> list[str]:
+def _opened(fit: PlaneFit, *, known: bool) -> list[str]:
     """Quantities that a turn about one axis does not determine."""
-    y = AXES[found.across]
-    i, j = (AXES[k] for k in found.inside)
+    y = AXES[fit.across]
+    i, j = (AXES[k] for k in fit.inside)
     parts = [
         f"scale of {y}",
         f"response of {i} and {j} to {y}",
@@ -183,38 +183,38 @@ def _opened(found: PlaneFit, *, known: bool) -> list[str]:
     return parts
 
 
-def _head(found: PlaneFit) -> str:
-    i, j = (AXES[k] for k in found.inside)
-    p = f"harmonics of the angle: p = {found.p_value:.2g}"
-    axes = f"turned about {AXES[found.across]}: {i} and {j} are calibrated in their plane"
-    return f"{axes}; residual {MICRO * found.rms:.1f} µg rms, {p}"
+def _head(fit: PlaneFit) -> str:
+    i, j = (AXES[k] for k in fit.inside)
+    p = f"harmonics of the angle: p = {fit.p_value:.2g}"
+    axes = f"turned about {AXES[fit.across]}: {i} and {j} are calibrated in their plane"
+    return f"{axes}; residual {MICRO * fit.rms:.1f} µg rms, {p}"
 
 
-def _line(found: PlaneFit, axis: int, unit: str) -> str:
-    i, j = found.inside
-    bias = f"{AXES[axis]}: bias {found.bias[axis]:.7g} ± {2.0 * found.bias_error[axis]:.2g} {unit} (k = 2)"
-    if axis == found.across:
+def _line(fit: PlaneFit, axis: int, unit: str) -> str:
+    i, j = fit.inside
+    bias = f"{AXES[axis]}: bias {fit.bias[axis]:.7g} ± {2.0 * fit.bias_error[axis]:.2g} {unit} (k = 2)"
+    if axis == fit.across:
         parts = [
-            f"K{AXES[axis]}{AXES[k]} {found.response[axis, c]:.4g} ± {2.0 * found.response_error[axis, c]:.2g} {unit}/g"
+            f"K{AXES[axis]}{AXES[k]} {fit.response[axis, c]:.4g} ± {2.0 * fit.response_error[axis, c]:.2g} {unit}/g"
             for c, k in enumerate((i, j))
         ]
         return f"{bias}, with the tilt of the axis of rotation; couplings {', '.join(parts)}"
     own, other = (0, 1) if axis == i else (1, 0)
-    scale = f"scale {found.response[axis, own] / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
-    if found.response_error[axis, other] == 0.0:
+    scale = f"scale {fit.response[axis, own] / STANDARD_GRAVITY_M_S2:.6g} {unit} per m/s²"
+    if fit.response_error[axis, other] == 0.0:
         return f"{bias}, {scale}"
-    cross = f"K{AXES[axis]}{AXES[j if axis == i else i]} {found.response[axis, other]:.4g}"
-    return f"{bias}, {scale}, {cross} ± {2.0 * found.response_error[axis, other]:.2g} {unit}/g"
+    cross = f"K{AXES[axis]}{AXES[j if axis == i else i]} {fit.response[axis, other]:.4g}"
+    return f"{bias}, {scale}, {cross} ± {2.0 * fit.response_error[axis, other]:.2g} {unit}/g"
 
 
-def _rows(found: PlaneFit, unit: str, out_unit: str, *, known: bool) -> list[dict[str, Any]]:
+def _rows(fit: PlaneFit, unit: str, out_unit: str, *, known: bool) -> list[dict[str, Any]]:
     """Rows of coefficients: only those that the plane determines."""
     per_g = f"{out_unit}/g"
     rows: list[dict[str, Any]] = []
     for axis in range(3):
-        rows.append(coefficient(unit, axis, "bias", "K0", found.bias[axis], found.bias_error[axis], out_unit))
-        for column, other in enumerate(inside_of(found.across)):
-            value, error = found.response[axis, column], found.response_error[axis, column]
+        rows.append(coefficient(unit, axis, "bias", "K0", fit.bias[axis], fit.bias_error[axis], out_unit))
+        for column, other in enumerate(inside_of(fit.across)):
+            value, error = fit.response[axis, column], fit.response_error[axis, column]
             if other == axis:
                 rows.append(coefficient(unit, axis, "scale", "K1", value, error, per_g))
             elif known or error > 0.0:

@@ -98,23 +98,23 @@ def imported(
     samples[list(AXES)] = raw * factor
     samples = samples.assign(**extras)
     labels = columns["dwell"].astype(str).tolist() if "dwell" in columns else None
-    found = stretches(labels, sample_faults.mended(raw, faults, bad), time, breaks, mapping, where)
+    intervals = stretches(labels, sample_faults.mended(raw, faults, bad), time, breaks, mapping, where)
     record = np.zeros(len(samples), dtype=np.int64)
-    for number, (a, b) in enumerate(zip(found.first, found.last, strict=True)):
+    for number, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True)):
         record[a:b] = number + 1
     record[bad] = 0
-    found, record, short = sample_faults.without_short(found, record)
+    intervals, record, short = sample_faults.without_short(intervals, record)
     samples["record"] = record
-    dwells = _means(samples, found, tuple(extras), mapping) if len(found) else None
+    dwells = _means(samples, intervals, tuple(extras), mapping) if len(intervals) else None
     if dwells is not None:
         remarks = (*remarks, *pose_check.refuse_or_remark(dwells, mapping, where))
         dwells, held = _held_out(dwells, mapping, where)
         remarks = (*remarks, *held)
     remarks = (
         *remarks,
-        *found.remarks,
+        *intervals.remarks,
         *short,
-        *time_doubts(time, extras.get("unit_C"), found, mapping, searched=labels is None),
+        *time_doubts(time, extras.get("unit_C"), intervals, mapping, searched=labels is None),
     )
     return Imported(samples, dwells, out_unit, remarks, tuple(faults.rows(time)))
 
@@ -122,22 +122,22 @@ def imported(
 def _columns(table: pd.DataFrame, mapping: Mapping, where: str) -> dict[str, pd.Series]:
     names = [str(name) for name in table.columns]
     named = table.set_axis(names, axis=1)
-    found: dict[str, pd.Series] = {}
+    columns: dict[str, pd.Series] = {}
     for meaning, source_column in mapping.columns.items():
         column = column_name(names, source_column)
         if not column:
             raise DataRejected(
                 f"{where}: column '{shown(source_column)}' (for {meaning}) is not there; {did_you_mean(source_column, names)}"
             )
-        found[meaning] = pd.Series(named[column], name=column)
-    meanings = [meaning for meaning in ("time", *AXES) if meaning in found]
-    names_ = [str(found[meaning].name) for meaning in meanings]
+        columns[meaning] = pd.Series(named[column], name=column)
+    meanings = [meaning for meaning in ("time", *AXES) if meaning in columns]
+    names_ = [str(columns[meaning].name) for meaning in meanings]
     if len(set(names_)) < len(names_):
         raise DataRejected(
             f"{where}: {', '.join(meanings)} are columns {', '.join(map(shown, names_))}, different ones are needed; "
             "correct --map"
         )
-    return found
+    return columns
 
 
 def _with_numbers(
@@ -219,27 +219,28 @@ def _celsius(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
     return (values - 32.0) / 1.8 if unit == "degF" else values
 
 
-def _means(samples: pd.DataFrame, found: Stretches, extras: tuple[str, ...], mapping: Mapping) -> pd.DataFrame:
+def _means(samples: pd.DataFrame, intervals: Stretches, extras: tuple[str, ...], mapping: Mapping) -> pd.DataFrame:
     """Dwells in the exchange format."""
     numbers = samples[[*AXES, *extras]].to_numpy(dtype=np.float64)
     time, record = samples["time_s"].to_numpy(dtype=np.float64), samples["record"].to_numpy()
     inside = [
-        a + np.flatnonzero(record[a:b] == k + 1) for k, (a, b) in enumerate(zip(found.first, found.last, strict=True))
+        a + np.flatnonzero(record[a:b] == k + 1)
+        for k, (a, b) in enumerate(zip(intervals.first, intervals.last, strict=True))
     ]
     mean = np.stack([numbers[rows].mean(axis=0) for rows in inside])
     sd = np.stack([numbers[rows, :3].std(axis=0, ddof=1) if rows.size > 1 else np.zeros(3) for rows in inside])
     frame = pd.DataFrame(
         {
             "unit": samples["unit"].iloc[0],
-            "dwell": np.arange(len(found)),
+            "dwell": np.arange(len(intervals)),
             "time_s": [float(time[rows].mean()) for rows in inside],
             **{f"out_{axis}": mean[:, k] for k, axis in enumerate(AXES)},
             **{f"sd_{axis}": sd[:, k] for k, axis in enumerate(AXES)},
             "n": [rows.size for rows in inside],
             "duration_s": [float(time[rows[-1]] - time[rows[0]]) for rows in inside],
             **{name: mean[:, 3 + k] for k, name in enumerate(extras)},
-            "record": np.arange(len(found)) + 1,
-            "pose": list(found.labels),
+            "record": np.arange(len(intervals)) + 1,
+            "pose": list(intervals.labels),
         }
     )
     return _finished(frame, mapping)

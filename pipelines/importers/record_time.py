@@ -118,8 +118,8 @@ def _clock(
     numbers = values.finite(time, where, content, needed="a time")
     name = str(time.name)
     if dwells:
-        found = clocks.recognised(numbers, name, stated.get(name, ""))
-        own = found.unit if not found.reason.startswith("steps") else ""
+        recognition = clocks.recognised(numbers, name, stated.get(name, ""))
+        own = recognition.unit if not recognition.reason.startswith("steps") else ""
         unit = mapping.units.time or own or "s"
         return RecordingClock(numbers * TIME_UNITS[unit], unit, ())
     if np.all(numbers == numbers[0]):
@@ -176,7 +176,12 @@ def gaps_of(
 
 
 def time_doubts(
-    time: NDArray[np.float64], heat: NDArray[np.float64] | None, found: Stretches, mapping: Mapping, *, searched: bool
+    time: NDArray[np.float64],
+    heat: NDArray[np.float64] | None,
+    intervals: Stretches,
+    mapping: Mapping,
+    *,
+    searched: bool,
 ) -> tuple[str, ...]:
     """Remarks if a record in seconds is impossible for a hand, table or chamber: its time may be in another unit.
 
@@ -190,9 +195,9 @@ def time_doubts(
     if heat is not None and span > 0.0 and float(np.ptp(heat)) > FASTEST_K_S * span:
         doubts.append(f"temperature changes by {float(np.ptp(heat)):.3g} K in {span:.3g} s")
     if searched and mapping.positions is None and mapping.block_s is None:
-        moves = [float(time[b] - time[a - 1]) for a, b in zip(found.last, found.first[1:], strict=False)]
+        moves = [float(time[b] - time[a - 1]) for a, b in zip(intervals.last, intervals.first[1:], strict=False)]
         if len(moves) >= 2 and float(np.median(moves)) > LONGEST_MOVE_S:
             doubts.append(f"the moves between the dwells take {float(np.median(moves)):.4g} s")
-        if not len(found) and span < SHORTEST_RECORD_S:
+        if not len(intervals) and span < SHORTEST_RECORD_S:
             doubts.append(f"the record lasts {span:.3g} s, too short for a dwell")
     return (f"CHECK THE UNIT OF TIME: {'; '.join(doubts)}",) if doubts else ()

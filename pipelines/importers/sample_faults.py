@@ -38,13 +38,13 @@ class SampleFaults:
 
     def sentences(self, time: NDArray[np.float64]) -> list[str]:
         """The faults as text."""
-        found = [
+        texts = [
             f"axis {AXES[one.axis]} is constant for {one.count} samples from row {one.start + 1} on ({time[one.start]:.6g} s)"
             for one in sorted(self.frozen, key=lambda one: -one.count)[:_MOST_LISTED]
         ]
         more = len(self.frozen) - _MOST_LISTED
-        found += [f"and {more} more such stretches"] if more > 0 else []
-        return found + [
+        texts += [f"and {more} more such stretches"] if more > 0 else []
+        return texts + [
             f"axis {AXES[one.axis]} has torn words: {100.0 * one.share:.3g} % of its resting samples deviate by "
             f"±{', ±'.join(map(str, one.offsets))} steps of its resolution, from row {int(one.rows.min()) + 1} on"
             for one in self.torn
@@ -76,30 +76,32 @@ def look(output: NDArray[np.float64]) -> SampleFaults:
     return SampleFaults(frozen, torn, bad)
 
 
-def mended(output: NDArray[np.float64], found: SampleFaults, bad: NDArray[np.bool_]) -> NDArray[np.float64]:
+def mended(output: NDArray[np.float64], faults: SampleFaults, bad: NDArray[np.bool_]) -> NDArray[np.float64]:
     """The record (n, 3) for the search for dwells: torn words that are left out are replaced by the running median."""
-    if not bad.any() or not found.torn:
+    if not bad.any() or not faults.torn:
         return output
     clean = output.copy()
-    for one in found.torn:
+    for one in faults.torn:
         clean[one.rows, one.axis] = record_faults.running_median(output[:, one.axis])[one.rows]
     return clean
 
 
-def without_short(found: Stretches, record: NDArray[np.int64]) -> tuple[Stretches, NDArray[np.int64], tuple[str, ...]]:
+def without_short(
+    intervals: Stretches, record: NDArray[np.int64]
+) -> tuple[Stretches, NDArray[np.int64], tuple[str, ...]]:
     """The dwells that keep at least half of their samples, renumbered, and a remark on the others."""
-    left = [int(np.count_nonzero(record[a:b])) for a, b in zip(found.first, found.last, strict=True)]
-    kept = [k for k, count in enumerate(left) if 2 * count > found.last[k] - found.first[k]]
-    if len(kept) == len(found):
-        return found, record, ()
-    numbers = np.zeros(len(found) + 1, dtype=np.int64)
+    left = [int(np.count_nonzero(record[a:b])) for a, b in zip(intervals.first, intervals.last, strict=True)]
+    kept = [k for k, count in enumerate(left) if 2 * count > intervals.last[k] - intervals.first[k]]
+    if len(kept) == len(intervals):
+        return intervals, record, ()
+    numbers = np.zeros(len(intervals) + 1, dtype=np.int64)
     numbers[np.array(kept, dtype=np.int64) + 1] = np.arange(len(kept)) + 1
-    gone = [found.labels[k] for k in range(len(found)) if k not in set(kept)]
+    gone = [intervals.labels[k] for k in range(len(intervals)) if k not in set(kept)]
     fewer = Stretches(
-        tuple(found.first[k] for k in kept),
-        tuple(found.last[k] for k in kept),
-        tuple(found.labels[k] for k in kept),
-        found.remarks,
+        tuple(intervals.first[k] for k in kept),
+        tuple(intervals.last[k] for k in kept),
+        tuple(intervals.labels[k] for k in kept),
+        intervals.remarks,
     )
     return (
         fewer,
@@ -142,7 +144,7 @@ def sound_dwells(
 
 
 def refuse_or_remark(
-    found: SampleFaults, output: NDArray[np.float64], time: NDArray[np.float64], mapping: Mapping, where: str
+    faults: SampleFaults, output: NDArray[np.float64], time: NDArray[np.float64], mapping: Mapping, where: str
 ) -> tuple[str, ...]:
     """Remarks on the faults that are left out or kept.
 
@@ -151,10 +153,10 @@ def refuse_or_remark(
     DataRejected
         There are faults and the mapping does not state their treatment; or an axis is always constant.
     """
-    if not found:
+    if not faults:
         return ()
-    words = "; ".join(found.sentences(time))
-    whole = [one for one in found.frozen if one.count == len(output)]
+    words = "; ".join(faults.sentences(time))
+    whole = [one for one in faults.frozen if one.count == len(output)]
     if whole and mapping.faulty != "keep":
         axis = AXES[whole[0].axis]
         raise DataRejected(
@@ -167,4 +169,4 @@ def refuse_or_remark(
             "or --faulty keep if this is what the sensor does"
         )
     done = "left out" if mapping.faulty == "leave-out" else "kept"
-    return (f"{int(found.bad.sum())} samples with faults {done}: {words}",)
+    return (f"{int(faults.bad.sum())} samples with faults {done}: {words}",)

@@ -24,10 +24,10 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
     WrongUse
         The day of the measurement is not given, which is needed to check whether references were due.
     """
-    found = read_references(path)
+    references = read_references(path)
     where = f"references {path.name}"
     _refuse_day(str(content.get("measured", "")), where)
-    gravity = found.uncertainty.gravity
+    gravity = references.uncertainty.gravity
     if gravity is None:
         raise RecipeInvalid(
             f"{where}: key 'uncertainty.gravity' is missing, local gravity and its uncertainty rule the scale of every import; "
@@ -43,7 +43,7 @@ def stated_references(path: Path, content: dict[str, Any]) -> ImportReferences:
             f"{float(given):.8g}, they differ by {1e6 * apart:.0f} ppm; leave --local-g out, or correct one of the two",
             key="uncertainty.gravity",
         )
-    return found
+    return references
 
 
 def _refuse_day(day: str, where: str) -> None:

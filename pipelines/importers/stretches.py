@@ -58,15 +58,15 @@ def stretches(
     """
     edges = [0, *(k for k in breaks if 0 < k < len(time)), len(time)]
     if labels is not None:
-        found = _by_labels(labels, edges)
+        intervals = _by_labels(labels, edges)
     elif mapping.positions is not None:
-        found = _by_positions(output, mapping.positions, where)
+        intervals = _by_positions(output, mapping.positions, where)
     elif mapping.block_s is not None:
-        found = _by_blocks(time, edges, mapping.block_s)
+        intervals = _by_blocks(time, edges, mapping.block_s)
     else:
-        found = _found(output, time, edges, mapping)
-        _refuse_several_positions(found, output, where)
-    return _named(found, mapping, where)
+        intervals = _found(output, time, edges, mapping)
+        _refuse_several_positions(intervals, output, where)
+    return _named(intervals, mapping, where)
 
 
 def _by_labels(labels: Sequence[str], edges: list[int]) -> Stretches:
@@ -85,15 +85,13 @@ def _by_blocks(time: NDArray[np.float64], edges: list[int], block_s: float) -> S
 
 def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretches:
     try:
-        found = change_of_level.levels(output, count)
+        levels = change_of_level.levels(output, count)
     except ValueError as problem:
         raise DataRejected(f"{where}: {problem}") from None
     # the samples beside a change may belong to either side
-    start, stop = found.start + (found.start > 0), found.stop - (found.stop < len(output))
-    remark = (
-        f"{len(found)} positions logged back to back, {100.0 * found.explained:.4g} % of the scatter explained by them"
-    )
-    names = tuple(f"position {k}" for k in range(len(found)))
+    start, stop = levels.start + (levels.start > 0), levels.stop - (levels.stop < len(output))
+    remark = f"{len(levels)} positions logged back to back, {100.0 * levels.explained:.4g} % of the scatter explained by them"
+    names = tuple(f"position {k}" for k in range(len(levels)))
     return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
 
 
@@ -117,14 +115,14 @@ def _found(output: NDArray[np.float64], time: NDArray[np.float64], edges: list[i
     return Stretches(tuple(first), tuple(last), tuple(f"dwell {k}" for k in range(len(first))))
 
 
-def _refuse_several_positions(found: Stretches, output: NDArray[np.float64], where: str) -> None:
+def _refuse_several_positions(intervals: Stretches, output: NDArray[np.float64], where: str) -> None:
     """Refuse stretches with more scatter than noise: positions logged one after another."""
-    counts = [change_of_level.several_levels(output[a:b]) for a, b in zip(found.first, found.last, strict=True)]
+    counts = [change_of_level.several_levels(output[a:b]) for a, b in zip(intervals.first, intervals.last, strict=True)]
     several = [k for k, count in enumerate(counts) if count > 1]
     if not several:
         return
     worst = max(several, key=lambda k: counts[k])
-    a, b = found.first[worst], found.last[worst]
+    a, b = intervals.first[worst], intervals.last[worst]
     total = change_of_level.several_levels(output)
     offer = (
         f"--positions {total} divides the record at the changes"
@@ -137,19 +135,19 @@ def _refuse_several_positions(found: Stretches, output: NDArray[np.float64], whe
     )
 
 
-def _named(found: Stretches, mapping: Mapping, where: str) -> Stretches:
+def _named(intervals: Stretches, mapping: Mapping, where: str) -> Stretches:
     """The stretches with a label of a pose; all without poses."""
     if not mapping.poses:
-        return found
-    missing = [label for label in mapping.poses if label not in found.labels]
+        return intervals
+    missing = [label for label in mapping.poses if label not in intervals.labels]
     if missing:
         raise DataRejected(
-            f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], found.labels)}"
+            f"{where}: no dwell is labelled '{missing[0]}' (in --poses); {did_you_mean(missing[0], intervals.labels)}"
         )
-    kept = [k for k, label in enumerate(found.labels) if label in mapping.poses]
+    kept = [k for k, label in enumerate(intervals.labels) if label in mapping.poses]
     return Stretches(
-        tuple(found.first[k] for k in kept),
-        tuple(found.last[k] for k in kept),
-        tuple(found.labels[k] for k in kept),
-        found.remarks,
+        tuple(intervals.first[k] for k in kept),
+        tuple(intervals.last[k] for k in kept),
+        tuple(intervals.labels[k] for k in kept),
+        intervals.remarks,
     )

@@ -129,7 +129,7 @@ def _sampled(filled: list[str]) -> list[str]:
 def _divided(sample: Sequence[str]) -> tuple[str, str, int]:
     """Divider, decimal sign and count of fields that fit the sampled lines best."""
     best: tuple[float, ...] = ()
-    found = (BLANKS, ".", 1)
+    chosen = (BLANKS, ".", 1)
     for order, (divider, decimal) in enumerate(_CANDIDATES):
         rows = [fields_of(line, divider) for line in sample]
         width, often = Counter(map(len, rows)).most_common(1)[0]
@@ -139,8 +139,8 @@ def _divided(sample: Sequence[str]) -> tuple[str, str, int]:
         # a divider that leaves nothing but numbers, then the more columns, then the usual order
         key = (float(alike and width > 1), round(numbers, 2), width, -order)
         if key > best:
-            best, found = key, (divider, decimal, width)
-    return found
+            best, chosen = key, (divider, decimal, width)
+    return chosen
 
 
 def _numeric_columns(sample: Sequence[str], divider: str, decimal: str, width: int) -> list[bool]:

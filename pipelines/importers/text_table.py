@@ -64,18 +64,18 @@ def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     """The columns of a text, named as there ("1", "2", … without a header), and its detected layout."""
     lines, grouped = without_thousands(logical_lines(text))
     filled = filled_lines(lines)
-    found = layout(lines, filled)
-    if found is None:
+    detected = layout(lines, filled)
+    if detected is None:
         raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
-    labels = _labels(found, where)
-    rows = filled[bisect_left(filled, found.first) :]
+    labels = _labels(detected, where)
+    rows = filled[bisect_left(filled, detected.first) :]
     body = [lines[k] for k in rows]
-    table = _parsed(body, found, labels, where)
-    units = {label: unit for label, unit in zip(labels, found.units, strict=False) if unit} or {
+    table = _parsed(body, detected, labels, where)
+    units = {label: unit for label, unit in zip(labels, detected.units, strict=False) if unit} or {
         label: unit for label in labels if (unit := unit_in(label))
     }
     units = {label: unit.strip("[]() ") for label, unit in units.items()}
-    remarks = _remarks(found, lines, encoding)
+    remarks = _remarks(detected, lines, encoding)
     remarks = (*remarks, grouped) if grouped else remarks
     # a line break inside a quoted field, or one that the parser joins, moves all rows behind it
     whole = len(lines) == len(text.splitlines()) and len(rows) == len(table)
@@ -103,30 +103,30 @@ def logical_lines(text: str) -> list[str]:
     return rows + waiting
 
 
-def _labels(found: Layout, where: str) -> list[str]:
-    if found.width > MOST_COLUMNS:
-        line = f"{found.width} columns in line {max(found.header, 0) + 1}"
+def _labels(detected: Layout, where: str) -> list[str]:
+    if detected.width > MOST_COLUMNS:
+        line = f"{detected.width} columns in line {max(detected.header, 0) + 1}"
         raise DataRejected(f"{where}: {line}, at most {MOST_COLUMNS} are read; one row per sample is needed")
-    if not found.names:
-        return [str(k + 1) for k in range(found.width)]
-    labels = [name or f"column {k + 1}" for k, name in enumerate(found.names)]
+    if not detected.names:
+        return [str(k + 1) for k in range(detected.width)]
+    labels = [name or f"column {k + 1}" for k, name in enumerate(detected.names)]
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise DataRejected(f"{where}: column '{shown(twice)}' is there twice, names must differ; rename one")
     return labels
 
 
-def _parsed(body: Sequence[str], found: Layout, labels: list[str], where: str) -> pd.DataFrame:
+def _parsed(body: Sequence[str], detected: Layout, labels: list[str], where: str) -> pd.DataFrame:
     if not body:
         return pd.DataFrame(columns=labels)
-    wrong = f"{where}: rows from line {found.first + 1} on do not have the {len(labels)} columns of the first"
-    extra = [*labels, *(["\0last"] if found.trailing else []), _MORE]
+    wrong = f"{where}: rows from line {detected.first + 1} on do not have the {len(labels)} columns of the first"
+    extra = [*labels, *(["\0last"] if detected.trailing else []), _MORE]
     with foreign(wrong, "repair or remove the broken rows"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         table = pd.read_csv(
             io.StringIO("\n".join(body)),
-            sep=found.divider,
-            decimal=found.decimal,
+            sep=detected.divider,
+            decimal=detected.decimal,
             header=None,
             names=extra,
             index_col=False,
@@ -134,7 +134,7 @@ def _parsed(body: Sequence[str], found: Layout, labels: list[str], where: str) -
             low_memory=False,
         )
     more = table.pop(_MORE).notna().to_numpy()
-    if found.trailing:
+    if detected.trailing:
         more = more | table.pop("\0last").notna().to_numpy()
     if more.any():
         row = int(np.flatnonzero(more)[0])
@@ -152,22 +152,26 @@ def _fortran(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _remarks(found: Layout, lines: Sequence[str], encoding: str) -> tuple[str, ...]:
+def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str, ...]:
     remarks: list[str] = []
-    begin = found.first if found.header < 0 else found.header
+    begin = detected.first if detected.header < 0 else detected.header
     passed = [line for line in lines[:begin] if not is_comment(line)]
     if passed:
-        place = f"the header in line {found.header + 1}" if found.header >= 0 else f"the first row in line {begin + 1}"
+        place = (
+            f"the header in line {detected.header + 1}"
+            if detected.header >= 0
+            else f"the first row in line {begin + 1}"
+        )
         remarks.append(
             f"{len(passed)} lines before {place} were not read, beginning with '{shown(passed[0].strip(), 60)}'"
         )
-    if found.integers:
+    if detected.integers:
         remarks.append(
-            f"line {found.header + 1} only numbers the columns: {', '.join(filter(None, found.names[:6]))}, …"
+            f"line {detected.header + 1} only numbers the columns: {', '.join(filter(None, detected.names[:6]))}, …"
         )
-    elif found.names and found.header < 0:
-        remarks.append(f"columns named by a comment: {shown(', '.join(found.names))}")
-    if found.decimal == ",":
+    elif detected.names and detected.header < 0:
+        remarks.append(f"columns named by a comment: {shown(', '.join(detected.names))}")
+    if detected.decimal == ",":
         remarks.append("numbers with a decimal comma")
     if encoding != "UTF-8":
         remarks.append(f"text in {encoding}")

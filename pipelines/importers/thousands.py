@@ -87,7 +87,7 @@ def _cleaned(line: str, divider: str, sign: str, grouped: re.Pattern[str]) -> st
     if sign not in line:
         return line
     if divider == sign:  # only quoted fields may have it
-        return re.sub(rf'"\s*({grouped.pattern})\s*"', lambda found: found[1].replace(sign, ""), line)
+        return re.sub(rf'"\s*({grouped.pattern})\s*"', lambda number: number[1].replace(sign, ""), line)
     fields = line.split(divider)
     return divider.join(
         field.replace(sign, "") if grouped.fullmatch(field.strip().strip('"')) else field for field in fields

@@ -88,10 +88,10 @@ def import_transfer(
     table, source = files.read(path)
     points = transfer_points(table, path.name)
     try:
-        found = diagnose_transfer(points, effects)
+        diagnosis = diagnose_transfer(points, effects)
     except InertialError as problem:
         raise DataRejected(f"{path.name}: {problem}") from None
-    fit = found.extended
+    fit = diagnosis.extended
     bandwidth = bandwidth_of(fit, fit.values, float(points.conditions.frequency.max()))
     parameters: dict[str, TransferParameter] = {}
     for p in fit.parameters:
@@ -100,29 +100,30 @@ def import_transfer(
         parameters[p.name] = TransferParameter(
             value=value, uncertainty=error, low=low, high=high, unit=p.unit, identified=known
         )
-    text = diagnosis_text(found)
+    text = diagnosis_text(diagnosis)
     run = _keep(points, source, unit, list(effects), text, archive)
     return {
         "run": run.id,
         "unit": unit,
         "points": len(points.value),
-        "adequate": found.adequate,
-        "reason": found.reason,
-        "model": list(found.fit.effects),
-        "p_value": found.fit.p_value,
-        "error_percent": found.error_percent,
-        "extended_percent": found.extended_percent,
-        "left_out": list(found.left_out),
+        "adequate": diagnosis.adequate,
+        "reason": diagnosis.reason,
+        "model": list(diagnosis.fit.effects),
+        "p_value": diagnosis.fit.p_value,
+        "error_percent": diagnosis.error_percent,
+        "extended_percent": diagnosis.extended_percent,
+        "left_out": list(diagnosis.left_out),
         "where": [
-            {"low_hz": one.low_hz, "high_hz": one.high_hz, "part": one.part, "share": one.share} for one in found.where
+            {"low_hz": one.low_hz, "high_hz": one.high_hz, "part": one.part, "share": one.share}
+            for one in diagnosis.where
         ],
-        "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in found.classes],
-        "recommended": list(found.recommended),
-        "unexplained": found.unexplained,
+        "classes": [{"effects": list(one.effects), "p_value": one.p_value} for one in diagnosis.classes],
+        "recommended": list(diagnosis.recommended),
+        "unexplained": diagnosis.unexplained,
         "sensitivity": fit.sensitivity,
         "bandwidth_hz": bandwidth,
         "parameters": parameters,
-        "next_hz": list(found.next_hz),
+        "next_hz": list(diagnosis.next_hz),
         "text": [f"{subject}: {one}" for subject, one in text],
     }
 

@@ -100,13 +100,13 @@ def import_waveforms(
         outcome = one.evaluate(own, points, device)
     except InertialError as problem:
         raise DataRejected(f"{paths[0].name}: {problem}") from None
-    found = outcome.figures.get(unit, [])
+    values = outcome.figures.get(unit, [])
     texts = [(f.subject, f.text) for f in outcome.findings]
     if not np.isfinite(full_scale):
         texts.append(("not judged", "clipping: full_scale is not given; add it to the file of --part"))
     stated = {"part": content, "columns": dict(layout.columns), "units": dict(layout.units), "rate_hz": layout.rate_hz}
     stated |= {"group": layout.group}
-    run = _keep(procedure, stated, points, found, texts, sources, unit, archive)
+    run = _keep(procedure, stated, points, values, texts, sources, unit, archive)
     units = {spec.name: spec.unit for spec in one.figures}
     figures: list[WaveformFigure] = [
         {
@@ -114,7 +114,7 @@ def import_waveforms(
             "uncertainty": f.uncertainty if f.identified and np.isfinite(f.uncertainty) else None, "unit": units[f.figure],
             "identified": bool(f.identified and np.isfinite(f.value)), "note": f.note,
         }
-        for f in found
+        for f in values
     ]  # fmt: skip
     return {
         "run": run.id,
@@ -246,7 +246,7 @@ def _keep(
     procedure: str,
     stated: Mapping[str, Any],
     points: pd.DataFrame,
-    found: Sequence[Any],
+    values: Sequence[Any],
     texts: Sequence[tuple[str, str]],
     sources: Sequence[files.SourceFile],
     unit: str,
@@ -276,7 +276,7 @@ def _keep(
             "uncertainty": f.uncertainty, "low": f.low, "high": f.high, "identified": bool(f.identified and np.isfinite(f.value)),
             "unit_text": units[f.figure], "note": f.note,
         }
-        for f in found
+        for f in values
     ]  # fmt: skip
     findings = [{"unit": unit, "procedure": procedure, "number": 0, "subject": a, "text": b} for a, b in texts]
     tables = {

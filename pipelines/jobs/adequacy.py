@@ -82,8 +82,8 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
     from inertial.criticism.verdict import judged  # loads scipy.stats: a run without dwells does not need it
 
     catalogue.get_all(list(effects))
-    found, faults, lot = sound_lot(dwells, history, effects)
-    faulty = sorted({found.units[fault.unit] for fault in faults})
+    measurement, faults, lot = sound_lot(dwells, history, effects)
+    faulty = sorted({measurement.units[fault.unit] for fault in faults})
     if lot is None:
         return _not_judged(every_unit_faulty(faults), faulty)
     with threadpool_limits(1):
@@ -95,7 +95,7 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
         "rms_ug": error["rms_ug"],
         "floor_ug": error["floor_ug"],
         "p_value": error["p_value"],
-        "units": len(found.units) - len(faulty),
+        "units": len(measurement.units) - len(faulty),
         "faulty": faulty,
     }
 

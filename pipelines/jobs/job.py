@@ -248,10 +248,10 @@ def _refuse_more_units_than_slots(job: Job) -> None:
     """Refuse a lot that does not fit the fixture: units must be seated between two fillings, so each filling is a lot."""
     serials, slots = [unit.serial for unit in job.lot.units], job.station.devices.slots.count
     if len(serials) > slots:
-        found = fillings(serials, slots)
-        commands = ", then ".join(f"--units {','.join(own)}" for own in found)
+        lots = fillings(serials, slots)
+        commands = ", then ".join(f"--units {','.join(own)}" for own in lots)
         raise WrongUse(
-            f"lot: {len(serials)} units, the fixture has {slots} slots; measure {len(found)} lots, one after the other: "
+            f"lot: {len(serials)} units, the fixture has {slots} slots; measure {len(lots)} lots, one after the other: "
             f"{commands}"
         )
     for unit in job.lot.units:

@@ -76,8 +76,8 @@ def with_moved_poses(recipe: Recipe, moves: dict[str, Angles], where: str) -> Re
     changed = {"poses": [moved(p) for p in recipe.poses], "verification": [moved(p) for p in recipe.verification]}
     source = f"recipe {recipe.name}"
     try:
-        found = Recipe.model_validate({**recipe.model_dump(), **changed})
+        moved_recipe = Recipe.model_validate({**recipe.model_dump(), **changed})
     except ValidationError as problem:
         raise explain(problem, source, Recipe) from None
-    refuse_unusable_poses(found, source)
-    return found
+    refuse_unusable_poses(moved_recipe, source)
+    return moved_recipe

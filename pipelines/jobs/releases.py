@@ -185,8 +185,8 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
         No model is released for the device and station.
     """
     at = when or datetime.now(UTC)
-    found = released(archive, device, station, at)
-    if found is None:
+    in_force = released(archive, device, station, at)
+    if in_force is None:
         there = releases(archive)
         known = ", ".join(f"{one.device or 'every device'} from {one.since:%Y-%m-%d}" for one in there) or "none"
         raise RecipeInvalid(
@@ -194,7 +194,7 @@ def line_model(archive: Archive, device: str, station: str, when: datetime | Non
             f"(released: {known}); release one with 'tumbleline release', or name effects in the recipe",
             key="model",
         )
-    return found.of_model()
+    return in_force.of_model()
 
 
 def _place(archive: Archive, number: int) -> Any:

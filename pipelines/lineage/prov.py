@@ -108,18 +108,18 @@ def _activity(step: ProvActivity, graph: Graph, agents: dict[str, dict[str, Any]
 
 def _agents(step: ProvActivity, agents: dict[str, dict[str, Any]]) -> list[str]:
     """The person and the program of a step."""
-    found: list[str] = []
+    names: list[str] = []
     if step.about.get("who"):
         name = iri("agent", _person(step))
         agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:Person"], "label": _person(step)}
-        found.append(name)
+        names.append(name)
     software = step.about.get("software", {})
     if software:
         label = " ".join(f"{key} {value}" for key, value in sorted(software.items(), reverse=True))
         name = iri("agent", label)
         agents[name] = {"@id": name, "@type": ["prov:Agent", "prov:SoftwareAgent"], "label": label}
-        found.append(name)
-    return found
+        names.append(name)
+    return names
 
 
 def _person(step: ProvActivity) -> str:

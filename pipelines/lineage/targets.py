@@ -55,8 +55,8 @@ def lineage(archive: Archive, target: str) -> Lineage:
         return _of_file(archive, target)
     if Ledger(archive).events(target):
         gatherer = Gatherer(archive)
-        found = gatherer.calibrations(target)
-        return Lineage(target, "unit", tuple(found), gatherer.graph.around(found))
+        names = gatherer.calibrations(target)
+        return Lineage(target, "unit", tuple(names), gatherer.graph.around(names))
     ids = archive.run_ids()
     if target == "latest" or any(target and name.startswith(target) for name in ids):
         return _of_run(archive, archive.run(target))
@@ -65,9 +65,9 @@ def lineage(archive: Archive, target: str) -> Lineage:
         gatherer = Gatherer(archive)
         for name in runs:
             gatherer.run(archive.run(name))
-        found = [name for name in gatherer.graph.nodes if name in {f"runs/{run}/grades.parquet" for run in runs}]
-        found = found or [f"runs/{run}" for run in runs]
-        return Lineage(target, "unit", tuple(found), gatherer.graph.around(found))
+        names = [name for name in gatherer.graph.nodes if name in {f"runs/{run}/grades.parquet" for run in runs}]
+        names = names or [f"runs/{run}" for run in runs]
+        return Lineage(target, "unit", tuple(names), gatherer.graph.around(names))
     message = f"lineage: '{target}' is neither a unit, a run nor a file of archive {archive.root}; {did_you_mean(target, ids)}"
     raise WrongUse(message if ids else f"archive {archive.root}: no run exists; make one with 'tumbleline run'")
 

@@ -44,8 +44,8 @@ def alerts_of(snapshot: Snapshot, audits: Path | None = None) -> list[Alert]:
     ----------
     audits : folder of the documents of the audits (``pages`` of the deployment weekly-audit); none where None
     """
-    found = [*_of_runs(snapshot), *_of_stations(snapshot)]
-    return [*found, *_of_audit(audits, snapshot.when)] if audits is not None else found
+    alerts = [*_of_runs(snapshot), *_of_stations(snapshot)]
+    return [*alerts, *_of_audit(audits, snapshot.when)] if audits is not None else alerts
 
 
 def _opener() -> urllib.request.OpenerDirector:

@@ -118,14 +118,14 @@ class ArchiveReader:
         run = self.archive.run(run_id)
         try:
             dwells = run.table("dwells") if "dwells" in run.tables() else None
-            found = interruptions(run)
+            interrupted = interruptions(run)
         except TumblelineError:  # 'tumbleline verify' reports the faults of its files
             return RunTime()
         station_s = float(dwells["time_s"].max()) if dwells is not None and len(dwells) else 0.0
-        if found is None:
+        if interrupted is None:
             return RunTime(station_s)
-        repeated = sum(one["times"] for one in found["repeated_dwells"])
-        return RunTime(station_s, found["pauses"], found["paused_s"], repeated, found["door_opened"])
+        repeated = sum(one["times"] for one in interrupted["repeated_dwells"])
+        return RunTime(station_s, interrupted["pauses"], interrupted["paused_s"], repeated, interrupted["door_opened"])
 
     def _lag(self, finished: Iterable[RunInfo], numbers: ArchiveNumbers, at: datetime) -> None:
         for info in finished:

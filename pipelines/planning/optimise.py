@@ -130,11 +130,11 @@ def _refusal(search: RecipeSearch) -> str:
         needed = requirement.discrimination.chi_square
         reached = f"χ² {needed / near**2:.2g}, {needed:g} is needed"
         return f"{start}discriminates between these effects: the best reaches {reached}; use {near:.1f} times the size (--size)"
-    found = lower_bound(search.recipe, search.against, requirement)
-    if found is None:
+    lower = lower_bound(search.recipe, search.against, requirement)
+    if lower is None:
         bound = "; uninterrupted measurement for the textbook plan's time does not reach them either: wander limits the bias"
     else:
-        bound = f"; uninterrupted measurement needs {100.0 * found.share:.0f} % of the textbook plan's time, for {found.effect}"
+        bound = f"; uninterrupted measurement needs {100.0 * lower.share:.0f} % of the textbook plan's time, for {lower.effect}"
     nearest = f": the best has {near:.3f} times those" if math.isfinite(near) else ""
     return f"{start}reaches the required errors{nearest}{bound}; allow larger errors (--factor, --wanted) or other temperatures"
 
@@ -155,11 +155,11 @@ class RecipeSearch:
         """Designs with the fewest dwells in the best orders of soaks, and their station times in s, the quickest first."""
         requirement, recipe = self.requirement, self.recipe
         back = requirement.discrimination is None
-        found = orders(
+        soak_orders = orders(
             requirement.levels, self.against.station, recipe.soak_min_s, optional=requirement.optional_levels, back=back
         )
         dwell_s = self.timed.dwell_lengths()[0]
-        likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in found)[:LIKELY]
+        likely = sorted((self.estimated_seconds(order, dwell_s), order) for order in soak_orders)[:LIKELY]
         tried: list[tuple[float, PlanDesign]] = []
         for seconds, order in likely:
             if math.isfinite(seconds):
@@ -200,8 +200,8 @@ class RecipeSearch:
     def with_fewest_dwells(self, plan: PlanDesign) -> tuple[float, PlanDesign]:
         """The design with the fewest dwells, and its station time in s; infinite where no number is enough."""
         ratio, _ = self.timed.ratio_and_seconds(replace(plan, counts=(FEWEST,) * len(plan.order)))
-        found = fewest_dwells(self.timed, plan, self.allowed(ratio))
-        return (math.inf, plan) if found is None else (self.timed.ratio_and_seconds(found)[1], found)
+        fewest = fewest_dwells(self.timed, plan, self.allowed(ratio))
+        return (math.inf, plan) if fewest is None else (self.timed.ratio_and_seconds(fewest)[1], fewest)
 
     def best(self, plan: PlanDesign, best: PlanContext | None) -> PlanContext | None:
         """The quicker of the best recipe so far and the one found by exchanges in the soaks of a design."""
@@ -209,18 +209,18 @@ class RecipeSearch:
         for _ in range(ROUNDS):
             if now is None or self.slower(now, best):
                 break
-            found = self.designed(now)
+            designed = self.designed(now)
             try:
-                reached = self.reached(found)
+                reached = self.reached(designed)
             except NotIdentified:
                 break
             worst = float(np.max(reached))
             self.nearest = min(self.nearest, worst)
             if self.near is None or worst < self.near[0]:
-                self.near = (worst, found)
-            if worst <= 1.0 and (best is None or measuring_minutes(found) < measuring_minutes(best)):
-                self.unseen = self.not_visible(found)
-                best = best if self.unseen else found
+                self.near = (worst, designed)
+            if worst <= 1.0 and (best is None or measuring_minutes(designed) < measuring_minutes(best)):
+                self.unseen = self.not_visible(designed)
+                best = best if self.unseen else designed
             if NEAR < worst <= 1.0 or self.unseen:
                 break
             now = fewest_dwells(self.timed, plan, (1.0 - SPARE) * self.timed.ratio_and_seconds(now)[0] / reached)
@@ -230,8 +230,12 @@ class RecipeSearch:
         """The recipe with the smallest ratio, if within tolerance, quicker than the textbook plan, and all effects visible."""
         if self.near is None or self.near[0] > tolerance:
             return None
-        found = self.near[1]
-        return None if measuring_minutes(found) >= measuring_minutes(self.against) or self.not_visible(found) else found
+        nearest = self.near[1]
+        return (
+            None
+            if measuring_minutes(nearest) >= measuring_minutes(self.against) or self.not_visible(nearest)
+            else nearest
+        )
 
     def slower(self, plan: PlanDesign, best: PlanContext | None) -> bool:
         """Whether a design clearly takes longer than the best recipe so far."""
@@ -245,15 +249,15 @@ class RecipeSearch:
         recipe = self._recipe(plan, choice)
         return plan_context(recipe, self.against.station, self.against.noise, slowest=self.timed.slowest)
 
-    def reached(self, found: PlanContext) -> Array:
+    def reached(self, context: PlanContext) -> Array:
         """Ratios of a recipe to the requirement, with every dwell at its planned time; met at ≤ 1."""
-        expected = identified(found)
+        expected = identified(context)
         if self.requirement.discrimination is None:
             return expected.errors / self.requirement.errors
         sensor, _ = design.split(self.requirement.effects)
-        rows = design.local_columns(sensor, found.state, design.starting_values(sensor, found.state))
+        rows = design.local_columns(sensor, context.state, design.starting_values(sensor, context.state))
         rows = rows * self.requirement.errors[:, None, :]
-        return self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ np.linalg.solve(found.covariance, rows))
+        return self.requirement.ratio_to_required(np.swapaxes(rows, -1, -2) @ np.linalg.solve(context.covariance, rows))
 
     def _recipe(self, plan: PlanDesign, choice: NDArray[np.intp]) -> Recipe:
         used = np.unique(choice)
@@ -280,10 +284,10 @@ class RecipeSearch:
             }
         )
 
-    def not_visible(self, found: PlanContext) -> list[str]:
+    def not_visible(self, context: PlanContext) -> list[str]:
         """Required effects that are not visible."""
         seen = {
             s.effect: s.remaining_fraction
-            for s in visibilities(found.state, self.recipe.effects, 1.0, self.requirement.see)
+            for s in visibilities(context.state, self.recipe.effects, 1.0, self.requirement.see)
         }
         return [name for name in self.requirement.see if seen.get(name, 1.0) < PART_SEEN]

@@ -85,10 +85,12 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
     recipe, noise = context.recipe, context.noise
     of_record = _of_record(context)
     expected = identified(replace(context, covariance=of_record))
-    found = visibilities(context.state, recipe.effects, noise.error(recipe.dwell_s), covariance=context.covariance)
-    fast = visibilities(context.state, recipe.effects, noise.white(recipe.dwell_s), [s.effect for s in found if s.seen])
+    visibility = visibilities(context.state, recipe.effects, noise.error(recipe.dwell_s), covariance=context.covariance)
+    fast = visibilities(
+        context.state, recipe.effects, noise.white(recipe.dwell_s), [s.effect for s in visibility if s.seen]
+    )
     alone = {s.effect: MICRO * s.size for s in fast if np.isfinite(s.size)}
-    checked = _shown_by_verification(context, [s.effect for s in found if not s.seen])
+    checked = _shown_by_verification(context, [s.effect for s in visibility if not s.seen])
     white, wander, together = (MICRO * f(recipe.dwell_s) for f in (noise.white, noise.wander, noise.error))
     return {
         "recipe": recipe.name,
@@ -103,7 +105,7 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
         "minutes": spent(context.activities).document(),
         "coefficients": _coefficient_rows(expected),
         "bias": _bias(context, expected, of_record, terms),
-        "effects": [_row(s, context, checked) | {"floor_white_ug": alone.get(s.effect)} for s in found],
+        "effects": [_row(s, context, checked) | {"floor_white_ug": alone.get(s.effect)} for s in visibility],
         **({} if terms is None else {"uncertainty": reach(context, of_record, terms, limits)}),
     }
 

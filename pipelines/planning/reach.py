@@ -66,7 +66,7 @@ def reach(context: Planning, covariance: Array, terms: BudgetTerms, limits: Limi
     within = noise.instability * flicker_within(Windows(span, length, 0.0), slowest)
     run = MICRO * float(np.hypot(noise.white(length), within))
     planned = PlannedDwells(*dwells, covariance, run, MICRO * noise.instability)
-    found = reachable(planned, terms, context.recipe.effects)
+    reaches = reachable(planned, terms, context.recipe.effects)
     months = terms.certificate.validity_months
     return {
         "k": 2.0,
@@ -83,9 +83,9 @@ def reach(context: Planning, covariance: Array, terms: BudgetTerms, limits: Limi
                 "expanded": 2.0 * one.u,
                 "shares": {LABELS[name]: share for name, share in one.shares.items() if share >= 5e-4},
             }
-            for one in found
+            for one in reaches
         ],
-        "unreachable": [] if limits is None else unreachable(found, limits, months),
+        "unreachable": [] if limits is None else unreachable(reaches, limits, months),
         "remarks": remarks(context, terms),
     }
 

@@ -31,8 +31,8 @@ def shown_by_verification(
     if not effects or not recipe.verification:
         return set()
     every = state_of(activities, station, recipe, history=True, kinds=("dwell", "verification"))
-    found: set[str] = set()
+    shown: set[str] = set()
     for effect in effects:
         rest = [other for other in recipe.effects if other != effect]
-        found |= {s.effect for s in visibilities(every, rest, 1.0, [effect]) if s.remaining_fraction > SEEN}
-    return found
+        shown |= {s.effect for s in visibilities(every, rest, 1.0, [effect]) if s.remaining_fraction > SEEN}
+    return shown

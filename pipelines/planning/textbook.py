@@ -66,9 +66,9 @@ def reference_errors(against: PlanContext, recipe: Recipe) -> Array:
     for effect in _hidden(against.state, model):
         model.remove(effect)
     there = expected_errors(model, against.state, against.covariance)
-    found = own.errors.copy()
-    found[:, [k for k, name in enumerate(names) if name in model]] = there.errors
-    return found
+    errors = own.errors.copy()
+    errors[:, [k for k, name in enumerate(names) if name in model]] = there.errors
+    return errors
 
 
 def _hidden(state: State, model: Sequence[str]) -> list[str]:

@@ -216,13 +216,13 @@ def spanned(force: Array, choice: Choice, fixed: NDArray[np.bool_], needed_g: fl
     fixed : (n,), slots that are not changed
     needed_g : g, required difference of the largest and smallest component
     """
-    found, free = choice.copy(), ~fixed
+    changed, free = choice.copy(), ~fixed
     for axis in np.flatnonzero(np.ptp(force[choice], axis=0) < needed_g):
         for far in (int(np.argmax(force[:, axis])), int(np.argmin(force[:, axis]))):
-            nearest = np.argmax(np.where(free, force[found] @ force[far], -np.inf))
+            nearest = np.argmax(np.where(free, force[changed] @ force[far], -np.inf))
             if free.any():
-                found[nearest], free[nearest] = far, False
-    return found
+                changed[nearest], free[nearest] = far, False
+    return changed
 
 
 @lru_cache(maxsize=32)

@@ -36,13 +36,13 @@ def apart(chosen: Array, given: Sequence[Pose]) -> list[Pose]:
     count = len({(p.outer_deg, p.inner_deg) for p in given})
     grid = WHOLE_DEG * np.round(poses.fibonacci(400) / WHOLE_DEG)
     force, used = force_from_angles(*np.radians(grid).T), force_from_angles(*np.radians(chosen).T)
-    found: list[Array] = []
+    angles: list[Array] = []
     for _ in range(count):
         near = np.max(force @ used.T, axis=1)
         best = int(np.argmin(near))
-        found.append(grid[best])
+        angles.append(grid[best])
         used = np.concatenate([used, force[best : best + 1]])
-    return numbered("v", np.array(found).reshape(-1, 2))
+    return numbered("v", np.array(angles).reshape(-1, 2))
 
 
 def turns(count: int, repeats: int, soak: int, soaks: int) -> list[int]:

@@ -78,7 +78,7 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     IncompleteProcedure
         A module has no PROCEDURE, or one that declares what it cannot do, or two have one figure.
     """
-    found: list[Procedure] = []
+    procedures: list[Procedure] = []
     for info in iter_modules(path):
         if info.name in SHARED or info.ispkg:
             continue
@@ -88,12 +88,12 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
                 f"{package}.{info.name}: no PROCEDURE of this name, one is needed; define PROCEDURE = … with name = '{info.name}'"
             )
         _refuse_half(f"{package}.{info.name}", one)
-        found.append(one)
-    figures = [figure.name for one in found for figure in one.figures]
+        procedures.append(one)
+    figures = [figure.name for one in procedures for figure in one.figures]
     twice = sorted({name for name in figures if figures.count(name) > 1})
     if twice:
         raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
-    return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
+    return {one.name: one for one in sorted(procedures, key=lambda one: (one.order, one.name))}
 
 
 def _refuse_half(module: str, one: Procedure) -> None:

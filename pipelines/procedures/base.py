@@ -283,8 +283,8 @@ def worst(values: Sequence[FigureValue]) -> FigureValue:
     missing = [one for one in values if not one.identified]
 
     def size(one: FigureValue) -> float:
-        found = abs(one.value) + 2.0 * one.uncertainty
-        return found if np.isfinite(found) else np.inf  # max() passes over a nan that is not the first
+        bound = abs(one.value) + 2.0 * one.uncertainty
+        return bound if np.isfinite(bound) else np.inf  # max() passes over a nan that is not the first
 
     return missing[0] if missing else max(values, key=size)
 

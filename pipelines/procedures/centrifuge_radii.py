@@ -38,7 +38,7 @@ def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
     k1, k2, k3 = (unit.of(name) for name in ("scale", "second_order", "third_order"))
     offset, spread = fit.mass_offset_m
     linearity, error = linearity_percent(unit, full_scale_g), linearity_error(unit, full_scale_g)
-    found = [
+    figures = [
         FigureValue("centrifuge_linearity_percent", "z", linearity, error),
         FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
         FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
@@ -47,9 +47,9 @@ def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
     ]
     name = "centrifuge_radius_consistency_ppm"
     if fit.consistency is None:
-        return [*found, FigureValue.not_determined(name, "z", ONE_MOUNTING)]
+        return [*figures, FigureValue.not_determined(name, "z", ONE_MOUNTING)]
     value, error = fit.consistency
-    return [*found, FigureValue(name, "z", MICRO * value, MICRO * error)]
+    return [*figures, FigureValue(name, "z", MICRO * value, MICRO * error)]
 
 
 def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str]]:

@@ -66,26 +66,28 @@ def texts_of_radius(fit: Polynomial, radius_m: float, *, both: bool) -> list[tup
     return out
 
 
-def diagnosis_text(found: SpinDiagnosis) -> list[tuple[str, str]]:
+def diagnosis_text(diagnosis: SpinDiagnosis) -> list[tuple[str, str]]:
     """The diagnosis in sentences: subject and text."""
-    model = " + ".join(("bias", "scale", *found.fit.effects))
-    if found.adequate is None:
-        return [("diagnosis", f"{model} cannot be judged: {found.reason}")]
-    verdict = "adequate" if found.adequate else "not adequate"
-    text = f"{model} is {verdict} ({probability(p_value(found.fit))}), rms residual {MICRO * found.error_g:.3g} µg"
+    model = " + ".join(("bias", "scale", *diagnosis.fit.effects))
+    if diagnosis.adequate is None:
+        return [("diagnosis", f"{model} cannot be judged: {diagnosis.reason}")]
+    verdict = "adequate" if diagnosis.adequate else "not adequate"
+    text = (
+        f"{model} is {verdict} ({probability(p_value(diagnosis.fit))}), rms residual {MICRO * diagnosis.error_g:.3g} µg"
+    )
     out = [("diagnosis", text)]
-    for one in found.classes:
+    for one in diagnosis.classes:
         name = one.effects[0]
-        value, error = found.extended.of(name)
+        value, error = diagnosis.extended.of(name)
         rivals = f"; the points do not separate it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
         size = f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
         out.append(("missing effect", f"{name}: {size}, {probability(one.p_value)}{rivals}"))
-    if found.classes:
+    if diagnosis.classes:
         text = (
-            f"rms residual {MICRO * found.error_g:.3g} → {MICRO * found.extended_g:.3g} µg; points left out, in standard "
-            f"uncertainties: {found.left_out[0]:.2f} → {found.left_out[1]:.2f}"
+            f"rms residual {MICRO * diagnosis.error_g:.3g} → {MICRO * diagnosis.extended_g:.3g} µg; points left out, in standard "
+            f"uncertainties: {diagnosis.left_out[0]:.2f} → {diagnosis.left_out[1]:.2f}"
         )
         out.append(("with the missing effects", text))
-    if found.unexplained:
+    if diagnosis.unexplained:
         out.append(("unexplained", "no known effect explains the residual; look at it over the acceleration"))
-    return [*out, *(("next measurement", step) for step in found.next_steps)]
+    return [*out, *(("next measurement", step) for step in diagnosis.next_steps)]

@@ -17,8 +17,8 @@ FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "val
 
 def points(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     """Points from rows with unit, axis, series, point, setting, value, uncertainty and further numbers."""
-    found = list(rows)
-    if not found:
+    listed = list(rows)
+    if not listed:
         return pd.DataFrame(
             {
                 **{name: pd.Series([], dtype="str") for name in ("unit", "axis", "series")},
@@ -26,7 +26,7 @@ def points(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
             }
             | {name: pd.Series([], dtype="float64") for name in POINT_NUMBERS.split()}
         )
-    return pd.DataFrame(found)
+    return pd.DataFrame(listed)
 
 
 def gathered_points(parts: Sequence[tuple[int, str, pd.DataFrame]]) -> pd.DataFrame:

@@ -31,20 +31,20 @@ class MultiPosition(Procedure):
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
         """Per temperature the poses of the fit, then those for verification."""
         del part
-        found: list[ProcedureStep] = []
+        steps: list[ProcedureStep] = []
         for soak, temperature in enumerate(recipe.temperatures_C):
             poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)
             for pose, wait, off in zip(poses, waits, recipe.off_at(soak), strict=True):
-                found.append(
+                steps.append(
                     ProcedureStep(
                         pose.name, pose, temperature, "dwell", wait_s=wait, off_s=off, soak=soak, settled=settled
                     )
                 )
-            found += [
+            steps += [
                 ProcedureStep(pose.name, pose, temperature, "verification", soak=soak, settled=settled)
                 for pose in recipe.verification_at(soak)
             ]
-        return found
+        return steps
 
 
 PROCEDURE = MultiPosition()

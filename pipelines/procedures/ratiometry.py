@@ -174,11 +174,11 @@ class Ratiometry(SetsEquipment, Evaluated):
                 note = "the output is constant; check cable and supply"
                 figures[name] = [FigureValue.not_determined(f.name, "*", note) for f in self.figures]
                 continue
-            found = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
+            by_axis = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
             figures[name] = [
-                worst([_figure(spec.name, axis, one, device) for axis, one in found.items()]) for spec in self.figures
+                worst([_figure(spec.name, axis, one, device) for axis, one in by_axis.items()]) for spec in self.figures
             ]
-            findings += [Finding(name, f"axis {axis}", _text(part, one)) for axis, one in found.items()]
+            findings += [Finding(name, f"axis {axis}", _text(part, one)) for axis, one in by_axis.items()]
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: RatiometryPart, points: pd.DataFrame) -> None:

@@ -157,14 +157,14 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
                     rows += bias_points(unit, k, record, own, scale)
                 else:
                     pair = shock_waves.filtered_pair(record.samples[REFERENCE], own, axis, scale[axis], duration)
-                    found = _pulse(k, record, own.output[:, axis], pair, device)
-                    rows += [one | {"unit": unit, "axis": part.axis} for one in found]
+                    entries = _pulse(k, record, own.output[:, axis], pair, device)
+                    rows += [one | {"unit": unit, "axis": part.axis} for one in entries]
                     noise = shock_waves.noise_before(pair, BEFORE_S)
-                    found = shock_waves.waves(k, pair, record.step.setting["direction"], settings_of(part), noise)
-                    rows += [one | {"unit": unit, "axis": part.axis} for one in found]
+                    entries = shock_waves.waves(k, pair, record.step.setting["direction"], settings_of(part), noise)
+                    rows += [one | {"unit": unit, "axis": part.axis} for one in entries]
                     if k == first:
-                        found = shock_waves.curves(pair, duration, BEFORE_S)
-                        rows += [one | {"unit": unit, "axis": part.axis} for one in found]
+                        entries = shock_waves.curves(pair, duration, BEFORE_S)
+                        rows += [one | {"unit": unit, "axis": part.axis} for one in entries]
         return point_table(rows)
 
     def evaluate(self, part: ShockPart, points: pd.DataFrame, device: Device) -> Outcome:

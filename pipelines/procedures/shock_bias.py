@@ -39,7 +39,7 @@ def bias_points(
 
 def bias_shift(rows: pd.DataFrame) -> FigureValue:
     """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
-    found: list[FigureValue] = []
+    shifts: list[FigureValue] = []
     bias = rows[rows["series"] == "bias"]
     pooled = _pooled_error(bias) if len(bias) else 0.0
     for axis, own in bias.groupby("axis", sort=False):
@@ -50,10 +50,10 @@ def bias_shift(rows: pd.DataFrame) -> FigureValue:
         error = max(pooled, float(np.hypot(after["uncertainty"].iloc[0], before["uncertainty"].iloc[0])))
         stuck = float(after["uncertainty"].iloc[0]) <= STUCK
         note = "the output is constant after the shocks: the unit has not survived" if stuck else ""
-        found.append(FigureValue("shock_bias_shift_ug", str(axis), value, error, identified=not stuck, note=note))
-    if not found:
+        shifts.append(FigureValue("shock_bias_shift_ug", str(axis), value, error, identified=not stuck, note=note))
+    if not shifts:
         return FigureValue.not_determined("shock_bias_shift_ug", "*", "no bias before or after")
-    return worst(found)
+    return worst(shifts)
 
 
 def _pooled_error(bias: pd.DataFrame) -> float:

@@ -101,41 +101,43 @@ def judged(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -
 def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -> list[tuple[str, str]]:
     """The diagnosis in sentences: subject and text."""
     try:
-        found = judged(rows, settings, effects)
+        diagnosis = judged(rows, settings, effects)
     except NotIdentified as problem:
         return [("comparison of the waveforms", f"cannot be judged: {problem}")]
-    if found is None:
+    if diagnosis is None:
         return []
-    model = " + ".join(("sensitivity", *found.fit.effects))
-    if found.adequate is None:
-        return [("comparison of the waveforms", f"{model} cannot be judged: {found.reason}")]
-    p = p_value(found.fit)
-    verdict = "adequate" if found.adequate else "not adequate"
-    text = f"{model} is {verdict} ({probability(p)}), rms residual {found.error_percent:.2g} % of the peak"
-    if not found.adequate:
-        text += f"; {100.0 * found.where[1]:.0f} % of χ² is in the samples of {found.where[0]}"
+    model = " + ".join(("sensitivity", *diagnosis.fit.effects))
+    if diagnosis.adequate is None:
+        return [("comparison of the waveforms", f"{model} cannot be judged: {diagnosis.reason}")]
+    p = p_value(diagnosis.fit)
+    verdict = "adequate" if diagnosis.adequate else "not adequate"
+    text = f"{model} is {verdict} ({probability(p)}), rms residual {diagnosis.error_percent:.2g} % of the peak"
+    if not diagnosis.adequate:
+        text += f"; {100.0 * diagnosis.where[1]:.0f} % of χ² is in the samples of {diagnosis.where[0]}"
     out = [("comparison of the waveforms", text)]
-    for one in found.classes:
+    for one in diagnosis.classes:
         best, *others = one.effects
         rivals = f"; the shocks do not separate it from {', '.join(others)}" if others else ""
-        out.append(("missing effect", f"{best}: {_size(found, best, settings)}, {probability(one.p_value)}{rivals}"))
-    if found.classes:
+        out.append(
+            ("missing effect", f"{best}: {_size(diagnosis, best, settings)}, {probability(one.p_value)}{rivals}")
+        )
+    if diagnosis.classes:
         text = (
-            f"rms residual {found.error_percent:.2g} → {found.extended_percent:.2g} % of the peak; samples left out, in standard "
-            f"uncertainties: {found.left_out[0]:.2f} → {found.left_out[1]:.2f}"
+            f"rms residual {diagnosis.error_percent:.2g} → {diagnosis.extended_percent:.2g} % of the peak; samples left out, in "
+            f"standard uncertainties: {diagnosis.left_out[0]:.2f} → {diagnosis.left_out[1]:.2f}"
         )
         out.append(("with the missing effects", text))
-    if found.unexplained:
+    if diagnosis.unexplained:
         out.append(
             ("unexplained", "no known effect explains the difference of the waveforms; look at mounting and cable")
         )
-    return [*out, *(("next measurement", step) for step in found.next_steps)]
+    return [*out, *(("next measurement", step) for step in diagnosis.next_steps)]
 
 
-def _size(found: ShockDiagnosis, name: str, settings: WaveSettings) -> str:
+def _size(diagnosis: ShockDiagnosis, name: str, settings: WaveSettings) -> str:
     one = EFFECTS[name]
     parameters = one.parameters(settings.duration_s)
-    fit = found.extended
+    fit = diagnosis.extended
     value, error = fit.coefficients[name] if name in fit.coefficients else fit.parameters[parameters[0].name]
     return f"{with_uncertainty(value, 2.0 * error)} {one.unit()} (k = 2)"
 

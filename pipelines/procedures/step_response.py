@@ -127,20 +127,20 @@ class StepResponse(OnEquipment, FromWaveforms):
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):
-            found: dict[str, list[FigureValue]] = {spec.name: [] for spec in self.figures}
+            by_figure: dict[str, list[FigureValue]] = {spec.name: [] for spec in self.figures}
             for axis, own in rows.groupby("axis", sort=False):
                 try:
                     one = axis_figures(part, own)
                 except NotIdentified as problem:
                     note = f"axis {axis}: {problem}"
-                    for name, values in found.items():
+                    for name, values in by_figure.items():
                         values.append(FigureValue.not_determined(name, str(axis), note))
                     continue
                 for value in _values(part, str(axis), one):
-                    found[value.figure].append(value)
+                    by_figure[value.figure].append(value)
                 text = f"{1e3 * one.delay_s:.4g} ms from the edge of the drive to 50 % of the step"
                 findings.append(Finding(str(unit), f"delay of axis {axis}", text))
-            figures[str(unit)] = [worst(values) for values in found.values()]
+            figures[str(unit)] = [worst(values) for values in by_figure.values()]
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: StepPart, points: pd.DataFrame) -> None:
@@ -173,7 +173,7 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
     kept = rows.sort_values("setting")
     time, value, error = (kept[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
     rate = float(kept["rate_hz"].iloc[0])
-    found = step_figures(
+    figures = step_figures(
         time,
         value,
         error,
@@ -181,14 +181,14 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
         edge_error_s=float(kept["edge_error_s"].iloc[0]),
         bin_s=1.0 / rate / BINS,
     )
-    samples = found.rise_s * rate
+    samples = figures.rise_s * rate
     if samples < RISE_POINTS:
         msg = (
             f"{samples:.1f} samples in the rise time, {RISE_POINTS:g} are needed to resolve a tenth of 1/f_n; record the "
             "analogue output, or use a sweep"
         )
         raise NotIdentified(msg)
-    return found
+    return figures
 
 
 FAULTS: Mapping[int, str] = {

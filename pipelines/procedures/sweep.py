@@ -147,13 +147,13 @@ class Sweep(OnEquipment, FromWaveforms):
                 figures[name] = [FigureValue.not_determined(f.name, part.axis, note) for f in self.figures]
                 continue
             try:
-                found = judged(part, kept)
+                diagnosis = judged(part, kept)
             except NotIdentified as problem:
                 note = str(problem)
                 figures[name] = [FigureValue.not_determined(f.name, part.axis, note) for f in self.figures]
                 continue
-            figures[name] = figures_of_transfer(part, found, transfer_points(kept), device.scale.get(name))
-            findings += [Finding(name, subject, text) for subject, text in diagnosis_text(found)]
+            figures[name] = figures_of_transfer(part, diagnosis, transfer_points(kept), device.scale.get(name))
+            findings += [Finding(name, subject, text) for subject, text in diagnosis_text(diagnosis)]
             findings += condition_findings(name, kept)
             band = next(one for one in figures[name] if one.figure == "sweep_bandwidth_hz")
             if band.identified:

@@ -23,7 +23,7 @@ SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise
 
 def clocks_of(records: Sequence[ProcedureRecord], axis: int) -> dict[str, tuple[float, float]]:
     """Departure of each device's clock from the reference's as a share, and its standard uncertainty, over all points."""
-    found: dict[str, list[tuple[float, float]]] = {}
+    departures: dict[str, list[tuple[float, float]]] = {}
     for record in records:
         frequency = record.step.setting["frequency_hz"]
         for unit, own in record.samples.items():
@@ -34,9 +34,11 @@ def clocks_of(records: Sequence[ProcedureRecord], axis: int) -> dict[str, tuple[
                 continue
             tone = fit_tone_and_frequency(y, own.rate_hz, frequency)
             if abs(tone.value[0]) > SILENT * tone.amplitude_error[0]:
-                found.setdefault(unit, []).append((frequency / tone.frequency - 1.0, tone.frequency_error / frequency))
+                departures.setdefault(unit, []).append(
+                    (frequency / tone.frequency - 1.0, tone.frequency_error / frequency)
+                )
     clocks: dict[str, tuple[float, float]] = {}
-    for unit, values in found.items():
+    for unit, values in departures.items():
         value, error = np.array(values).T
         middle = np.abs(value - np.median(value)) < 5e-3
         weight = error[middle] ** -2.0
@@ -93,20 +95,20 @@ def response_point(
 
 def condition_findings(unit: str, rows: pd.DataFrame) -> list[Finding]:
     """Own clock, distortion and transverse motion against what is usually held."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     clock, error = float(rows["clock_ppm"].iloc[0]), float(rows["clock_uncertainty_ppm"].iloc[0])
     if abs(clock) > max(5.0 * error, 5.0):
         text = f"{clock:+.0f} ± {2.0 * error:.1g} ppm (k = 2) against the reference; the sine fits use it"
-        found.append(Finding(unit, "clock of the device", text))
+        findings.append(Finding(unit, "clock of the device", text))
     distortion, across = float(rows["distortion_percent"].max()), rows["transverse_percent"]
     limit = np.where(rows["setting"] <= 1000.0, 10.0, 30.0)
     if distortion > 5.0:
-        found.append(Finding(unit, "distortion of the exciter", f"{distortion:.1f} %, at most 5 % is usually held"))
+        findings.append(Finding(unit, "distortion of the exciter", f"{distortion:.1f} %, at most 5 % is usually held"))
     if bool((across > limit).any()):
         at = float(rows["setting"].to_numpy(dtype=float)[int(np.argmax(across.to_numpy(dtype=float)))])
         text = f"{across.max():.0f} % at {at:.4g} Hz, at most 10 % to 1 kHz and 30 % above is usually held"
-        found.append(Finding(unit, "transverse motion of the exciter", text))
-    return found
+        findings.append(Finding(unit, "transverse motion of the exciter", text))
+    return findings
 
 
 def transfer_points(rows: pd.DataFrame) -> Points:

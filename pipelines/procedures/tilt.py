@@ -91,14 +91,14 @@ class Tilt(Evaluated):
         """One dwell at each angle, in order of angle."""
         del recipe
         inner = 0.0 if part.about == "x" else 90.0
-        found: list[ProcedureStep] = []
+        steps: list[ProcedureStep] = []
         for k in range(round(360.0 / part.step_deg)):
             angle = k * part.step_deg if k * part.step_deg <= 180.0 else k * part.step_deg - 360.0
             pose = Pose(name=f"t{angle:+07.2f}", outer_deg=angle, inner_deg=inner)
-            found.append(
+            steps.append(
                 ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.dwell_s, setting={"angle_deg": angle})
             )
-        return found
+        return steps
 
     def reduce(self, part: TiltPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Mean output of every axis at every angle; the angle is the encoder's."""
@@ -131,12 +131,12 @@ class Tilt(Evaluated):
             fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
             linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
             # of the whole model: what K2 and K3 leave in a sine's residual is no wander
-            found = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
+            values = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
             if part.orders == 3:
-                found.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
+                values.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
             else:
-                found.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
-            figures[str(unit)] = found
+                values.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
+            figures[str(unit)] = values
             largest += [_residual(str(unit), axis, one) for axis, one in linear.items()]
         inside, turned = " and ".join(_plane(part)), part.about
         open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 WORD = {"delay_s": "delay", "natural_hz": "natural frequency", "damping": "damping ratio"}
 
 
-def figures_of_transfer(part: Any, found: TransferDiagnosis, points: Points, static: Array | None) -> list[FigureValue]:
+def figures_of_transfer(
+    part: Any, diagnosis: TransferDiagnosis, points: Points, static: Array | None
+) -> list[FigureValue]:
     """Figures of one unit.
 
     Parameters
@@ -33,9 +35,9 @@ def figures_of_transfer(part: Any, found: TransferDiagnosis, points: Points, sta
     part : of the recipe: axis, flat_to_hz, nominal_scale, reference_percent
     static : (3,), scale of the multi-position test, output per g; None without one
     """
-    fit, axis = found.extended, part.axis
-    if found.adequate is None or found.unexplained:
-        why = found.reason or "the model, also with the effects found, does not describe the points"
+    fit, axis = diagnosis.extended, part.axis
+    if diagnosis.adequate is None or diagnosis.unexplained:
+        why = diagnosis.reason or "the model, also with the effects found, does not describe the points"
         lost = [
             FigureValue.not_determined(name, axis, why)
             for name in ("sweep_bandwidth_hz", "sweep_natural_hz", "sweep_damping")
@@ -88,8 +90,8 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
         value: Any = over(f)
         return float(value[0])
 
-    found: Any = brentq(at_one, grid[k - 1], grid[k])
-    return float(found)
+    crossing: Any = brentq(at_one, grid[k - 1], grid[k])
+    return float(crossing)
 
 
 def _owners(fit: TransferFit) -> Array:
@@ -147,47 +149,47 @@ def _sensitivity(part: Any, fit: TransferFit, static: Array | None) -> FigureVal
     return FigureValue("sweep_sensitivity_percent", part.axis, value, error)
 
 
-def diagnosis_text(found: TransferDiagnosis) -> list[tuple[str, str]]:
+def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     """Subject and text of the findings of the diagnosis on one unit."""
-    fit = found.fit
+    fit = diagnosis.fit
     model = " + ".join(("sensitivity", *fit.effects))
     out: list[tuple[str, str]] = []
-    if found.adequate is None:
-        return [("model", f"{model}: cannot be judged: {found.reason}")]
-    verdict = "adequate" if found.adequate else "not adequate"
+    if diagnosis.adequate is None:
+        return [("model", f"{model}: cannot be judged: {diagnosis.reason}")]
+    verdict = "adequate" if diagnosis.adequate else "not adequate"
     text = (
         f"{model} is {verdict}: χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, "
-        f"{probability(fit.p_value)}, rms residual {found.error_percent:.2g} %"
+        f"{probability(fit.p_value)}, rms residual {diagnosis.error_percent:.2g} %"
     )
     out.append(("model", text))
-    if found.where:
+    if diagnosis.where:
         places = [
             f"{w.part} from {w.low_hz:.4g} to {w.high_hz:.4g} Hz ({100.0 * w.share:.0f} % of χ²)"
-            for w in found.where[:3]
+            for w in diagnosis.where[:3]
         ]
         out.append(("range of misfit", ", ".join(places)))
-    for one in found.classes:
+    for one in diagnosis.classes:
         first, *others = one.effects
         alike = f"; not separated from {', '.join(others)}" if others else ""
         out.append(("missing effect", f"{first} ({probability(one.p_value)}){alike}"))
-    if found.classes:
-        before, after = found.left_out
+    if diagnosis.classes:
+        before, after = diagnosis.left_out
         text = (
-            f"rms residual {found.error_percent:.2g} % → {found.extended_percent:.2g} % with "
-            f"{', '.join(found.recommended)}; of points "
+            f"rms residual {diagnosis.error_percent:.2g} % → {diagnosis.extended_percent:.2g} % with "
+            f"{', '.join(diagnosis.recommended)}; of points "
             f"left out, in standard uncertainties: {before:.2g} → {after:.2g}"
         )
         out.append(("after extension", text))
-    if found.unexplained:
+    if diagnosis.unexplained:
         out.append(("unexplained", "a significant deviation remains that no effect of the catalogue describes"))
-    for p in found.extended.parameters:
-        value, _, low, high = found.extended.of(p.name)
-        if p.log and not found.extended.identified(p.name):
+    for p in diagnosis.extended.parameters:
+        value, _, low, high = diagnosis.extended.of(p.name)
+        if p.log and not diagnosis.extended.identified(p.name):
             out.append(("not identified", f"{p.name}: 95 % interval {low:.4g} … {high:.4g} {p.unit}"))
         elif p.name == "delay_s":
             out.append(("delay", f"{1e6 * value:.2f} µs, 95 % interval {1e6 * low:.2f} … {1e6 * high:.2f} µs"))
-    if found.next_hz:
-        out.append(("next frequencies to measure", ", ".join(f"{f:.4g} Hz" for f in found.next_hz)))
+    if diagnosis.next_hz:
+        out.append(("next frequencies to measure", ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)))
     return out
 
 

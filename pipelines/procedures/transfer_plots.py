@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 MEASURED, MODEL, EXTENDED = "#0072b2", "#d55e00", "#009e73"
 
 
-def draw_bode(drawing: Drawing, points: Points, found: TransferDiagnosis, coherence: Array) -> None:
+def draw_bode(drawing: Drawing, points: Points, diagnosis: TransferDiagnosis, coherence: Array) -> None:
     """Magnitude, phase, residual and coherence over frequency, and the Nyquist plot, in two rows."""
     places = drawing.subplots(2, 3)
     c = points.conditions
     order = np.argsort(c.frequency)
     f = c.frequency[order]
-    sign, rest = np.sign(found.fit.sensitivity), abs(found.extended.sensitivity)
+    sign, rest = np.sign(diagnosis.fit.sensitivity), abs(diagnosis.extended.sensitivity)
     value = points.value[order] * sign / rest
     k = 2.0
     fine = np.geomspace(f[0], f[-1], 300)
     plan = Conditions(fine, *(np.full(300, np.median(one)) for one in (c.level, c.temperature, c.record_s)))
-    curves = [("model", found.fit, MODEL, "--")]
-    if found.classes:
-        curves.append(("with the missing effects", found.extended, EXTENDED, "-"))
+    curves = [("model", diagnosis.fit, MODEL, "--")]
+    if diagnosis.classes:
+        curves.append(("with the missing effects", diagnosis.extended, EXTENDED, "-"))
     size, phase, left, bond, plane, empty = places.ravel()
     size.errorbar(
         f,
@@ -86,9 +86,9 @@ def draw_bode(drawing: Drawing, points: Points, found: TransferDiagnosis, cohere
     for one in (left, bond):
         one.yaxis.set_major_formatter(_plain)
     empty.axis("off")
-    added = [f"missing: {name}" for name in found.recommended]
-    lines = [*added, *(_text(found, p.name, p.unit) for p in found.extended.parameters)]
-    verdict = {True: "model adequate", False: "model not adequate", None: "model cannot be judged"}[found.adequate]
+    added = [f"missing: {name}" for name in diagnosis.recommended]
+    lines = [*added, *(_text(diagnosis, p.name, p.unit) for p in diagnosis.extended.parameters)]
+    verdict = {True: "model adequate", False: "model not adequate", None: "model cannot be judged"}[diagnosis.adequate]
     empty.text(0.0, 0.95, "\n".join([verdict, *lines]), va="top", fontsize=8.5, linespacing=1.4)
 
 
@@ -97,9 +97,9 @@ def _plain(value: float, _: int) -> str:
     return f"{value:g}"
 
 
-def _text(found: TransferDiagnosis, name: str, unit: str) -> str:
+def _text(diagnosis: TransferDiagnosis, name: str, unit: str) -> str:
     """A parameter with U (k = 2); times in µs."""
-    value, error, low, high = found.extended.of(name)
+    value, error, low, high = diagnosis.extended.of(name)
     if unit == "s":
         value, error, low, high, unit = 1e6 * value, 1e6 * error, 1e6 * low, 1e6 * high, "µs"
     unit = "" if unit == "1" else f" {unit}"
@@ -107,6 +107,6 @@ def _text(found: TransferDiagnosis, name: str, unit: str) -> str:
     word = {"natural": "natural frequency", "two pole": "two-pole low-pass", "one pole": "one-pole low-pass"}.get(
         own, own
     )
-    if not found.extended.identified(name):
+    if not diagnosis.extended.identified(name):
         return f"{word}: not identified, {low:.3g} … {high:.3g}{unit}"
     return f"{word}: {with_uncertainty(value, 2.0 * error)}{unit}"

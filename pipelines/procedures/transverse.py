@@ -136,20 +136,20 @@ class TransverseTest(InG, OnEquipment, Evaluated):
         for unit, rows in points.groupby("unit", sort=False):
             name = str(unit)
             try:
-                found = fitted(rows)
+                fit = fitted(rows)
             except NotIdentified as problem:
                 figures[name] = [FigureValue.not_determined(FIGURE, part.axis, str(problem))]
                 continue
-            value = 100.0 * found.value
+            value = 100.0 * fit.value
             known = device.scale_error.get(name)
             scale = part.scale_percent if known is None else 100.0 * float(known[AXES.index(part.axis)])
             share = 1e-2 * float(np.hypot(part.reference_percent, scale)) * value
-            error = float(np.hypot(100.0 * found.error, share))
+            error = float(np.hypot(100.0 * fit.error, share))
             low, high = value - Z95 * error, value + Z95 * error
             figures[name] = [
-                FigureValue(FIGURE, part.axis, value, error, max(0.0, low) if found.low > 0.0 else 0.0, high)
+                FigureValue(FIGURE, part.axis, value, error, max(0.0, low) if fit.low > 0.0 else 0.0, high)
             ]
-            findings += [Finding(name, subject, text) for subject, text in _texts(part, found)]
+            findings += [Finding(name, subject, text) for subject, text in _texts(part, fit)]
         return Outcome(figures, findings)
 
     def draw(self, drawing: Drawing, part: TransversePart, points: pd.DataFrame) -> None:
@@ -161,11 +161,11 @@ class TransverseTest(InG, OnEquipment, Evaluated):
             label="measured, U (k = 2)"
         )  # fmt: skip
         if len(kept) >= FEWEST_ANGLES:
-            found = fitted(points)
+            fit = fitted(points)
             angle = np.linspace(0.0, 360.0, 361)
-            wave = 100.0 * (found.value * np.cos(np.radians(angle - found.direction_deg)) + found.offset)
+            wave = 100.0 * (fit.value * np.cos(np.radians(angle - fit.direction_deg)) + fit.offset)
             place.plot(angle, wave, lw=1.1, c="#d55e00", label="fitted sine")
-            place.axhline(100.0 * found.offset, lw=0.7, ls="--", c="#888888", label="motion along the axis")
+            place.axhline(100.0 * fit.offset, lw=0.7, ls="--", c="#888888", label="motion along the axis")
         first = AXES[(AXES.index(part.axis) + 1) % 3]
         place.set(xlabel=f"direction of motion from {first} / °", ylabel=f"output of {part.axis} / % of the motion")
         place.set_xticks(range(0, 361, 45))
@@ -252,24 +252,22 @@ def _point(
     }
 
 
-def _texts(part: TransversePart, found: Transverse) -> list[tuple[str, str]]:
+def _texts(part: TransversePart, fit: Transverse) -> list[tuple[str, str]]:
     axis = AXES.index(part.axis)
     first, second = AXES[(axis + 1) % 3], AXES[(axis + 2) % 3]
-    if found.direction_error_deg >= 180.0:
+    if fit.direction_error_deg >= 180.0:
         text = "the transverse sensitivity is not significant against its uncertainty; raise level_g, or record longer"
         out = [("direction not determined", text)]
     else:
-        text = (
-            f"{found.direction_deg:.1f}° ± {2.0 * found.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
-        )
+        text = f"{fit.direction_deg:.1f}° ± {2.0 * fit.direction_error_deg:.1g}° (k = 2) from {first} towards {second}"
         out = [("direction of the largest transverse sensitivity", text)]
-    if not np.isfinite(found.p_value):
+    if not np.isfinite(fit.p_value):
         return [
             *out,
             ("model", "a sine over the angle cannot be judged: no degree of freedom is left; measure at more angles"),
         ]
-    text = f"a sine over the angle {verdict_of(found)}"
-    if adequate(found) is False:
+    text = f"a sine over the angle {verdict_of(fit)}"
+    if adequate(fit) is False:
         text += "; check the angles of the fixture and its resonance, repeat at another frequency"
     return [*out, ("model", text)]
 

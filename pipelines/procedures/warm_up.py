@@ -135,14 +135,14 @@ def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
         )
         return FigureValue.not_determined("warm_up_s", axis, note)
     try:
-        found = entered(time, value, band=part.band_ug, window_s=part.window_s)
+        entry = entered(time, value, band=part.band_ug, window_s=part.window_s)
     except NotIdentified as problem:
         return FigureValue.not_determined("warm_up_s", axis, str(problem))
     # of the means of 1 s, in standard uncertainty and at 95 %
     step, reach = 1.0 / np.sqrt(12.0), float(norm.ppf(0.975)) / np.sqrt(12.0)
-    low = found.value - float(np.hypot(found.value - found.low, reach))
-    high = found.value + float(np.hypot(found.high - found.value, reach))
-    return FigureValue("warm_up_s", axis, found.value, float(np.hypot(step, found.error)), low, high)
+    low = entry.value - float(np.hypot(entry.value - entry.low, reach))
+    high = entry.value + float(np.hypot(entry.high - entry.value, reach))
+    return FigureValue("warm_up_s", axis, entry.value, float(np.hypot(step, entry.error)), low, high)
 
 
 PROCEDURE = WarmUp()

@@ -58,13 +58,13 @@ def require_in_pose(one: ProgrammingOutcome, at: InPose, tolerance_ug: float) ->
             f"{one.memory.name}: {temperature:.1f} °C, {low:.1f} to {high:.1f} °C is needed to verify the coefficients; "
             "bring the chamber to such a temperature, and repeat the command"
         )
-    found = held.correct(output[None], temperature)[0]
+    corrected = held.correct(output[None], temperature)[0]
     archived = one.unit.correct((output - one.step_counts * np.array(held.offsets))[None], temperature)[0]
-    error = MICRO * (found - force)
-    apart = MICRO * float(np.max(np.abs(found - archived)))
+    error = MICRO * (corrected - force)
+    apart = MICRO * float(np.max(np.abs(corrected - archived)))
     one.poses.append({
         "pose": pose, "temperature_C": temperature, "force_g": force.tolist(), "output": output.tolist(),
-        "corrected_g": found.tolist(), "error_ug": error.tolist(), "magnitude_g": float(np.linalg.norm(found)),
+        "corrected_g": corrected.tolist(), "error_ug": error.tolist(), "magnitude_g": float(np.linalg.norm(corrected)),
         "from_archive_ug": apart,
     })  # fmt: skip
     if not float(np.max(np.abs(error))) <= tolerance_ug:

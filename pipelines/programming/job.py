@@ -39,9 +39,9 @@ def chosen_units(run: Run, serials: Sequence[str]) -> list[tuple[int, UnitCalibr
         )
     slots = {unit["serial"]: int(unit["slot"]) for unit in run.about["lot"]["units"]}
     once = tuple(dict.fromkeys(serials))  # a device that is named twice is written once
-    found = unit_calibrations(run, once, failed=False, revoked=True)
-    allowed = [unit for unit in found if not _revoked(unit)]
-    revoked = [unit for unit in found if _revoked(unit)]
+    calibrations = unit_calibrations(run, once, failed=False, revoked=True)
+    allowed = [unit for unit in calibrations if not _revoked(unit)]
+    revoked = [unit for unit in calibrations if _revoked(unit)]
     if revoked and (serials or not allowed):
         raise WrongUse(
             f"program: unit {revoked[0].unit}: {revoked[0].certified}, a valid calibration is needed; measure the unit again"

@@ -212,12 +212,12 @@ class Programmer:
 
     def _read_back(self, one: ProgrammingOutcome) -> None:
         """Refuses a copy that differs from the written bytes."""
-        found = one.memory.read(one.copy)[: len(one.content)]
-        if found != one.content:
-            place = next(i for i, (a, b) in enumerate(zip(found, one.content, strict=True)) if a != b)
+        read_back = one.memory.read(one.copy)[: len(one.content)]
+        if read_back != one.content:
+            place = next(i for i, (a, b) in enumerate(zip(read_back, one.content, strict=True)) if a != b)
             raise StationRefused(
                 f"{one.memory.name}: copy {one.copy.upper()} differs from what was written from byte {place} on "
-                f"({found[place]:#04x}, {one.content[place]:#04x} is needed); replace the device"
+                f"({read_back[place]:#04x}, {one.content[place]:#04x} is needed); replace the device"
             )
 
     def _power_cycle(self) -> None:

@@ -26,7 +26,7 @@ FEWEST_POSES = 4  # fewer make no map
 
 def render_diagnosis(
     document: dict[str, Any],
-    found: Measured,
+    measurement: Measured,
     diagnosis: Diagnosis | None,
     source: str,
     coefficients: list[dict[str, Any]] | None = None,
@@ -36,17 +36,17 @@ def render_diagnosis(
     Parameters
     ----------
     document : the diagnosis for programs, with its extras
-    found, diagnosis : the readings and their diagnosis; None if every unit has a data fault
+    measurement, diagnosis : the readings and their diagnosis; None if every unit has a data fault
     source : name of the dwells
     coefficients : rows of the fit's table, to be shown with it; none where None
     """
     faulty = {unit for fault in document["blocked_by"] for unit in fault["units"]}
-    sound = tuple(unit for unit in found.units if unit not in faulty)
+    sound = tuple(unit for unit in measurement.units if unit not in faulty)
     page = template("diagnosis.html").render(
         source=source,
         document=document,
         coefficients=coefficients or [],
-        units=len(found.units),
+        units=len(measurement.units),
         classes=[_class(group, document) for group in document["classes"]],
         unseen=[
             (name, document.get("reasons", {}).get(name) or document["breakers"][name]) for name in document["unseen"]

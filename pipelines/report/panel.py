@@ -36,7 +36,7 @@ def panels(package: str) -> tuple[Panel, ...]:
     IncompletePanel
         A module lacks ORDER, TITLE or ``render``, or two have one ORDER.
     """
-    found: list[Panel] = []
+    collected: list[Panel] = []
     for info in iter_modules(import_module(package).__path__):
         module = import_module(f"{package}.{info.name}")
         kinds = {"ORDER": int, "TITLE": str}
@@ -44,11 +44,11 @@ def panels(package: str) -> tuple[Panel, ...]:
         missing += [] if callable(getattr(module, "render", None)) else ["render"]
         if missing:
             raise IncompletePanel(f"{package}.{info.name}: a panel without {', '.join(missing)}; add it")
-        found.append(cast("Panel", module))
-    order, count = Counter(panel.ORDER for panel in found).most_common(1)[0]
+        collected.append(cast("Panel", module))
+    order, count = Counter(panel.ORDER for panel in collected).most_common(1)[0]
     if count > 1:
         raise IncompletePanel(f"{package}: {count} panels have the ORDER {order}; choose another number")
-    return tuple(sorted(found, key=lambda panel: panel.ORDER))
+    return tuple(sorted(collected, key=lambda panel: panel.ORDER))
 
 
 def rendered(package: str, context: Any) -> list[tuple[str, str]]:

@@ -44,12 +44,12 @@ def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
     }
 
 
-def _budget(found: dict[str, Any] | None) -> str:
+def _budget(reach: dict[str, Any] | None) -> str:
     """Shares of the contributions to the reachable uncertainty, of the worst axis of each quantity; empty if none is stated."""
-    if found is None:
+    if reach is None:
         return ""
     worst: dict[str, dict[str, Any]] = {}
-    for row in found["quantities"]:
+    for row in reach["quantities"]:
         if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
             worst[row["quantity"]] = row
     titles = {"bias_error": "error by the references", "bias_error_period": "error over the period"}

@@ -25,12 +25,16 @@ _STILL, _FAULT, _SEVERAL = "#dfe9f5", "#f6c9c9", "#f5e3b3"
 _AXES = "xyz"
 
 
-def figure_of(found: Inspection) -> Figure | None:
+def figure_of(inspection: Inspection) -> Figure | None:
     """Output against time by axis, static intervals shaded; None where no axes were recognised."""
-    if found.output is None or not len(found.output):
+    if inspection.output is None or not len(inspection.output):
         return None
-    document = found.document
-    time = np.arange(len(found.output), dtype=np.float64) if found.time is None else found.time - found.time[0]
+    document = inspection.document
+    time = (
+        np.arange(len(inspection.output), dtype=np.float64)
+        if inspection.time is None
+        else inspection.time - inspection.time[0]
+    )
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 6.2))
         rows = figure.subplots(3, 1, sharex=True)
@@ -44,11 +48,11 @@ def figure_of(found: Inspection) -> Figure | None:
                 if one["axis"] == _AXES[k] and one["fault"] == "stuck_output":
                     end = time[min(one["first_row"] - 1 + one["samples"], len(time) - 1)]
                     place.axvspan(time[one["first_row"] - 1], end, color=_FAULT, linewidth=0.0)
-            x, low, high = _envelope(time, found.output[:, k])
+            x, low, high = _envelope(time, inspection.output[:, k])
             place.fill_between(x, low, high, color=COLOURS[_AXES[k]], linewidth=0.6, edgecolor=COLOURS[_AXES[k]])
             place.set_ylabel(f"{_AXES[k]} / {unit}")
             place.yaxis.set_major_locator(MaxNLocator(5))
-        rows[-1].set_xlabel("time / s" if found.time is not None else "sample")
+        rows[-1].set_xlabel("time / s" if inspection.time is not None else "sample")
         rows[0].set_title(_title(document), loc="left", fontsize=10.5)
         return figure
 
@@ -74,9 +78,9 @@ def _envelope(
     return time[edges], np.minimum.reduceat(x, edges), np.maximum.reduceat(x, edges)
 
 
-def save_picture(found: Inspection, path: Path) -> bool:
+def save_picture(inspection: Inspection, path: Path) -> bool:
     """Write the picture in the format of the file's ending (.svg, .png, .pdf); False if there is nothing to draw."""
-    figure = figure_of(found)
+    figure = figure_of(inspection)
     if figure is None:
         return False
     with mpl.rc_context(STYLE):
@@ -84,7 +88,7 @@ def save_picture(found: Inspection, path: Path) -> bool:
     return True
 
 
-def page(found: Inspection) -> str:
+def page(inspection: Inspection) -> str:
     """The content of a recording as one HTML text that needs no other file."""
-    figure = figure_of(found)
-    return template("recording.html").render(one=found.document, picture="" if figure is None else svg(figure))
+    figure = figure_of(inspection)
+    return template("recording.html").render(one=inspection.document, picture="" if figure is None else svg(figure))

@@ -53,14 +53,14 @@ class ResidualTable:
         return f"{self.units[unit]}:{int(self.dwells[dwell])}"
 
 
-def residual_table(found: Measured, diagnosis: Diagnosis, units: tuple[str, ...]) -> ResidualTable:
+def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str, ...]) -> ResidualTable:
     """The residuals of the model that a diagnosis judged.
 
     Parameters
     ----------
     units : those without a data fault, in the order of the diagnosis
     """
-    return _tabled(found, diagnosis.base, units)
+    return _tabled(measurement, diagnosis.base, units)
 
 
 def residuals_of_model(
@@ -74,11 +74,11 @@ def residuals_of_model(
         The dwells do not determine the model, or lack a quantity that it needs.
     """
     try:
-        found = measured(dwells, history)
-        found = found.pick([found.units.index(unit) for unit in units])
-        problem = Problem(lot_of(found, square="misalignment" not in effects))
+        measurement = measured(dwells, history)
+        measurement = measurement.pick([measurement.units.index(unit) for unit in units])
+        problem = Problem(lot_of(measurement, square="misalignment" not in effects))
         model = Model(problem, terms_of(catalogue.get_all(list(effects)), problem))
-        return _residuals(model, len(found.units))
+        return _residuals(model, len(measurement.units))
     except InertialError as problem_:
         raise DataRejected(str(problem_)) from None
 
@@ -88,7 +88,7 @@ def _residuals(model: Model, units: int) -> Array:
     return MICRO * residuals_of(model.problem, estimate(model)).reshape(units, axes, model.problem.n)
 
 
-def _tabled(found: Measured, model: Model, units: tuple[str, ...]) -> ResidualTable:
+def _tabled(measurement: Measured, model: Model, units: tuple[str, ...]) -> ResidualTable:
     problem = model.problem
     state = problem.lot.state
     drivers: dict[str, tuple[str, Array]] = {}
@@ -100,7 +100,7 @@ def _tabled(found: Measured, model: Model, units: tuple[str, ...]) -> ResidualTa
     shape = (len(units), problem.n)
     drivers["force"] = ("specific force along the axis / g", np.asarray(state.force, dtype=float))
     drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))
-    drivers["dwell"] = ("number of the dwell", np.broadcast_to(found.dwells.astype(float), shape).copy())
+    drivers["dwell"] = ("number of the dwell", np.broadcast_to(measurement.dwells.astype(float), shape).copy())
     if state.slot is not None:
         slot = np.asarray(state.slot, dtype=float)
         drivers["slot"] = ("slot", np.broadcast_to(slot.reshape(len(units), -1)[:, :1], shape).copy())
@@ -108,7 +108,7 @@ def _tabled(found: Measured, model: Model, units: tuple[str, ...]) -> ResidualTa
     if state.temperature is not None:
         turning = np.stack([direction(row) for row in state.temperature])
     return ResidualTable(
-        units, found.dwells, ("norm",) if problem.lot.radial else ("x", "y", "z"), _residuals(model, len(units)),
+        units, measurement.dwells, ("norm",) if problem.lot.radial else ("x", "y", "z"), _residuals(model, len(units)),
         np.asarray(state.force, dtype=float), turning, drivers,
     )  # fmt: skip
 

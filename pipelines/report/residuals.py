@@ -87,13 +87,13 @@ def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
     names = [*first, *(p.driver for p in diagnosis.where[:5])]
     candidates = dict.fromkeys([*names, *ALWAYS])
-    found: list[DriverValues] = []
+    drivers: list[DriverValues] = []
     for name in candidates:
         values = known.get(name)
         still = name not in names and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
-        if values is not None and not still and not any(_alike(values, other.values) for other in found):
-            found.append(DriverValues(name, LABELS.get(name, name), values * shown_factor(name)))
-    return found[:_MOST]
+        if values is not None and not still and not any(_alike(values, other.values) for other in drivers):
+            drivers.append(DriverValues(name, LABELS.get(name, name), values * shown_factor(name)))
+    return drivers[:_MOST]
 
 
 def _alike(one: Array, other: Array) -> bool:
@@ -105,7 +105,7 @@ def _alike(one: Array, other: Array) -> bool:
 
 def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[str]:
     """The drivers, with their axes, whose band after the added effects lies beside zero somewhere."""
-    found: list[str] = []
+    labels: list[str] = []
     for series in drivers:
         values = series.values[left.shown]
         axes: list[str] = []
@@ -115,8 +115,8 @@ def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[
             if bool(np.any(low > 0.0) or np.any(high < 0.0)):
                 axes.append(axis)
         if axes:
-            found.append(f"{series.label} ({', '.join(axes)})")
-    return found
+            labels.append(f"{series.label} ({', '.join(axes)})")
+    return labels
 
 
 def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -129,11 +129,11 @@ def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
     places = np.linspace(x.min(), x.max(), 80) if groups > 3 else np.unique(x)
     both = _basis(np.concatenate([x, places]), x.size, groups)
     design, at = both[: x.size], both[x.size :]
-    found, _, rank, _ = np.linalg.lstsq(design, y, rcond=1e-9)
-    left = y - design @ found
+    coefficients, _, rank, _ = np.linalg.lstsq(design, y, rcond=1e-9)
+    left = y - design @ coefficients
     variance = float(left @ left) / max(x.size - int(rank), 1)
     spread = 1.96 * np.sqrt(variance * np.einsum("ij,jk,ik->i", at, np.linalg.pinv(design.T @ design, rcond=1e-10), at))
-    return places, at @ found - spread, at @ found + spread
+    return places, at @ coefficients - spread, at @ coefficients + spread
 
 
 def _groups(values: Array) -> int:

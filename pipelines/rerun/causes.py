@@ -19,12 +19,12 @@ def causes(a: Run, b: Run) -> list[dict[str, Any]]:
 
     Every row has ``what`` (data, model, limits, code, library, another parameter), its ``stage``, and the values in both runs.
     """
-    found = _data(a, b) + _chosen(a, b)
+    rows = _data(a, b) + _chosen(a, b)
     seen: set[tuple[str, str]] = {("model", ""), ("limits", "")}
     for stage, (before, after) in _manifests(a, b).items():
-        found += [row for row in _of_stage(stage, before, after) if (row["what"], row["name"]) not in seen]
-        seen |= {(row["what"], row["name"]) for row in found if row["what"] == "library"}
-    return found
+        rows += [row for row in _of_stage(stage, before, after) if (row["what"], row["name"]) not in seen]
+        seen |= {(row["what"], row["name"]) for row in rows if row["what"] == "library"}
+    return rows
 
 
 def _row(what: str, name: str, before: Any, after: Any, stage: str = "") -> dict[str, Any]:
@@ -92,8 +92,8 @@ def _manifests(a: Run, b: Run) -> dict[str, tuple[dict[str, Any], dict[str, Any]
 
 
 def _by_stage(run: Run) -> dict[str, dict[str, Any]]:
-    found = [run.manifest(name) for name in run.tables()]
-    return {manifest["stage"]: manifest for manifest in found}
+    manifests = [run.manifest(name) for name in run.tables()]
+    return {manifest["stage"]: manifest for manifest in manifests}
 
 
 def _of_stage(stage: str, before: dict[str, Any], after: dict[str, Any]) -> list[dict[str, Any]]:

@@ -155,13 +155,13 @@ def fresh(tasks: Sequence[FreshTask]) -> list[Fresh]:
 def _fresh(task: FreshTask) -> Fresh:
     task.change.use()
     run = Run(Archive(task.archive), task.run)
-    found = Fresh(task.run)
+    fresh_sums = Fresh(task.run)
     dwells, history = run.table("dwells"), run.table("history")
     for units, old, new in task.earlier:
-        for calibration, sums in ((old, found.old), (new, found.new)):
+        for calibration, sums in ((old, fresh_sums.old), (new, fresh_sums.new)):
             if calibration is not None:
                 sums.update(applied(calibration, units, dwells, history))
-    return found
+    return fresh_sums
 
 
 def applied(calibration: Calibration, units: Sequence[str], dwells: pd.DataFrame, history: pd.DataFrame) -> Sums:

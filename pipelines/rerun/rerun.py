@@ -122,12 +122,12 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
     ----------
     raw : whether the raw samples are there; without them the stages that read them are kept as they are
     """
-    found: list[dict[str, str]] = []
+    rows: list[dict[str, str]] = []
     there = set(old.tables())
     for step in plan.steps:
         if step.name == "leave_out":
             named = ", ".join(f"{unit}:{dwell}" for unit, dwell in step.parameters["left_out"])
-            found.append({"stage": step.name, "what": "dwells left out", "from": "", "to": named})
+            rows.append({"stage": step.name, "what": "dwells left out", "from": "", "to": named})
             continue
         if (
             not there.issuperset(step.outputs)
@@ -137,9 +137,9 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
             continue
         manifest = old.manifest(step.outputs[0])
         if manifest.get("code") != step.code:
-            found.append({"stage": step.name, "what": "code", "from": str(manifest.get("code", "")), "to": step.code})
+            rows.append({"stage": step.name, "what": "code", "from": str(manifest.get("code", "")), "to": step.code})
         before = manifest.get("parameters", {})
-        found += [
+        rows += [
             {
                 "stage": step.name,
                 "what": PARAMETER_TITLES.get(key, key),
@@ -151,8 +151,8 @@ def changes(old: Run, plan: Plan, *, raw: bool) -> list[dict[str, str]]:
         ]
     whole = {name for step in plan.steps for name in step.outputs}
     if there >= {"dwells"} and not whole <= there and not old.about.get("capture"):
-        found.append({"stage": "fit", "what": "not fitted yet", "from": "", "to": ""})
-    return found
+        rows.append({"stage": "fit", "what": "not fitted yet", "from": "", "to": ""})
+    return rows
 
 
 PARAMETER_TITLES = {"effects": "model", "formulas": "model", "lot": "lot", "limits": "limits"}

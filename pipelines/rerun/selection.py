@@ -37,8 +37,8 @@ class SelectedRun:
 
 def entries(archive: Archive) -> list[SelectedRun]:
     """Every run, in the order of measurement."""
-    found = [_entry(path.parent.name, files.read_json(path)) for path in (archive.root / "runs").glob("*/run.json")]
-    return sorted(found, key=lambda entry: (entry.measured, entry.id))
+    runs = [_entry(path.parent.name, files.read_json(path)) for path in (archive.root / "runs").glob("*/run.json")]
+    return sorted(runs, key=lambda entry: (entry.measured, entry.id))
 
 
 def entry_of(run_id: str, about: dict[str, Any]) -> SelectedRun:
@@ -98,12 +98,12 @@ def _filter(part: str) -> tuple[str, Any]:
 def moment(text: str, where: str, *, end: bool = False) -> datetime:
     """A date or time as UTC; a date alone is the beginning of the day, or its end on request."""
     try:
-        found = datetime.fromisoformat(text)
+        when = datetime.fromisoformat(text)
         if len(text) <= len("2026-01-31"):
-            found = datetime.combine(date.fromisoformat(text), time.max if end else time.min)
+            when = datetime.combine(date.fromisoformat(text), time.max if end else time.min)
     except ValueError:
         raise WrongUse(f"{where}: '{text}' is no date, YYYY-MM-DD is needed; correct it") from None
-    return found if found.tzinfo else found.replace(tzinfo=UTC)
+    return when if when.tzinfo else when.replace(tzinfo=UTC)
 
 
 def _named(known: list[SelectedRun], names: list[str], archive: Archive) -> list[SelectedRun]:

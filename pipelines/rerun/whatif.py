@@ -218,13 +218,13 @@ def _pairs(
 
 def _log_ratios(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> NDArray[np.float64]:
     """Natural logarithm of new over old error, one value per unit: the mean of its calibrations that both models judge."""
-    found: dict[str, list[float]] = defaultdict(list)
+    by_unit: dict[str, list[float]] = defaultdict(list)
     for old, new in _pairs(figure, lots, fresh):
         for unit in old.keys() & new.keys():
             (before, _), (after, _) = old[unit], new[unit]
             if before > 0.0 and after > 0.0:
-                found[unit].append(0.5 * float(np.log(after / before)))
-    return np.array([float(np.mean(own)) for own in found.values()])
+                by_unit[unit].append(0.5 * float(np.log(after / before)))
+    return np.array([float(np.mean(own)) for own in by_unit.values()])
 
 
 def _lost(figure: str, lots: Sequence[LotComparison], fresh: dict[str, Fresh]) -> int:

@@ -55,21 +55,21 @@ def steps(recipe: Recipe) -> list[Step]:
     """
     if recipe.procedures:
         return _listed(recipe)
-    found: list[Step] = []
+    records: list[Step] = []
     for soak, temperature in enumerate(recipe.temperatures_C):
-        first = len(found)
+        first = len(records)
         poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)
         for pose, wait, off in zip(poses, waits, recipe.off_at(soak), strict=True):
-            found.append(Step(len(found), "dwell", soak, temperature, pose, wait, settled, off))
+            records.append(Step(len(records), "dwell", soak, temperature, pose, wait, settled, off))
         for pose in recipe.verification_at(soak):
-            found.append(Step(len(found), "verification", soak, temperature, pose, settled=settled))
+            records.append(Step(len(records), "verification", soak, temperature, pose, settled=settled))
         if recipe.verification_order == "interleaved":
-            found = [*found[:first], *_interleaved(found[first:], first)]
+            records = [*records[:first], *_interleaved(records[first:], first)]
     if recipe.static_record_s > 0.0:
         again = recipe.static_temperature_C == recipe.temperatures_C[-1]
         soak = len(recipe.temperatures_C) - (1 if again else 0)
-        found.append(Step(len(found), "allan", soak, recipe.static_temperature_C, recipe.static_pose))
-    return found
+        records.append(Step(len(records), "allan", soak, recipe.static_temperature_C, recipe.static_pose))
+    return records
 
 
 def _interleaved(soak: list[Step], first: int) -> list[Step]:
@@ -86,15 +86,15 @@ def _interleaved(soak: list[Step], first: int) -> list[Step]:
 
 def _listed(recipe: Recipe) -> list[Step]:
     """Every record of a recipe's list of procedures; a procedure at the temperature of the one before shares its soak."""
-    found: list[Step] = []
+    records: list[Step] = []
     for number, part in enumerate(parts_of(recipe)):
         own = PROCEDURES[part.kind].steps(part, recipe)
-        same = bool(found and own) and found[-1].temperature == own[0].temperature_C and own[0].settled
-        first = (found[-1].soak + (0 if same else 1)) if found else 0
+        same = bool(records and own) and records[-1].temperature == own[0].temperature_C and own[0].settled
+        first = (records[-1].soak + (0 if same else 1)) if records else 0
         for one in own:
-            found.append(
+            records.append(
                 Step(
-                    len(found),
+                    len(records),
                     one.kind,
                     first + one.soak - own[0].soak,
                     one.temperature_C,
@@ -108,4 +108,4 @@ def _listed(recipe: Recipe) -> list[Step]:
                     one,
                 )
             )
-    return found
+    return records

@@ -94,7 +94,7 @@ def schedule(
     """What a station does for steps in order: soaks, moves with their settling, records; see :func:`minutes`."""
     room = station.simulation.room_C if station.simulation else station.pace.room_C
     now, clock = start or StationPose(air=room, device=room), 0.0
-    found: list[Activity] = []
+    activities: list[Activity] = []
     for step in steps:
         begin = now
         parts: list[tuple[ActivityKind, float, StationPose]] = []
@@ -113,10 +113,10 @@ def schedule(
         parts.append(("move", going, there))
         parts.append((step.kind, lasting, _later(there, step.temperature, lasting, station)))
         for what, seconds, end in parts:
-            found.append(Activity(what, step, clock, seconds, begin, end))
+            activities.append(Activity(what, step, clock, seconds, begin, end))
             clock, begin = clock + seconds, end
         now = begin
-    return found
+    return activities
 
 
 def temperatures(stretches: Sequence[Activity], station: StationConfig) -> list[tuple[float, float, float]]:
@@ -125,23 +125,23 @@ def temperatures(stretches: Sequence[Activity], station: StationConfig) -> list[
     What a settled device is still away from its target is no temperature that a plan may count on: it is taken off.
     """
     pace, poll = air_of(station), station.soak.poll_s
-    found: list[tuple[float, float, float]] = []
+    points: list[tuple[float, float, float]] = []
     for stretch in stretches:
         target = stretch.step.temperature
         air, device = stretch.begin.air, stretch.begin.device
         if stretch.kind != "soak":
-            found.append((stretch.start, target, target) if stretch.step.settled else (stretch.start, air, device))
+            points.append((stretch.start, target, target) if stretch.step.settled else (stretch.start, air, device))
             continue
-        ends = (found[-1][2] - device if found else 0.0, target - stretch.end.device)
+        ends = (points[-1][2] - device if points else 0.0, target - stretch.end.device)
         count = math.ceil(stretch.seconds / poll)
         for k in range(count):
             part = k / count
-            found.append((stretch.start + k * poll, air, device + (1.0 - part) * ends[0] + part * ends[1]))
+            points.append((stretch.start + k * poll, air, device + (1.0 - part) * ends[0] + part * ends[1]))
             air, device = timing.followed(air, device, target, poll, pace)
     last = stretches[-1]
     target = last.step.temperature
     air, device = (target, target) if last.step.settled else (last.end.air, last.end.device)
-    return [*found, (last.start + last.seconds, air, device)]
+    return [*points, (last.start + last.seconds, air, device)]
 
 
 def move_seconds(now: StationPose, pose: Pose, station: StationConfig) -> float:

@@ -42,11 +42,11 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
         lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
     calibration = read_calibration(tables.coefficients, tables.covariance)
     at = conditions(lot, tables.dwells, calibration.response, terms)
-    found = propagate(lot, calibration, tables.wander, terms, at)
-    quantities = list(quantities_of(lot, calibration, tables, terms, found))
+    variances = propagate(lot, calibration, tables.wander, terms, at)
+    quantities = list(quantities_of(lot, calibration, tables, terms, variances))
     return {
-        **rows_of_quantities(calibration.units, quantities, found, terms, sources(terms.stated)),
-        "budget_covariance": covariance_rows(calibration.units, found.fit.covariance()),
+        **rows_of_quantities(calibration.units, quantities, variances, terms, sources(terms.stated)),
+        "budget_covariance": covariance_rows(calibration.units, variances.fit.covariance()),
     }
 
 

@@ -90,15 +90,15 @@ class _Contributions:
 def rows_of_quantities(
     units: Sequence[str],
     quantities: Sequence[BudgetQuantity],
-    found: VarianceParts,
+    variances: VarianceParts,
     terms: BudgetTerms,
     known: Mapping[str, UncertaintySource],
 ) -> dict[str, pd.DataFrame]:
     """Tables ``budget`` and ``uncertainties``, unit by unit; every quantity is computed for all units at once."""
-    names = np.array(found.fit.source.contributions, dtype=object)
+    names = np.array(variances.fit.source.contributions, dtype=object)
     groups = list(dict.fromkeys(names.tolist()))
     places = {group: np.flatnonzero(names == group) for group in groups}
-    parts = [_contributions(one, groups, places, found, known, terms) for one in quantities]
+    parts = [_contributions(one, groups, places, variances, known, terms) for one in quantities]
     return {
         "budget": _budget_rows(units, quantities, parts),
         "uncertainties": _sum_rows(units, quantities, parts, terms),
@@ -106,7 +106,7 @@ def rows_of_quantities(
 
 
 def _contributions(
-    one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]], found: VarianceParts,
+    one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]], variances: VarianceParts,
     known: Mapping[str, UncertaintySource],
     terms: BudgetTerms,
 ) -> _Contributions:  # fmt: skip
@@ -120,7 +120,7 @@ def _contributions(
             if name in {NOISE, "run"}:
                 dof[:, column] = one.dof_noise
         else:
-            row = _referred(known[name], found.visible[places[name]])
+            row = _referred(known[name], variances.visible[places[name]])
             stated[:, column], dof[:, column] = known[name].stated.stated, float(known[name].entry.dof or np.inf)
             single = known[name].stated.stated / known[name].stated.divisor if known[name].stated.unit else float("nan")
             if single > 0.0:

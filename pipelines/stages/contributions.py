@@ -58,18 +58,18 @@ def merged(station: Uncertainty | None, recipe: Uncertainty | None) -> Uncertain
 
 def sources(stated: Uncertainty) -> dict[str, UncertaintySource]:
     """The contributions that a statement has, by name."""
-    found: dict[str, UncertaintySource] = {}
+    by_name: dict[str, UncertaintySource] = {}
     for name, entry in stated.entries.items():
         if name == "gravity" and stated.gravity is not None:
-            found[name] = UncertaintySource(entry, stated.gravity.relative())
+            by_name[name] = UncertaintySource(entry, stated.gravity.relative())
         elif name == "settling":
-            found[name] = UncertaintySource(entry, entry.standard())
+            by_name[name] = UncertaintySource(entry, entry.standard())
         else:
-            found |= {
+            by_name |= {
                 label: UncertaintySource(entry, entry.standard(part))
                 for part, label in _PARTS.get(name, {"": name}).items()
             }
-    return found
+    return by_name
 
 
 _PARTS: dict[str, dict[str, str]] = {
@@ -89,12 +89,12 @@ def influences(
     ----------
     stability : of the device: whose temperature the user corrects with, and whether its output follows the supply
     """
-    found: list[InputQuantity] = []
+    inputs: list[InputQuantity] = []
     for name, errors, u in _all(stated, at, stability):
         if u > 0.0:
             entry = sources(stated)[name].entry
-            found.append(InputQuantity(name, errors, u, entry.scope, entry.dof or float("inf")))
-    return found, list(_scattered(stated, at))
+            inputs.append(InputQuantity(name, errors, u, entry.scope, entry.dof or float("inf")))
+    return inputs, list(_scattered(stated, at))
 
 
 def _all(stated: Uncertainty, at: DwellConditions, stability: Stability | None) -> Iterator[tuple[str, Errors, float]]:

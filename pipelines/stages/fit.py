@@ -86,17 +86,17 @@ def fit_tables(tables: LotTables, effects: Sequence[str]) -> dict[str, pd.DataFr
         return _nothing()
     lot = tables.fitted_kinds
     try:
-        found = _fitted(lot, effects)
+        fitted = _fitted(lot, effects)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
     return {
         "coefficients": coefficient_rows(
-            lot.units, found.fit, found.fit.covariance, lot.out_unit, found.nonlinear_error
+            lot.units, fitted.fit, fitted.fit.covariance, lot.out_unit, fitted.nonlinear_error
         ),
-        "covariance": covariance_rows(lot.units, found.fit.covariance),
-        "residuals": _residual_rows(lot, found),
-        "predictions": _prediction_rows(lot, found),
-        "wander": _wander_rows(lot, found),
+        "covariance": covariance_rows(lot.units, fitted.fit.covariance),
+        "residuals": _residual_rows(lot, fitted),
+        "predictions": _prediction_rows(lot, fitted),
+        "wander": _wander_rows(lot, fitted),
     }
 
 
@@ -110,8 +110,8 @@ def _fitted(lot: LotArrays, effects: Sequence[str]) -> _Noisy:
     spare = int(plain.dof.sum()) - plain.shared.size
     if spare < FEWEST_TO_SPARE or np.any(plain.dof < 1) or not np.all(np.isfinite(known) & (known > 0.0)):
         return _by_birge(lot, plain, used)
-    found = fit_lot_with_wander(effects, lot.state, lot.output, lot.standard_error, nonlinear=values, used=used)
-    return _by_wander(lot, found, used)
+    fitted = fit_lot_with_wander(effects, lot.state, lot.output, lot.standard_error, nonlinear=values, used=used)
+    return _by_wander(lot, fitted, used)
 
 
 def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
@@ -121,23 +121,23 @@ def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
     return force @ turn
 
 
-def _by_wander(lot: LotArrays, found: WanderFit, used: NDArray[np.bool_]) -> _Noisy:
-    level = np.sqrt(np.mean(lot.standard_error[:, used] ** 2, axis=1)) * np.sqrt(found.lack_of_fit)
+def _by_wander(lot: LotArrays, fitted: WanderFit, used: NDArray[np.bool_]) -> _Noisy:
+    level = np.sqrt(np.mean(lot.standard_error[:, used] ** 2, axis=1)) * np.sqrt(fitted.lack_of_fit)
     return _Noisy(
         method="wander",
-        fit=found.fit,
-        noise=found.noise,
-        expected=found.expected,
-        predicted=found.predicted,
-        white=level * found.white,
-        flicker=level * found.flicker,
-        walk=level * found.walk,
-        lack_of_fit=found.lack_of_fit,
-        nonlinear_error=found.nonlinear_error,
-        per_g=_per_g(lot, found.fit),
-        gain=found.gain,
-        known=found.widened,
-        walk_shown=found.walk_shown,
+        fit=fitted.fit,
+        noise=fitted.noise,
+        expected=fitted.expected,
+        predicted=fitted.predicted,
+        white=level * fitted.white,
+        flicker=level * fitted.flicker,
+        walk=level * fitted.walk,
+        lack_of_fit=fitted.lack_of_fit,
+        nonlinear_error=fitted.nonlinear_error,
+        per_g=_per_g(lot, fitted.fit),
+        gain=fitted.gain,
+        known=fitted.widened,
+        walk_shown=fitted.walk_shown,
     )
 
 
@@ -167,7 +167,7 @@ def _by_birge(lot: LotArrays, plain: LotFit, used: NDArray[np.bool_]) -> _Noisy:
     )
 
 
-def _per_g(lot: LotArrays, found: LotFit) -> Array:
+def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
     """Output per g of every unit and axis, (units, 3): the scale of the model, or what the output's unit says where it has none.
 
     Raises
@@ -175,28 +175,28 @@ def _per_g(lot: LotArrays, found: LotFit) -> Array:
     DataRejected
         The model has no scale, and the output is in a unit of its own: its size in g is unknown.
     """
-    scale = np.abs(np.diagonal(found.response(), axis1=-2, axis2=-1))
-    if "scale" in found.effects:
+    scale = np.abs(np.diagonal(lot_fit.response(), axis1=-2, axis2=-1))
+    if "scale" in lot_fit.effects:
         return scale
     if lot.out_unit not in _PER_G:
         turned = bool(np.any(np.ptp(lot.state.force.reshape(-1, 3), axis=0) > _TURNED_G))
         scale_too = "add 'scale' to the effects, or " if turned else "one orientation cannot show it; "
         raise DataRejected(
-            f"fit: the model {', '.join(found.effects)} has no 'scale', and the outputs are in {lot.out_unit}: residuals in µg "
+            f"fit: the model {', '.join(lot_fit.effects)} has no 'scale', and the outputs are in {lot.out_unit}: residuals in µg "
             f"need the output per g; {scale_too}divide the outputs by that of the data sheet and import them with "
             "--units output=g"
         )
     return np.full_like(scale, _PER_G[lot.out_unit])
 
 
-def birge_squared(found: LotFit) -> Array:
+def birge_squared(lot_fit: LotFit) -> Array:
     """χ²/ν of every unit and axis, never below one, (units, 3)."""
-    return np.maximum(1.0, found.chi2 / np.maximum(found.dof, 1))
+    return np.maximum(1.0, lot_fit.chi2 / np.maximum(lot_fit.dof, 1))
 
 
-def _residual_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
+def _residual_rows(lot: LotArrays, fitted: _Noisy) -> pd.DataFrame:
     used = lot.of_kind("dwell")
-    scale = found.per_g[:, None, :]
+    scale = fitted.per_g[:, None, :]
     force = np.broadcast_to(lot.state.force, lot.output.shape)[:, used]
     u, n, a = (index.ravel() for index in np.meshgrid(*(np.arange(size) for size in force.shape), indexing="ij"))
     temperature = lot.state.temperature
@@ -207,23 +207,23 @@ def _residual_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
             "axis": picked(AXES, a),
             "pose": picked(lot.poses, np.flatnonzero(used)[n]),
             "force_g": force.ravel(),
-            "residual_ug": (MICRO * found.fit.residuals / scale)[:, used].ravel(),
-            "standard_error_ug": (MICRO * found.noise / scale)[:, used].ravel(),
-            "expected_ug": (MICRO * found.expected / scale)[:, used].ravel(),
+            "residual_ug": (MICRO * fitted.fit.residuals / scale)[:, used].ravel(),
+            "standard_error_ug": (MICRO * fitted.noise / scale)[:, used].ravel(),
+            "expected_ug": (MICRO * fitted.expected / scale)[:, used].ravel(),
             "unit_C": np.full(u.size, np.nan) if temperature is None else temperature[:, used][u, n],
         }
     )
 
 
-def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
+def _prediction_rows(lot: LotArrays, fitted: _Noisy) -> pd.DataFrame:
     """Covariance of the expected residuals of the dwells for verification, as a long table of lower triangles."""
-    scale = found.per_g
+    scale = fitted.per_g
     dwells = lot.dwells[~lot.of_kind("dwell")]
     row, column = np.tril_indices(dwells.size)
     u, a, k = (
         i.ravel() for i in np.meshgrid(np.arange(len(lot.units)), np.arange(3), np.arange(row.size), indexing="ij")
     )
-    values = found.predicted * (MICRO / scale[..., None, None]) ** 2
+    values = fitted.predicted * (MICRO / scale[..., None, None]) ** 2
     return pd.DataFrame(
         {
             "unit": picked(lot.units, u),
@@ -235,56 +235,58 @@ def _prediction_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
     )
 
 
-def _wander_rows(lot: LotArrays, found: _Noisy) -> pd.DataFrame:
+def _wander_rows(lot: LotArrays, fitted: _Noisy) -> pd.DataFrame:
     """The method that estimates the noise of the dwells, and the parts of the noise, by unit and axis."""
-    scale = found.per_g
+    scale = fitted.per_g
     u, a = (index.ravel() for index in np.meshgrid(np.arange(len(lot.units)), np.arange(3), indexing="ij"))
-    parts = {"white_ug": found.white, "flicker_ug": found.flicker, "walk_ug": found.walk}
+    parts = {"white_ug": fitted.white, "flicker_ug": fitted.flicker, "walk_ug": fitted.walk}
     return pd.DataFrame(
         {
             "unit": picked(lot.units, u),
             "axis": picked(AXES, a),
-            "method": picked([found.method], np.zeros(u.size, dtype=np.intp)),
+            "method": picked([fitted.method], np.zeros(u.size, dtype=np.intp)),
             **{name: (MICRO * values / scale).ravel() for name, values in parts.items()},
-            "lack_of_fit": found.lack_of_fit.ravel(),
-            "dof": found.fit.dof.ravel(),
-            **{name: values.ravel() for name, values in _bias_of(lot, found, scale).items()},
+            "lack_of_fit": fitted.lack_of_fit.ravel(),
+            "dof": fitted.fit.dof.ravel(),
+            **{name: values.ravel() for name, values in _bias_of(lot, fitted, scale).items()},
         }
     )
 
 
-def _bias_of(lot: LotArrays, found: _Noisy, scale: Array) -> dict[str, Array]:
+def _bias_of(lot: LotArrays, fitted: _Noisy, scale: Array) -> dict[str, Array]:
     """Uncertainties of the bias by measurand, (units, 3), µg; none for a model without a bias.
 
     Scatter that the dwells' own samples do not show counts as flicker here: few dwells do not show its kind, and white noise
     would not last beyond the record. The walk of a short record that flicker explains equally well also counts as flicker: a walk
     of two minutes, extrapolated over a day, would grow by a factor of fifteen.
     """
-    places = [[name for name, _ in names].index("bias") if ("bias", "K0") in names else -1 for names in found.fit.names]
+    places = [
+        [name for name, _ in names].index("bias") if ("bias", "K0") in names else -1 for names in fitted.fit.names
+    ]
     if min(places) < 0:
         return {name: np.full(scale.shape, np.nan) for name in COLUMNS}
     used = lot.of_kind("dwell")
-    errors = np.sqrt(np.diagonal(found.fit.covariance, axis1=-2, axis2=-1))
+    errors = np.sqrt(np.diagonal(fitted.fit.covariance, axis1=-2, axis2=-1))
     own = np.mean(lot.standard_error[:, used] ** 2, axis=1)
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0]
-    carried = found.walk_shown or np.ptp(time[used]) >= LONG_S
-    walk = found.walk if carried else np.zeros_like(found.walk)
-    excess = np.sqrt(np.maximum(found.white**2 - own, 0.0) + 0.5 * (found.walk**2 - walk**2))
+    carried = fitted.walk_shown or np.ptp(time[used]) >= LONG_S
+    walk = fitted.walk if carried else np.zeros_like(fitted.walk)
+    excess = np.sqrt(np.maximum(fitted.white**2 - own, 0.0) + 0.5 * (fitted.walk**2 - walk**2))
     record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
     record, flicker, whole, walk, excess = (
-        MICRO * part / scale for part in (record, found.flicker, found.walk, walk, excess)
+        MICRO * part / scale for part in (record, fitted.flicker, fitted.walk, walk, excess)
     )
     noise = BiasNoise(
         error=record,
-        gain=np.stack([found.gain[:, axis, place] for axis, place in enumerate(places)], axis=1),
+        gain=np.stack([fitted.gain[:, axis, place] for axis, place in enumerate(places)], axis=1),
         flicker=flicker,
         walk=whole,
         carried=walk,
         excess=excess,
         time=time[used],
         every=time,
-        known=found.known,
-        widened=student(max(int(np.sum(found.fit.dof)) - 2, 1)),
+        known=fitted.known,
+        widened=student(max(int(np.sum(fitted.fit.dof)) - 2, 1)),
     )
     return bias_measurands(noise)
 

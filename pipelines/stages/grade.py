@@ -124,23 +124,23 @@ def grade(
         ]
         figure_rows += [_figure_row(unit, figure, decisions, limits) for figure in figures if not figure.why_not]
         grade_rows.append(_decided(verdict, figures, decisions, limits, evidence.basis))
-    found = _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS)
+    figure_table = _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS)
     return {
-        "figures": found,
+        "figures": figure_table,
         "grades": _table(grade_rows).assign(rule=rule, basis=evidence.basis),
-        "lot_risks": lot_risks(found, limits, evidence.uncertainties),
+        "lot_risks": lot_risks(figure_table, limits, evidence.uncertainties),
     }
 
 
 def _budget(table: pd.DataFrame | None) -> dict[str, dict[tuple[str, str], BudgetRow]]:
     """The quantities of the budget by unit."""
-    found: dict[str, dict[tuple[str, str], BudgetRow]] = {}
+    by_unit: dict[str, dict[tuple[str, str], BudgetRow]] = {}
     if table is None:
-        return found
+        return by_unit
     columns = (table[name].tolist() for name in ("unit", "quantity", "axis", "value", "u_a", "u_b", "u"))
     for unit, quantity, axis, *numbers in zip(*columns, strict=True):
-        found.setdefault(str(unit), {})[str(quantity), str(axis)] = BudgetRow(*numbers)
-    return found
+        by_unit.setdefault(str(unit), {})[str(quantity), str(axis)] = BudgetRow(*numbers)
+    return by_unit
 
 
 def _stated(table: pd.DataFrame | None, units: int) -> NDArray[np.float64] | None:
@@ -158,7 +158,7 @@ def _stated(table: pd.DataFrame | None, units: int) -> NDArray[np.float64] | Non
 
 def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> list[Figure]:
     """The figures of a unit that procedures have determined; of several axes, or repeated procedures, the largest."""
-    found: dict[str, Figure] = {}
+    figures: dict[str, Figure] = {}
     if table is None or table.empty:
         return []
     guard = limits.coverage_factor if limits.rule == "guarded_acceptance" else 0.0
@@ -167,19 +167,19 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         value = float(row["value"]) if row["identified"] else np.inf
         name = str(row["figure"])
         one = Figure(name, str(row["unit_text"]), value, float(row["uncertainty"]) if not why else 0.0, why)
-        before = found.get(name)
+        before = figures.get(name)
         least = name in limits.figures and limits.figures[name].min is not None
         if before is None or _badness(one, guard, least=least) > _badness(before, guard, least=least):
-            found[name] = one
-    return list(found.values())
+            figures[name] = one
+    return list(figures.values())
 
 
 def _badness(figure: Figure, guard: float, *, least: bool) -> float:
     """How far a figure lies towards its limit, with its guard band; infinite where it is not determined, or no number."""
     if figure.why_not:
         return float("inf")
-    found = (-figure.value if least else abs(figure.value)) + guard * figure.uncertainty
-    return found if np.isfinite(found) else float("inf")
+    badness = (-figure.value if least else abs(figure.value)) + guard * figure.uncertainty
+    return badness if np.isfinite(badness) else float("inf")
 
 
 def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficients | None, dict[str, int]]:

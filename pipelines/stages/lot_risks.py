@@ -67,5 +67,5 @@ def _risks(mean: float, process: float, u: float, limit: float, accept: float, u
         return {"pfa": float("nan"), "pfr": float("nan"), "accepted": float("nan")}
     if not process > 0.0:  # the units differ by no more than their measurement: all are taken as equal to their mean
         process = 1e-6 * limit
-    found = global_risk(mean, process, u, (-limit, limit), (-accept, accept))
-    return {"pfa": found.pfa, "pfr": found.pfr, "accepted": found.accepted}
+    risk = global_risk(mean, process, u, (-limit, limit), (-accept, accept))
+    return {"pfa": risk.pfa, "pfr": risk.pfr, "accepted": risk.accepted}

@@ -222,9 +222,9 @@ def _term_rows(channel: _Channel, terms: NoiseTerms, place: int) -> list[tuple[o
 
 def _stability_row(channel: _Channel, rate: float) -> list[tuple[object, ...]]:
     """The bias stability over the last hour of the record; none where it is shorter."""
-    found = bias_stability(channel.record, rate)
+    stability = bias_stability(channel.record, rate)
     where = (channel.unit, channel.axis, TERM)
-    return [] if found is None else [(*where, *found, True, "µg", channel.warmth)]
+    return [] if stability is None else [(*where, *stability, True, "µg", channel.warmth)]
 
 
 def _silent_rows(channel: _Channel) -> list[tuple[object, ...]]:

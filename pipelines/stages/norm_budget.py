@@ -54,7 +54,7 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
     own, scattered = influences(stated, at, terms.stability)
     whole = sensitivity(physical, lot.state, own, scattered)
     fitted = propagated_by_norm(one.design, whole, one.calibration.response)
-    found = VarianceParts(
+    variances = VarianceParts(
         fit=replace(fitted, source=replace(whole, changes=whole.changes[:, one.design.used])),
         verification=whole.changes[:, ~one.design.used],
         visible=one.design.visible_share(whole.changes[0]),
@@ -67,10 +67,10 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
         verification_poses=_of(tables.verification_poses, unit),
         noise=_of(tables.noise, unit),
     )
-    quantities = [q for q in quantities_of(lot, one.calibration, part, terms, found) if not _is_rotation(q)]
+    quantities = [q for q in quantities_of(lot, one.calibration, part, terms, variances) if not _is_rotation(q)]
     return {
-        **rows_of_quantities((unit,), quantities, found, terms, sources(stated)),
-        "budget_covariance": covariance_rows((unit,), found.fit.covariance()),
+        **rows_of_quantities((unit,), quantities, variances, terms, sources(stated)),
+        "budget_covariance": covariance_rows((unit,), variances.fit.covariance()),
     }
 
 

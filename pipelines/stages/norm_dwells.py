@@ -72,8 +72,8 @@ def norm_dwells(
 def _one(
     dwells: pd.DataFrame, history: pd.DataFrame | None, calibration: Calibration, wander: pd.DataFrame
 ) -> NormDwells:
-    found = measured(dwells, history)
-    readings, state = found.readings, found.state
+    measurement = measured(dwells, history)
+    readings, state = measurement.readings, measurement.state
     force = correct(calibration.effects, state, readings.output, calibration.coefficients, calibration.nonlinear)
     response = response_matrix(calibration.coefficients, calibration.names)
     scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1))
@@ -97,10 +97,10 @@ def _one(
     model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
     lot = LotArrays(
         units=calibration.units,
-        dwells=found.dwells,
+        dwells=measurement.dwells,
         poses=tuple(dwells["pose"].astype(str))
         if "pose" in dwells.columns
-        else tuple(f"dwell {k}" for k in found.dwells),
+        else tuple(f"dwell {k}" for k in measurement.dwells),
         kinds=kinds,
         state=state,
         output=readings.output,

@@ -79,14 +79,16 @@ def norms_fitted(
         The dwells do not determine the model, or lack a quantity that it needs.
     """
     try:
-        found = measured(fitted_dwells(dwells), history)
-        lot = lot_of(found, square="misalignment" not in effects)
+        measurement = measured(fitted_dwells(dwells), history)
+        lot = lot_of(measurement, square="misalignment" not in effects)
         problem = Problem(lot)
         model = Model(problem, terms_of(catalogue.get_all(effects), problem))
         values = {t.effect.id: t.keywords for t in model.terms if t.keywords}
-        filled = np.where(found.readings.there[..., None], found.readings.output, _typical(found.readings.output))
+        filled = np.where(
+            measurement.readings.there[..., None], measurement.readings.output, _typical(measurement.readings.output)
+        )
         shape = "six" if "misalignment" not in effects else "nine"
-        origin = [expansion(found.readings, unit, shape=shape) for unit in range(len(found.units))]
+        origin = [expansion(measurement.readings, unit, shape=shape) for unit in range(len(measurement.units))]
         start = np.stack([o.bias for o in origin]), np.stack([o.response for o in origin]) / gravity
         fit = fit_norms(
             effects,
@@ -97,13 +99,13 @@ def norms_fitted(
             norm=gravity,
             nonlinear=values,
             plausible=plausible_noises(model),
-            weights=found.readings.duration,
+            weights=measurement.readings.duration,
         )
     except InertialError as problem_found:
         raise DataRejected(str(problem_found)) from None
     noise, covariance = model.noise, problem.covariance
     return FittedNorms(
-        measured=found,
+        measured=measurement,
         model=model,
         fit=fit,
         scale=np.abs(np.diagonal(fit.fit.response(), axis1=-2, axis2=-1)),
@@ -227,11 +229,11 @@ def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
     time = np.sort(lot.state.time[0])
     widened = student(max(int(done.fit.dof.sum()), 1))
     long = of_a_day(record, wander, time, slowest=SLOWEST_DIAGNOSED, widened=widened)
-    found: dict[str, Any] = {
+    by_measurand: dict[str, Any] = {
         "bias_instability_ug": instability(wander, time, slowest=SLOWEST_DIAGNOSED),
         "bias_record_u_ug": record,
         "bias_long_u_ug": long,
         "bias_long_s": np.full_like(record, DAY_S),
         "bias_switch_on_u_ug": np.full_like(record, np.nan),
     }
-    return {name: found[name] for name in COLUMNS}
+    return {name: by_measurand[name] for name in COLUMNS}

@@ -96,11 +96,11 @@ def analysed(
         table, outcome, why = points([]), Outcome({}), str(problem)
     whole: dict[str, list[FigureValue]] = {}
     for unit in units:
-        found = list(outcome.figures.get(unit, []))
-        there = {one.figure for one in found}
+        values = list(outcome.figures.get(unit, []))
+        there = {one.figure for one in values}
         missing = [spec for spec in procedure.figures if spec.name not in there]
-        found += [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
-        whole[unit] = [one if np.isfinite(one.value) else replace(one, identified=False) for one in found]
+        values += [FigureValue.not_determined(spec.name, "*", why) for spec in missing]
+        whole[unit] = [one if np.isfinite(one.value) else replace(one, identified=False) for one in values]
     return table, Outcome(whole, outcome.findings)
 
 

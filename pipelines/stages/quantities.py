@@ -76,22 +76,24 @@ class BudgetQuantity:
 
 
 def quantities_of(
-    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, found: VarianceParts
+    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, variances: VarianceParts
 ) -> Iterator[BudgetQuantity]:
     """Every quantity of a budget."""
     units = len(lot.units)
     dof = np.full(units, float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
     scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))
-    yield from _coefficients(calibration, found, scale, dof)
-    yield from _angles(calibration, found, scale, dof)
-    yield from _outputs(lot, calibration, terms, found, dof)
+    yield from _coefficients(calibration, variances, scale, dof)
+    yield from _angles(calibration, variances, scale, dof)
+    yield from _outputs(lot, calibration, terms, variances, dof)
     if len(tables.verification):
-        errors = list(_verification(lot, calibration, tables, terms, found, dof))
+        errors = list(_verification(lot, calibration, tables, terms, variances, dof))
         yield from errors
         yield from _period(errors, lot, tables, terms, dof)
 
 
-def _coefficients(calibration: Calibration, found: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
+def _coefficients(
+    calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array
+) -> Iterator[BudgetQuantity]:
     spread = np.sqrt(np.diagonal(calibration.covariance, axis1=-2, axis2=-1))
     for effect, unit in EFFECTS.items():
         for axis, letter in enumerate(AXES):
@@ -100,7 +102,7 @@ def _coefficients(calibration: Calibration, found: VarianceParts, scale: Array, 
                 along = letter + _across(axis, place) if effect == "misalignment" else letter
                 factor = MICRO / scale[:, axis]
                 value = factor * calibration.coefficients[:, axis, column]
-                parts = factor[:, None] * found.fit.coefficients[:, axis, column, :]
+                parts = factor[:, None] * variances.fit.coefficients[:, axis, column, :]
                 nominal = MICRO if effect == "scale" else 0.0
                 yield BudgetQuantity(effect, along, unit, value - nominal, factor * spread[:, axis, column], parts, dof)
 
@@ -109,7 +111,7 @@ def _across(axis: int, place: int) -> str:
     return AXES[(axis + 1 + place) % 3]
 
 
-def _angles(calibration: Calibration, found: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
+def _angles(calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
     """Deviation from 90° of the angle between two axes, (m_ij + m_ji): independent of the seat."""
     if "misalignment" not in calibration.effects:
         return
@@ -121,18 +123,18 @@ def _angles(calibration: Calibration, found: VarianceParts, scale: Array, dof: A
         b = others[(i - j - 1) % 3]
         fi, fj = MICRO / scale[:, i], MICRO / scale[:, j]
         value = fi * calibration.coefficients[:, i, a] + fj * calibration.coefficients[:, j, b]
-        parts = fi[:, None] * found.fit.coefficients[:, i, a] + fj[:, None] * found.fit.coefficients[:, j, b]
+        parts = fi[:, None] * variances.fit.coefficients[:, i, a] + fj[:, None] * variances.fit.coefficients[:, j, b]
         u = np.sqrt((fi**2) * noise[:, i, a, a] + (fj**2) * noise[:, j, b, b])
         yield BudgetQuantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, dof)
 
 
 def _outputs(
-    lot: LotArrays, calibration: Calibration, terms: BudgetTerms, found: VarianceParts, dof: Array
+    lot: LotArrays, calibration: Calibration, terms: BudgetTerms, variances: VarianceParts, dof: Array
 ) -> Iterator[BudgetQuantity]:
     """Corrected output, worst force and temperature of the certified range."""
     state = certified_range(lot, terms)
     columns = design.local_columns(design.split(calibration.effects)[0], state, calibration.nonlinear)
-    errors = MICRO * found.fit.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    errors = MICRO * variances.fit.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
     noise = output_noise(calibration, columns)
     zero = np.zeros(len(lot.units))
     for axis, letter in enumerate(AXES):
@@ -191,7 +193,12 @@ def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
 
 
 def _verification(
-    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, found: VarianceParts, dof: Array
+    lot: LotArrays,
+    calibration: Calibration,
+    tables: BudgetTables,
+    terms: BudgetTerms,
+    variances: VarianceParts,
+    dof: Array,
 ) -> Iterator[BudgetQuantity]:
     """RMS error of each axis for the user, and the magnitude at its worst pose."""
     unseen = lot.of_kind("verification")
@@ -199,9 +206,9 @@ def _verification(
     columns = columns[..., unseen, :]
     force = np.broadcast_to(lot.state.force, (*lot.output.shape[:1], *lot.state.force.shape[-2:]))[:, unseen]
     intrinsic = terms.certificate.frame == "intrinsic"
-    true = MICRO * found.fit.user_errors(columns, force, intrinsic=intrinsic)
-    shown = MICRO * found.fit.shown_errors(columns, found.verification)
-    hidden = found.visible < UNSEEN
+    true = MICRO * variances.fit.user_errors(columns, force, intrinsic=intrinsic)
+    shown = MICRO * variances.fit.shown_errors(columns, variances.verification)
+    hidden = variances.visible < UNSEEN
     rows = tables.verification
     for axis, letter in enumerate(AXES):
         own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
@@ -232,13 +239,13 @@ def _verification(
 def _worst_pose(lot: LotArrays, tables: BudgetTables) -> tuple[Array, Array]:
     """Magnitude of the largest error of a pose and its uncertainty by noise, of every unit, µg."""
     rows = ByUnit(tables.verification_poses)
-    found = np.zeros((2, len(lot.units)))
+    largest = np.zeros((2, len(lot.units)))
     for place, unit in enumerate(lot.units):
         own = rows.of(unit)
         error, u = own["error_ug"], own["uncertainty_ug"]
         worst = int(np.argmax(np.abs(error)))
-        found[:, place] = abs(error[worst]), u[worst]
-    return found[0], found[1]
+        largest[:, place] = abs(error[worst]), u[worst]
+    return largest[0], largest[1]
 
 
 def _all(values: Array, lot: LotArrays) -> Array:
@@ -254,8 +261,8 @@ def _period(
     span = float(np.ptp(time[0])) + terms.dwell_s
     for letter in AXES:
         own = next(q for q in errors if q.name == "bias_error" and q.axis == letter)
-        found: list[Period | None] = [period_of(tables, terms, unit, letter, span) for unit in lot.units]
-        whole = [one for one in found if one is not None]
+        periods: list[Period | None] = [period_of(tables, terms, unit, letter, span) for unit in lot.units]
+        whole = [one for one in periods if one is not None]
         if len(whole) != len(lot.units):
             return
         variance = np.sum(own.parts**2, axis=-1)

@@ -67,8 +67,8 @@ class Reach:
     @property
     def shares(self) -> dict[str, float]:
         """Share of each contribution in u², the largest first."""
-        found = {name: part**2 / self.u**2 for name, part in self.parts.items()} if self.u > 0.0 else {}
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
+        shares = {name: part**2 / self.u**2 for name, part in self.parts.items()} if self.u > 0.0 else {}
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]) -> list[Reach]:
@@ -83,7 +83,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     at = DwellConditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
     source = sensitivity(model, planned.fit, *influences(terms.stated, at, terms.stability))
     fit = fit_design(nominal, planned.fit, planned.covariance)
-    found = propagated(fit, source, np.eye(3))
+    propagation = propagated(fit, source, np.eye(3))
     names = np.array(source.contributions, dtype=object)
     noise = fit.gain @ planned.covariance @ np.swapaxes(fit.gain, -1, -2)
     out: list[Reach] = []
@@ -91,9 +91,9 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
         for axis, letter in enumerate(AXES):
             for column in [k for k, (name, _) in enumerate(fit.names[axis]) if name == effect]:
                 own = float(np.sqrt(noise[axis, column, column]))
-                out.append(_reach(effect, letter, unit, own, found.coefficients[axis, column], names))
+                out.append(_reach(effect, letter, unit, own, propagation.coefficients[axis, column], names))
     if planned.verification is not None:
-        out += _errors(planned, terms, nominal, found, names)
+        out += _errors(planned, terms, nominal, propagation, names)
     return out
 
 
@@ -113,14 +113,14 @@ def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, nam
 
 
 def _errors(
-    planned: PlannedDwells, terms: BudgetTerms, model: MeasurementModel, found: Propagated, names: Array
+    planned: PlannedDwells, terms: BudgetTerms, model: MeasurementModel, propagation: Propagated, names: Array
 ) -> list[Reach]:
     """RMS error for the user, by the references alone, and over the period."""
     state = planned.verification
     if state is None:
         return []
     columns = design.local_columns(design.split(model.effects)[0], state, model.nonlinear)
-    errors = found.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    errors = propagation.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
     out: list[Reach] = []
     for axis, letter in enumerate(AXES):
         parts = {
@@ -156,12 +156,12 @@ def _later(planned: PlannedDwells, terms: BudgetTerms) -> dict[str, float] | Non
     return {name: value for name, value in parts.items() if value > 0.0}
 
 
-def unreachable(found: Sequence[Reach], limits: Limits, months: int) -> list[str]:
+def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[str]:
     """Why limits cannot be met, a sentence each: U of the references, or the error expected over the period, exceeds them."""
     from pipelines.stages.budget_rows import LABELS
 
     out: list[str] = []
-    worst = {q: max((r for r in found if r.quantity == q), key=lambda r: r.u, default=None) for q in FIGURES}
+    worst = {q: max((r for r in reaches if r.quantity == q), key=lambda r: r.u, default=None) for q in FIGURES}
     for quantity, figure in FIGURES.items():
         one = worst[quantity]
         needed = limits.figures[figure].max if figure in limits.figures else None

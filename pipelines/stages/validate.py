@@ -132,10 +132,10 @@ def _sample_faults(answered: pd.DataFrame, summaries: pd.DataFrame) -> list[Data
     for record in summaries["record"].unique():
         for row in answered[answered["record"] == record].to_dict("records"):
             own = known.get((record, row["unit"]))
-            found = _fault_of(own, str(row["out_unit"]), int(row["n"]), float(row["full_scale"]))
-            if found:
+            fault = _fault_of(own, str(row["out_unit"]), int(row["n"]), float(row["full_scale"]))
+            if fault:
                 place = f"in record {row['record']} (pose {row['pose']})"
-                faults.append(DataFault(str(row["unit"]), found[0], f"{found[1]} {place}; {found[2]}"))
+                faults.append(DataFault(str(row["unit"]), fault[0], f"{fault[1]} {place}; {fault[2]}"))
     return faults
 
 

@@ -49,9 +49,9 @@ class DwellTable:
             order = order[frame["kind"].isin(list(kinds)).to_numpy()[order]]
         self.frame = frame
         self._order = None if np.array_equal(order, np.arange(len(frame))) else order
-        found, unit = np.unique(place[order], return_inverse=True)
+        ranks, unit = np.unique(place[order], return_inverse=True)
         by_rank = dict(zip(rank.tolist(), names, strict=True))
-        self.units = tuple(str(by_rank[one]) for one in found.tolist())
+        self.units = tuple(str(by_rank[one]) for one in ranks.tolist())
         self.numbers, number = np.unique(dwell[order], return_inverse=True)
         self._rows = (unit, number)
         self.shape = (len(self.units), len(self.numbers))

@@ -181,7 +181,7 @@ def _stated_unit(dwells: pd.DataFrame) -> str | None:
     return str(stated[0]) if len(stated) == 1 else None
 
 
-def lot_of(found: Measured, like: Measured | None = None, *, square: bool = False) -> Lot:
+def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool = False) -> Lot:
     """The lot in g: outputs over a nominal scale, white standard errors, normalised response.
 
     Where only the norm of gravity is known, a nine-parameter fit gives the directions, and the lot is radial.
@@ -191,18 +191,18 @@ def lot_of(found: Measured, like: Measured | None = None, *, square: bool = Fals
     square : whether the model takes the axes as square, so that six parameters, not nine, give the directions
     like : the run whose nominal scale and response are used: coefficients of one run apply to another only so
     """
-    readings = found.readings
-    if found.reference == "norm":
-        return lot_of_norms(readings, found.state, (like or found).readings, square=square)
-    coefficients = (like or found).readings.fits
+    readings = measurement.readings
+    if measurement.reference == "norm":
+        return lot_of_norms(readings, measurement.state, (like or measurement).readings, square=square)
+    coefficients = (like or measurement).readings.fits
     scale = np.abs(np.diagonal(coefficients[:, :, 1:], axis1=1, axis2=2))
     scale = np.where(scale > 0.0, scale, 1.0)
     response = coefficients[:, :, 1:] / scale[:, :, None]
     output = readings.output / scale[:, None, :]
     there = readings.there
     error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
-    felt = np.einsum("uij,unj->uni", response, found.state.force) + _run_with_temperature(found, scale)
-    state = replace(found.state, felt=felt, memory={})
+    felt = np.einsum("uij,unj->uni", response, measurement.state.force) + _run_with_temperature(measurement, scale)
+    state = replace(measurement.state, felt=felt, memory={})
     return Lot(state, np.where(there[..., None], output, 0.0), error, response)
 
 
@@ -210,12 +210,12 @@ _WARM = 5.0
 """Range of temperature, K, from which on its linear terms are worth to be taken out of the force that a sensor answers to."""
 
 
-def _run_with_temperature(found: Measured, scale: Array) -> Array:
+def _run_with_temperature(measurement: Measured, scale: Array) -> Array:
     """What bias and scale add to the output by their run with temperature, (units, n, 3), g.
 
     A sharp nonlinearity answers to the whole output: a converter's steps stand elsewhere in a warm unit.
     """
-    state, readings = found.state, found.readings
+    state, readings = measurement.state, measurement.readings
     run = np.zeros(readings.output.shape)
     if state.theta is None or float(np.ptp(state.theta)) < _WARM:
         return run

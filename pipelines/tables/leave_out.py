@@ -25,13 +25,13 @@ def named_dwells(text: str) -> Dwells:
     WrongUse
         A part is not of this form.
     """
-    found: list[tuple[str, int]] = []
+    dwells: list[tuple[str, int]] = []
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         unit, colon, dwell = part.rpartition(":")
         if not (colon and unit and dwell.isdigit()):
             raise WrongUse(f"--leave-out: found '{part[:60]}', UNIT:DWELL is needed, divided by commas; correct it")
-        found.append((unit, int(dwell)))
-    return tuple(dict.fromkeys(found))
+        dwells.append((unit, int(dwell)))
+    return tuple(dict.fromkeys(dwells))
 
 
 def leave_out(dwells: pd.DataFrame, named: Sequence[tuple[str, int]]) -> pd.DataFrame:

@@ -164,10 +164,10 @@ def _fitted(readings: Readings, unit: int, kept: NDArray[np.bool_], shape: Shape
 
 def _heat(readings: Readings, unit: int, there: NDArray[np.bool_]) -> Array | None:
     """Temperatures of a unit's dwells; None where there are none, or one of them is missing."""
-    found = readings.temperature if readings.temperature is not None else readings.chamber
-    if found is None or not np.all(np.isfinite(found[unit, there])):
+    temperature = readings.temperature if readings.temperature is not None else readings.chamber
+    if temperature is None or not np.all(np.isfinite(temperature[unit, there])):
         return None
-    return found[unit, there]
+    return temperature[unit, there]
 
 
 def _white(readings: Readings, unit: int, fit: EllipsoidFit, size: Array) -> Array:

@@ -71,24 +71,28 @@ def sound_lot(
     DataRejected
         There are no dwells, or too few to judge anything.
     """
-    found = measured(condense(dwells), history)
-    faults = find_faults(found.readings) if found.reference != "norm" else []
-    faults = [fault for fault in faults if not _on_purpose(found, fault, left_out)]
+    measurement = measured(condense(dwells), history)
+    faults = find_faults(measurement.readings) if measurement.reference != "norm" else []
+    faults = [fault for fault in faults if not _on_purpose(measurement, fault, left_out)]
     blocked = {f.unit for f in faults}
-    sound = [u for u in range(len(found.units)) if u not in blocked]
+    sound = [u for u in range(len(measurement.units)) if u not in blocked]
     if not sound:
-        return found, faults, None
+        return measurement, faults, None
     try:
         # two threads on small matrices wait for each other: on a busy machine it takes sixty times as long
         with threadpool_limits(1):
-            return found, faults, lot_of(found.pick(sound) if blocked else found, square="misalignment" not in effects)
+            return (
+                measurement,
+                faults,
+                lot_of(measurement.pick(sound) if blocked else measurement, square="misalignment" not in effects),
+            )
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
 
 
-def _on_purpose(found: Measured, fault: Fault, left_out: Collection[str]) -> bool:
+def _on_purpose(measurement: Measured, fault: Fault, left_out: Collection[str]) -> bool:
     """Whether a fault is only that dwells were left out."""
-    named = {f"{found.units[fault.unit]}:{int(found.dwells[k])}" for k in fault.dwells}
+    named = {f"{measurement.units[fault.unit]}:{int(measurement.dwells[k])}" for k in fault.dwells}
     return fault.name in MISSING and bool(named) and named <= set(left_out)
 
 

@@ -72,7 +72,7 @@ def _parts(
     groups = table.groupby("unit", sort=True)
     values = groups[list(AXES)]
     mean, sd, low, high = (
-        found.to_numpy() for found in (values.mean(), values.std(ddof=1), values.min(), values.max())
+        statistic.to_numpy() for statistic in (values.mean(), values.std(ddof=1), values.min(), values.max())
     )
     output = table[list(AXES)].to_numpy(dtype=float)
     for k, (unit, places) in enumerate(groups.indices.items()):

@@ -46,13 +46,13 @@ def create_app(settings: WorkbenchSettings) -> ASGIApp:
 
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, lifespan=life)
     app.state.workbench = bench
-    found: list[tuple[int, str, str]] = []
+    pages: list[tuple[int, str, str]] = []
     for info in iter_modules(import_module(ROUTES).__path__):
         module = import_module(f"{ROUTES}.{info.name}")
         app.include_router(module.router)
         if hasattr(module, "HEADING"):
-            found.append((module.ORDER, module.HEADING, module.ADDRESS))
-    bench.navigation = [(heading, address) for _, heading, address in sorted(found)]
+            pages.append((module.ORDER, module.HEADING, module.ADDRESS))
+    bench.navigation = [(heading, address) for _, heading, address in sorted(pages)]
     app.add_api_route("/", lambda: RedirectResponse("/units", 303), include_in_schema=False)
     app.add_exception_handler(TumblelineError, _problem)
     app.add_exception_handler(InertialError, _problem)

@@ -66,8 +66,8 @@ class Workbench:
 
 def workbench_of(request: Request) -> Workbench:
     """The workbench of a request."""
-    found: Workbench = request.app.state.workbench
-    return found
+    bench: Workbench = request.app.state.workbench
+    return bench
 
 
 def state_of(request: Request, kind: type[State]) -> tuple[State, list[str]]:
@@ -148,10 +148,10 @@ def _cell(value: Any) -> Any:
 
 def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
     """A table of a run, cached while its manifest is the same."""
-    found = bench.archive.run(run)
-    place = found.path / f"{name}.json"
+    stored = bench.archive.run(run)
+    place = stored.path / f"{name}.json"
     when = place.stat().st_mtime_ns if isinstance(place, Path) and place.is_file() else 0
-    return _table(bench.settings.archive, found.id, name, when)
+    return _table(bench.settings.archive, stored.id, name, when)
 
 
 @lru_cache(maxsize=48)
@@ -191,5 +191,5 @@ def _tuple_of(values: Any) -> tuple[Any, ...]:
 
 def short(text: object, most: int = 28) -> str:
     """A long name shortened in the middle; the full name is in the title attribute."""
-    found = str(text)
-    return found if len(found) <= most else f"{found[: most - 9]}…{found[-8:]}"
+    whole = str(text)
+    return whole if len(whole) <= most else f"{whole[: most - 9]}…{whole[-8:]}"

@@ -45,9 +45,9 @@ class PageState(BaseModel):
                 for error in problem.errors():
                     name = str(error["loc"][0])
                     if name in values:
-                        found = shown(str(error["input"]), 60)
+                        given = shown(str(error["input"]), 60)
                         problems.append(
-                            f"address: {name} = {found} cannot be used ({error['msg'].lower()}); it is ignored"
+                            f"address: {name} = {given} cannot be used ({error['msg'].lower()}); it is ignored"
                         )
                         del values[name]
 

@@ -91,8 +91,8 @@ class Links:
 
     def _device(self, place: str) -> Carried:
         """The device at a place, or the equipment in a role."""
-        found = self.config.fitted().get(place)
-        return getattr(self.config.devices, place) if found is None else found
+        equipment = self.config.fitted().get(place)
+        return getattr(self.config.devices, place) if equipment is None else equipment
 
     def _key(self, device: Carried) -> Key:
         if self.config.kind == "simulated":
@@ -110,16 +110,16 @@ class Links:
 
     def _profiles(self, key: Key) -> dict[int, Profile]:
         """The profiles of all devices behind one address, by device id."""
-        found: dict[int, Profile] = {}
+        profiles: dict[int, Profile] = {}
         for place in Devices.model_fields:
             device = getattr(self.config.devices, place)
             if self._key(device) == key:
                 ids = range(device.device_id, device.device_id + getattr(device, "count", 1))
-                found.update(dict.fromkeys(ids, load_profile(device.profile)))
+                profiles.update(dict.fromkeys(ids, load_profile(device.profile)))
         for equipment in self.config.fitted().values():
             if equipment.link != "ascii" and self._key(equipment) == key:
-                found[equipment.device_id] = load_profile(equipment.profile)
-        return found
+                profiles[equipment.device_id] = load_profile(equipment.profile)
+        return profiles
 
     def _wire(self, device: Carried, key: Key) -> Wire:
         _, host, port = key

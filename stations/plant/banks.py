@@ -43,11 +43,11 @@ def build_line_devices(
 ) -> dict[int, LineDevice]:
     """Devices with a text protocol, by device id."""
     profile = profile_of(devices.chamber)
-    found = {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
+    line_devices = {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
     for device in (equipment or {}).values():
         if (own := profile_of(device)).commands:
-            found[device.device_id] = chamber_line_device(world, own)
-    return found
+            line_devices[device.device_id] = chamber_line_device(world, own)
+    return line_devices
 
 
 def _reader(world: World, profile: Profile, slots: int) -> Bank:

@@ -109,5 +109,5 @@ def built_in_presets() -> list[str]:
 def _texts() -> dict[str, str]:
     """The presets of the product by their names."""
     folder = files("stations.plant").joinpath("presets")
-    found = {item.name: item.read_text("utf-8") for item in folder.iterdir() if item.name.endswith(".toml")}
-    return {str(tomllib.loads(text)["name"]): text for text in found.values()}
+    texts = {item.name: item.read_text("utf-8") for item in folder.iterdir() if item.name.endswith(".toml")}
+    return {str(tomllib.loads(text)["name"]): text for text in texts.values()}

@@ -25,24 +25,26 @@ def address_of(device: Device | Slots) -> str:
 
 def _line(path: str) -> str:
     """The kernel's name of a serial line, the same for all links and device nodes."""
-    found = os.path.realpath(path)
+    real_path = os.path.realpath(path)
     try:
-        node = os.stat(found)  # noqa: PTH116 - of a text, as the station's file has it
+        node = os.stat(real_path)  # noqa: PTH116 - of a text, as the station's file has it
     except OSError:  # unplugged now; its name stays the same
-        return found
+        return real_path
     if not stat.S_ISCHR(node.st_mode):
-        return found
+        return real_path
     known = KERNEL_NAMES / f"{os.major(node.st_rdev)}:{os.minor(node.st_rdev)}"
-    return f"/dev/{known.resolve().name}" if known.exists() else found
+    return f"/dev/{known.resolve().name}" if known.exists() else real_path
 
 
 def _host(name: str) -> str:
     """The IP address of a host; all addresses and names of this machine give one address."""
     try:
-        found = {str(entry[4][0]) for entry in socket.getaddrinfo(name, None, type=socket.SOCK_STREAM)}
+        addresses = {str(entry[4][0]) for entry in socket.getaddrinfo(name, None, type=socket.SOCK_STREAM)}
     except OSError:  # a name that cannot be resolved now stays the same name
         return name.lower()
-    numbers = sorted((ipaddress.ip_address(one.partition("%")[0]) for one in found), key=lambda one: (one.version, one))
+    numbers = sorted(
+        (ipaddress.ip_address(one.partition("%")[0]) for one in addresses), key=lambda one: (one.version, one)
+    )
     if any(number.is_loopback or _is_own(str(number)) for number in numbers):
         return HERE
     return str(numbers[0])

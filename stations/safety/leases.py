@@ -222,11 +222,11 @@ class Leases:
     def _is_here(self, part: Part, lock: TextIO) -> bool:
         """Whether this lock is the file under the part's name, which others would lock."""
         try:
-            found = self._file(part).with_suffix(".lock").stat()
+            named = self._file(part).with_suffix(".lock").stat()
         except OSError:
             return False
         own = os.fstat(lock.fileno())
-        return (found.st_dev, found.st_ino) == (own.st_dev, own.st_ino)
+        return (named.st_dev, named.st_ino) == (own.st_dev, own.st_ino)
 
     def _keep(self, part: Part) -> None:
         """Restores a lease whose file was removed, where no other process has taken it since; else the leases are lost."""

@@ -66,9 +66,9 @@ def _every_class_has_its_own(classes: Sequence[frozenset[str]], truths: Sequence
 
 def _drivers(document: Document) -> set[str]:
     unexplained = document.get("unexplained")
-    found = {str(unexplained["driver"])} if unexplained else set[str]()
+    drivers = {str(unexplained["driver"])} if unexplained else set[str]()
     named = [name for group, _ in _classes(document) for name in group]
-    return found | {name.partition(":")[2] for name in named if name.startswith("covariate:")}
+    return drivers | {name.partition(":")[2] for name in named if name.startswith("covariate:")}
 
 
 def _faults(document: Document, truth: Truth) -> tuple[bool | None, bool | None, bool]:
@@ -135,8 +135,8 @@ def wilson(hits: int, count: int, level: float = 0.95) -> tuple[float, float]:
     """Wilson's score interval of a share (Wilson, JASA 22, 1927, p. 209)."""
     if count == 0:
         return 0.0, 1.0
-    found = binomtest(hits, count).proportion_ci(level, "wilson")
-    return float(found.low), float(found.high)
+    interval = binomtest(hits, count).proportion_ci(level, "wilson")
+    return float(interval.low), float(interval.high)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class Yielded(NamedTuple):
 
 def made() -> list[Yielded]:
     """Every call of ``AuditFinding`` in the room, with the kinds that it can give."""
-    found: list[Yielded] = []
+    calls: list[Yielded] = []
     for path in sorted(ROOM.glob("*.py")):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for function in [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]:
@@ -40,8 +40,8 @@ def made() -> list[Yielded]:
                 if isinstance(call.func, ast.Name) and call.func.id == "AuditFinding":
                     who, kind = call.args[0], call.args[1]
                     kinds = texts(kind) or handed_in(tree, function, kind)
-                    found.append(Yielded(f"{path.name}:{call.lineno}", kinds, texts(who), len(call.args)))
-    return found
+                    calls.append(Yielded(f"{path.name}:{call.lineno}", kinds, texts(who), len(call.args)))
+    return calls
 
 
 def texts(node: ast.expr) -> tuple[str, ...]:

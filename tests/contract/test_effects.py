@@ -222,14 +222,14 @@ def test_is_recovered_where_the_plan_sees_it_and_refused_where_not(name: str, rn
         with pytest.raises(NotIdentified):
             fit_lot(fitted, RICH, output, nonlinear={name: values})
         return
-    found = fit_lot(fitted, RICH, output, nonlinear={name: values})
+    fit = fit_lot(fitted, RICH, output, nonlinear={name: values})
     second_order = 1e-3 * 1e-3  # a station's effect goes through K, which is itself found beside it
-    assert np.max(np.abs(found.residuals)) < (1e-8 if isinstance(effect, SensorEffect) else second_order)
+    assert np.max(np.abs(fit.residuals)) < (1e-8 if isinstance(effect, SensorEffect) else second_order)
     if isinstance(effect, StationEffect):
-        assert np.allclose(found.shared, truth[0], rtol=5e-3, atol=1e-8)
+        assert np.allclose(fit.shared, truth[0], rtol=5e-3, atol=1e-8)
     if isinstance(effect, SensorEffect) and name not in BASE:
-        at = [k for k, (e, _) in enumerate(found.names[0]) if e == name]
-        assert np.allclose(found.coefficients[..., at], truth, rtol=1e-4, atol=1e-8)
+        at = [k for k, (e, _) in enumerate(fit.names[0]) if e == name]
+        assert np.allclose(fit.coefficients[..., at], truth, rtol=1e-4, atol=1e-8)
 
 
 def six_faces() -> pd.DataFrame:

@@ -18,10 +18,10 @@ REAL = [n for n in profile_names() if load_profile(n).registers and load_profile
 
 @pytest.fixture(scope="module")
 def program():
-    found = shutil.which("mbpoll")
-    if found is None:
+    path = shutil.which("mbpoll")
+    if path is None:
         pytest.skip("mbpoll is not installed; 'make debian' as root installs it")
-    return found
+    return path
 
 
 def mbpoll(program, port, device_id, address, count, kind, *more):
@@ -53,11 +53,11 @@ def test_mbpoll_reads_what_the_profile_says(name, program):
         for register in bank._registers:
             if register.access == "write":
                 continue
-            found, problem = mbpoll(
+            texts, problem = mbpoll(
                 program, server.port, device_id, register.address, register.words, KINDS[register.space]
             )
-            assert len(found) == register.words, (register.name, problem)
-            words = [int(text, 0) for text in found]
+            assert len(texts) == register.words, (register.name, problem)
+            words = [int(text, 0) for text in texts]
             told = [w for _, part in bank.read(register.address, register.words, register.space) for w in part]
             assert words == told, register.name
             value = bank._sources[register.name]()
@@ -88,6 +88,6 @@ def test_mbpoll_finds_nothing_in_spaces_that_the_profile_does_not_have(name, pro
     address = profile.registers[0].address
     with PlantServer(plant) as server:
         for space in {"coil", "discrete", "input"} - {r.space for r in profile.registers}:
-            found, problem = mbpoll(program, server.port, device_id, address, 1, KINDS[space])
-            assert not found
+            texts, problem = mbpoll(program, server.port, device_id, address, 1, KINDS[space])
+            assert not texts
             assert "Illegal data address" in problem

@@ -42,10 +42,10 @@ def text_of(path: Path) -> str:
 
 
 def test_the_packages_listed_are_the_packages_on_disk() -> None:
-    found = {
+    on_disk = {
         ".".join(path.parent.relative_to(ROOT).parts) for top in SHIPPED for path in (ROOT / top).rglob("__init__.py")
     }
-    assert set(SETUP["packages"]) == found
+    assert set(SETUP["packages"]) == on_disk
     assert len(SETUP["packages"]) == len(set(SETUP["packages"]))
 
 
@@ -81,14 +81,14 @@ def test_every_pattern_of_package_data_finds_something() -> None:
 
 
 def test_no_file_names_an_index_or_a_path_of_a_machine() -> None:
-    found: list[str] = []
+    mentions: list[str] = []
     for path in tracked():
         text = text_of(path)
         for pattern in (MACHINE, INDEX):
             for hit in pattern.finditer(text):
                 line = text[: hit.start()].count("\n") + 1
-                found.append(f"{path.relative_to(ROOT)}:{line}: {hit[0]!r}")
-    assert found == []
+                mentions.append(f"{path.relative_to(ROOT)}:{line}: {hit[0]!r}")
+    assert mentions == []
 
 
 def test_the_patterns_find_what_they_are_for() -> None:

@@ -41,7 +41,7 @@ def texts(tree: ast.Module) -> Iterator[str]:
 def quoted(text: str) -> list[str]:
     """The commands within a text: between quotes, or from the name of the program to the end of the line."""
     pattern = rf"'(tumbleline (?:{NAMES})\b[^'\n]*)'|^ *(tumbleline (?:{NAMES})\b.*)$"
-    return [found[0] or found[1] for found in re.findall(pattern, text, re.MULTILINE)]
+    return [groups[0] or groups[1] for groups in re.findall(pattern, text, re.MULTILINE)]
 
 
 NAMES = "|".join(re.escape(name) for name in COMMANDS)

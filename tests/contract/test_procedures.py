@@ -282,13 +282,13 @@ def take(folder: Path, name: str, sink) -> None:
 
 def test_the_parts_are_checked_with_the_key_that_is_wrong(tmp_path: Path) -> None:
     path = tmp_path / "recipe.toml"
-    for text, found in (
+    for text, message in (
         ('kind = "swep"', "did you mean 'sweep'|sweep"),
         ('kind = "tilt"\nstep_deg = 17.0', "a whole number"),
         ('kind = "sweep"\neffects = ["two_pol"]', "two_pole"),
     ):
         path.write_text(HEAD + f"\n[[procedures]]\n{text}\n")
-        with pytest.raises(RecipeInvalid, match=found):
+        with pytest.raises(RecipeInvalid, match=message):
             parts_of(load_recipe(str(path)))
 
 

@@ -116,8 +116,8 @@ def test_words_on_the_wire_are_those_of_the_f4t_low_word_first():
         answer = connection.recv(64)
     transaction, _, length, device_id, function, size, low, high = struct.unpack(">HHHBBBHH", answer)
     assert (transaction, length, device_id, function, size) == (7, 7, 3, 3, 4)
-    found = struct.unpack(">f", struct.pack(">HH", high, low))[0]
-    assert found == plant.fixture.chamber.set_point
+    set_point = struct.unpack(">f", struct.pack(">HH", high, low))[0]
+    assert set_point == plant.fixture.chamber.set_point
 
 
 def test_half_a_register_is_not_written(name, served):

@@ -89,12 +89,12 @@ def test_no_other_module_lists_the_columns():
     """Two columns of quantities on neighbouring lines as texts are a list by hand."""
     names = [row.column for row in RECORDED if row.attribute and row.column not in NEVER_NAMED]
     text = re.compile("|".join(f'"{name}"' for name in names))
-    found = set()
+    modules = set()
     for folder in ("inertial", "pipelines", "schemas", "stations"):
         for path in (ROOT / folder).rglob("*.py"):
             lines = [
                 k for k, line in enumerate(path.read_text(encoding="utf-8").splitlines()) for _ in text.findall(line)
             ]
             if any(b - a <= 1 for a, b in pairwise(lines)):
-                found.add(path.relative_to(ROOT).as_posix())
-    assert found <= HERE
+                modules.add(path.relative_to(ROOT).as_posix())
+    assert modules <= HERE

@@ -32,9 +32,9 @@ def test_every_page_of_the_documents_is_in_the_navigation(staged: Path) -> None:
 
 
 def test_every_module_of_the_science_has_a_page(staged: Path) -> None:
-    found = {path.stem for path in (staged / "docs" / "reference" / "inertial").glob("inertial*.md")}
-    assert found == set(modules())
-    assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.second_order"} <= found
+    pages = {path.stem for path in (staged / "docs" / "reference" / "inertial").glob("inertial*.md")}
+    assert pages == set(modules())
+    assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.second_order"} <= pages
 
 
 def test_every_relative_link_of_a_staged_page_leads_to_a_file(staged: Path) -> None:
@@ -87,10 +87,10 @@ def results_of(word: str, page: Path) -> int:
         opened.goto(page.as_uri())
         opened.fill("input.md-search__input", word, timeout=120_000)
         opened.wait_for_selector(".md-search-result__item", timeout=120_000)
-        found = opened.locator(".md-search-result__item").count()
+        count = opened.locator(".md-search-result__item").count()
         browser.close()
     assert [address for address in asked if not address.startswith(("file:", "data:", "blob:"))] == []
-    return found
+    return count
 
 
 @BUILT

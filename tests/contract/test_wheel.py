@@ -102,17 +102,17 @@ def test_every_file_that_is_used_by_name_is_read_from_the_wheel(unpacked: Path, 
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert found.pop("from") == [str(unpacked)]
-    assert "production" in found["recipes"]
-    assert {"consumer", "industrial", "navigation"} <= set(found["limits"])
+    loaded = json.loads(done.stdout)
+    assert loaded.pop("from") == [str(unpacked)]
+    assert "production" in loaded["recipes"]
+    assert {"consumer", "industrial", "navigation"} <= set(loaded["limits"])
     for key, folder, suffix in (
         ("presets", "stations/plant/presets", ".toml"),
         ("profiles", "stations/profiles", ".toml"),
         ("pages", "pipelines/report", ".html"),
     ):
-        assert len(found[key]) == len([p for p in tracked(folder) if p.suffix == suffix]), key
-    assert "doctor" in found["commands"]
+        assert len(loaded[key]) == len([p for p in tracked(folder) if p.suffix == suffix]), key
+    assert "doctor" in loaded["commands"]
 
 
 def test_metadata_say_what_was_tested(unpacked: Path) -> None:

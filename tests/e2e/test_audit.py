@@ -53,8 +53,8 @@ def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
 
 def told(folder: Path) -> str:
     """The whole document of an audit, as text."""
-    found = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
-    return json.dumps(json_value(document(found, findings(found), "archive")), sort_keys=True)
+    audited = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
+    return json.dumps(json_value(document(audited, findings(audited), "archive")), sort_keys=True)
 
 
 def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, typed, tmp_path):
@@ -95,10 +95,10 @@ def test_only_changed_runs_are_read_again_and_a_changed_byte_leaves_out_its_run(
     run = sorted(path.name for path in (copy / "runs").iterdir())[3]
     table = copy / "runs" / run / "figures.parquet"
     table.write_bytes(table.read_bytes()[:-1] + b"x")
-    found = audit(Archive(copy), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
-    assert [name for name, _ in found.problems] == [run]
-    assert [f.subject for f in findings(found) if f.who == "archive"] == [run]
-    assert run not in set(found.all.run)
+    audited = audit(Archive(copy), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
+    assert [name for name, _ in audited.problems] == [run]
+    assert [f.subject for f in findings(audited) if f.who == "archive"] == [run]
+    assert run not in set(audited.all.run)
     shutil.rmtree(copy / "runs" / run)
     again = up_to_date(Archive(copy))
     assert run not in again.table("runs").column("run").to_pylist()
@@ -260,9 +260,9 @@ def test_rules_say_what_is_wrong_with_them(tmp_path):
 def test_every_hidden_event_of_some_years_is_found(tmp_path):
     folder = tmp_path / "archive"
     truth = write_archive(folder, 500, years=5.0, seed=2, workers=2)
-    found = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of("2026-01-04")))
+    audited = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of("2026-01-04")))
     by_kind: dict[str, list] = {}
-    for finding in findings(found):
+    for finding in findings(audited):
         by_kind.setdefault(finding.kind, []).append(finding)
     assert {f.subject for f in by_kind["exchanged"]} == set(truth["swap"]["units"])
     assert {f.evidence["run"] for f in by_kind["exchanged"]} == {truth["swap"]["run"]}
@@ -272,16 +272,16 @@ def test_every_hidden_event_of_some_years_is_found(tmp_path):
     assert moved.evidence["earliest"] <= truth["level"]["date"][:10] <= moved.evidence["latest"]
     assert moved.evidence["shift_urad"] == pytest.approx(300.0, abs=20.0)
     level_day = day_of(truth["level"]["date"])
-    since = (found.all.station == "line-2") & (found.all.day >= level_day) & found.product
-    assert set(moved.units) == {str(unit) for unit in found.all.unit[since]}
+    since = (audited.all.station == "line-2") & (audited.all.day >= level_day) & audited.product
+    assert set(moved.units) == {str(unit) for unit in audited.all.unit[since]}
     [knocked] = by_kind["slot_moved"]
     assert knocked.evidence["where"] == f"slot {truth['slot']['slot']}"
     assert knocked.evidence["earliest"] <= truth["slot"]["date"][:10] <= knocked.evidence["latest"]
     assert [f.subject for f in by_kind["odd_lot"]] == [truth["bad_lot"]["run"]]
-    assert {study.first_day for study in found.studies} != set()
+    assert {study.first_day for study in audited.studies} != set()
     assert "standard" not in by_kind  # the check standards of this factory stand still
     assert "foreign" not in by_kind
-    assert date_of(found.scope.until) == "2026-01-04"
+    assert date_of(audited.scope.until) == "2026-01-04"
 
 
 @pytest.mark.slow
@@ -316,8 +316,8 @@ def test_an_archive_in_an_object_store_gives_the_same_audit_and_answers(made, mo
                     place = place / part
                 place.write_bytes(path.read_bytes())
         scope = Scope(day_of("2021-01-01"), day_of(UNTIL))
-        found = audit(store, load_rules(), scope)
-        assert json.dumps(json_value(document(found, findings(found), "archive")), sort_keys=True) == told(made)
+        audited = audit(store, load_rules(), scope)
+        assert json.dumps(json_value(document(audited, findings(audited), "archive")), sort_keys=True) == told(made)
         assert up_to_date(store).made == 0
         for question in (
             "SELECT run, unit, bias_x FROM parameters ORDER BY ALL",

@@ -46,8 +46,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def content(root: Path) -> dict[str, bytes]:
     """Every file of an archive but the derived ones."""
-    found = {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
-    return {name: data for name, data in found.items() if not name.startswith("index/")}
+    files = {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+    return {name: data for name, data in files.items() if not name.startswith("index/")}
 
 
 def test_a_copy_restored_is_the_archive_byte_for_byte(made: Path, tmp_path: Path) -> None:

@@ -217,8 +217,8 @@ def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given(folder: 
     words = ("plate.csv", "--map", "x=x,y=y,z=z,dwell=label", "--units", "output=g", "--rate", "100", "--unit", "P")
     known = ("--poses", ",".join(poses), "--local-g", "9.80665")
     with_headings = document(run("import", *words, *known, "--headings", ",".join(headings), "--json"))
-    found = document(run("diagnose", with_headings["run"], "--json"))
-    assert [group["effects"] for group in found["classes"]] == [["level_error"]]
+    diagnosis = document(run("diagnose", with_headings["run"], "--json"))
+    assert [group["effects"] for group in diagnosis["classes"]] == [["level_error"]]
     fitted = document(run("fit", with_headings["run"], "--effects", "bias,scale,misalignment,level_error", "--json"))
     assert fitted["adequate"] is True
     rows_of = Archive(None).run(fitted["run"]).table("coefficients")

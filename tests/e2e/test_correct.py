@@ -100,14 +100,14 @@ def test_the_covariance_of_the_noise_covers_the_error(run: Run, rng: np.random.G
         force = rng.normal(size=(60, 3))
         table = raw(run, force, rng.uniform(0.0, 50.0, 60), rng, np.zeros(3), noise_g=0.0, unit=u)
         state = State(force=np.zeros((60, 3)), time=np.arange(60.0), temperature=table["unit_C"].to_numpy())
-        found = correct_output(
+        corrected = correct_output(
             calibration.effects, state, table[["x", "y", "z"]].to_numpy(), calibration.coefficients[u], {}
         )
-        seen = replace(state, force=found)
+        seen = replace(state, force=corrected)
         own = output_covariance(
             calibration.effects, seen, calibration.coefficients[u], {}, covariance.reshape(3 * p, -1)
         )
-        pulls.append((found - force) / np.sqrt(np.diagonal(own, axis1=1, axis2=2) + (0.29 / LSB_PER_G) ** 2))
+        pulls.append((corrected - force) / np.sqrt(np.diagonal(own, axis1=1, axis2=2) + (0.29 / LSB_PER_G) ** 2))
     assert 0.65 < np.sqrt(np.mean(np.square(pulls))) < 1.35  # 45 coefficients were drawn
 
 
@@ -118,12 +118,12 @@ def test_the_arithmetic_is_that_of_the_exported_c(run: Run, tmp_path: Path, rng:
     )
     table.to_csv(tmp_path / "a.csv", index=False)
     correct(run, str(tmp_path / "a.csv"), "--calibration", "latest:A1", "-o", str(tmp_path / "o.parquet"))
-    found = pd.read_parquet(tmp_path / "o.parquet")[["force_x_g", "force_y_g", "force_z_g"]].to_numpy()
+    corrected = pd.read_parquet(tmp_path / "o.parquet")[["force_x_g", "force_y_g", "force_z_g"]].to_numpy()
     unit = unit_calibrations(run, ("A1",), failed=True)
     for arithmetic, call, within in (("double", REAL.replace("REAL", "double"), 1e-9), ("q24", FIXED, 1e-6)):
         header = export_text("c", unit, run.id, ExportSettings(arithmetic=arithmetic))
         own = compiled(header, call, table[["x", "y", "z", "unit_C"]].to_numpy(), tmp_path, "A1")
-        assert np.max(np.abs(own - found)) < within
+        assert np.max(np.abs(own - corrected)) < within
 
 
 def test_the_bias_is_found_where_the_force_is_known_and_its_uncertainty_grows_after(
@@ -181,13 +181,13 @@ def test_a_gap_in_the_recording_changes_neither_steps_nor_uncertainty(
     n = 6000
     table = raw(run, np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 25.0), rng, np.zeros(3))
     later = table.assign(time_s=table["time_s"] + 600.0 * (np.arange(n) >= n // 2))
-    words, found = ["--calibration", "latest:A1", "--turn-on", "300", "--force", "0,0,1"], []
+    words, uncertainties = ["--calibration", "latest:A1", "--turn-on", "300", "--force", "0,0,1"], []
     for name, one in (("whole", table), ("gap", later)):
         one.to_csv(tmp_path / f"{name}.csv", index=False)
         document, _ = correct(run, str(tmp_path / f"{name}.csv"), *words, "-o", str(tmp_path / f"{name}.parquet"))
         assert document["bias"]["steps"] == 60
-        found.append(pd.read_parquet(tmp_path / f"{name}.parquet")["u_x_ug"].to_numpy())
-    whole, gap = found
+        uncertainties.append(pd.read_parquet(tmp_path / f"{name}.parquet")["u_x_ug"].to_numpy())
+    whole, gap = uncertainties
     np.testing.assert_allclose(gap[: n // 2], whole[: n // 2], rtol=1e-6)
     assert gap[n // 2] > whole[n // 2]  # the bias has drifted meanwhile
 
@@ -201,10 +201,10 @@ def test_samples_after_the_last_whole_step_have_the_uncertainty_of_their_time(
     table.to_csv(tmp_path / "a.csv", index=False)
     words = ["--calibration", "latest:A1", "--turn-on", "300", "--force", "0,0,1", "-o", str(tmp_path / "o.parquet")]
     document, _ = correct(run, str(tmp_path / "a.csv"), *words)
-    found = pd.read_parquet(tmp_path / "o.parquet")
-    own = found["u_bias_x_ug"].to_numpy()
+    corrected = pd.read_parquet(tmp_path / "o.parquet")
+    own = corrected["u_bias_x_ug"].to_numpy()
     assert np.all(own[-tail:] > 1.5 * own[-tail - 1])
-    assert not found["updated"][-tail:].any()
+    assert not corrected["updated"][-tail:].any()
     assert (document["bias"]["updates"], document["bias"]["steps"]) == (60, 61)
     assert document["bias"]["u_last_ug"]["x"] == pytest.approx(own[-1])
 

@@ -45,8 +45,8 @@ def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], t
 
 
 def examples(page: str) -> list[tuple[str, str]]:
-    found = re.findall(r"```console\n\$ ([^\n]*)\n(.*?)```", page, flags=re.DOTALL)
-    return [(command, printed) for command, printed in found]
+    blocks = re.findall(r"```console\n\$ ([^\n]*)\n(.*?)```", page, flags=re.DOTALL)
+    return [(command, printed) for command, printed in blocks]
 
 
 def lines(text: str) -> list[str]:

@@ -37,8 +37,8 @@ def test_an_example_prints_what_the_guide_says(line: str, printed: str, shared_d
     assert done.returncode == (1 if "NOT ADEQUATE" in printed else 0)
     expected = re.escape(printed.strip()).replace("…", "[0-9a-f]+")
     own = done.stdout.replace(str(shared_data), "$DATA").replace(f" --archive {tmp_path / 'archive'}", "")
-    found = "\n".join(line.rstrip() for line in own.strip().splitlines())
-    assert re.fullmatch(expected, found), done.stdout
+    output = "\n".join(line.rstrip() for line in own.strip().splitlines())
+    assert re.fullmatch(expected, output), done.stdout
 
 
 @pytest.fixture(scope="module")

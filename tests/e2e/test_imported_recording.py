@@ -57,8 +57,8 @@ def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate(
     assert (first["adequate"], status) == (False, 1)
     fresh, _ = imported(DRIFTING, 72, tmp_path)
 
-    found, _ = document("diagnose", first["run"], archive=archive)
-    assert found["recommended"] == ["warm_up"]
+    diagnosis, _ = document("diagnose", first["run"], archive=archive)
+    assert diagnosis["recommended"] == ["warm_up"]
     assert run("extend", model, "warm_up", "--effects", PLAIN, "--run", first["run"], archive=archive).exit_code == 2
     assert CliRunner().invoke(app, ["extend", str(model), "warm_up", "--effects", PLAIN]).exit_code == 0
 

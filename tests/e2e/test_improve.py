@@ -181,9 +181,9 @@ def test_a_removed_effect_is_a_new_version_and_stays_in_the_history(tmp_path: Pa
     document = json.loads(out)
     assert status == 0
     assert (document["version"], document["added"], document["removed"]) == (3, None, "third_order")
-    found = versions(read_model(model))
-    assert [(v.added, v.removed) for v in found] == [((), ()), (("third_order",), ()), ((), ("third_order",))]
-    assert (found[-1].change.by, found[-1].change.why) == ("R", "refuted")
+    history = versions(read_model(model))
+    assert [(v.added, v.removed) for v in history] == [((), ()), (("third_order",), ()), ((), ("third_order",))]
+    assert (history[-1].change.by, history[-1].change.why) == ("R", "refuted")
     assert "− third_order" in run("history", model)[1]
 
 

@@ -86,8 +86,8 @@ def test_a_follow_up_has_a_report_and_is_listed_and_shown(told_apart: tuple[Path
     kept = json.loads((follower.path / "inquiry.json").read_text(encoding="utf-8"))
     assert kept["runs"][0] == told_apart[1]["run"]
     assert next(info for info in archive.runs() if info.id == follower.id).finished
-    found = CliRunner().invoke(app, ["report", follower.id, "--archive", str(archive.root)])
-    assert found.exit_code == 0, found.output
+    reported = CliRunner().invoke(app, ["report", follower.id, "--archive", str(archive.root)])
+    assert reported.exit_code == 0, reported.output
     assert follower.id not in [entry.id for entry in selected(archive, ["all"])]
     shown = CliRunner().invoke(app, ["show", follower.id, "--archive", str(archive.root), "--json"])
     assert shown.exit_code in (0, 1), shown.output

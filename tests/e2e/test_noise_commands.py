@@ -50,11 +50,11 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_deviations_are_those_of_allantools(record: Path) -> None:
     allantools = pytest.importorskip("allantools")
-    found = document("allan", record, "--time", "t", "--unit", "g")
+    allan = document("allan", record, "--time", "t", "--unit", "g")
     table = pd.read_csv(record)
-    assert found["samples"] == 40_000
-    assert found["rate_hz"] == pytest.approx(RATE)
-    for curve in found["curves"]:
+    assert allan["samples"] == 40_000
+    assert allan["rate_hz"] == pytest.approx(RATE)
+    for curve in allan["curves"]:
         values = table[curve["channel"]].to_numpy()
         taus, peer, *_ = allantools.oadev(values, rate=RATE, data_type="freq", taus=curve["tau_s"])
         np.testing.assert_allclose(curve["tau_s"], taus)
@@ -81,10 +81,10 @@ def test_terms_have_a_value_or_a_limit(record: Path) -> None:
 
 
 def test_the_density_gives_the_deviation_and_the_level_of_white_noise(record: Path) -> None:
-    found = document("psd", record, "--rate", "100", "--columns", "ax", "--unit", "g")["spectra"][0]
-    assert found["median_amplitude"] == pytest.approx(N * np.sqrt(2.0), rel=0.03)
-    np.testing.assert_allclose(found["deviation_from_density"], found["deviation"], rtol=0.15)
-    np.testing.assert_allclose(found["deviation"], N / np.sqrt(found["tau_s"]), rtol=0.15)
+    spectrum = document("psd", record, "--rate", "100", "--columns", "ax", "--unit", "g")["spectra"][0]
+    assert spectrum["median_amplitude"] == pytest.approx(N * np.sqrt(2.0), rel=0.03)
+    np.testing.assert_allclose(spectrum["deviation_from_density"], spectrum["deviation"], rtol=0.15)
+    np.testing.assert_allclose(spectrum["deviation"], N / np.sqrt(spectrum["tau_s"]), rtol=0.15)
 
 
 def test_plots_and_pages_are_written(record: Path, tmp_path: Path) -> None:

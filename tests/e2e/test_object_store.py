@@ -25,10 +25,10 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def query() -> Iterator[str]:
-    with pytest.MonkeyPatch.context() as patch, s3_bucket() as found:
+    with pytest.MonkeyPatch.context() as patch, s3_bucket() as bucket_query:
         for name, value in CREDENTIALS.items():
             patch.setenv(name, value)
-        yield found
+        yield bucket_query
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +99,8 @@ def test_a_rerun_a_verification_and_a_lineage_work_there(address: str, local: Ru
     report = ask(address, "verify")
     assert (report["whole"], report["findings"], report["runs"]) == (True, [], before + 1)
     assert report["rows"] > 0
-    found = ask(address, "lineage", local.id)
-    assert {step["name"] for step in found["steps"]} >= {"capture", "fit", "grade"}
+    lineage = ask(address, "lineage", local.id)
+    assert {step["name"] for step in lineage["steps"]} >= {"capture", "fit", "grade"}
 
 
 def test_a_changed_object_and_a_missing_one_are_found(query: str, tmp_path: Path) -> None:
@@ -109,8 +109,8 @@ def test_a_changed_object_and_a_missing_one_are_found(query: str, tmp_path: Path
     path = store.run("latest").path
     (path / "noise.parquet").write_bytes((path / "noise.parquet").read_bytes()[:-5] + b"spoil")
     (path / "wander.parquet").unlink()
-    found = {(f["kind"], f["path"].rpartition("/")[2]) for f in ask(store.address, "verify")["findings"]}
-    assert found == {("changed", "noise.parquet"), ("missing", "wander.parquet")}
+    findings = {(f["kind"], f["path"].rpartition("/")[2]) for f in ask(store.address, "verify")["findings"]}
+    assert findings == {("changed", "noise.parquet"), ("missing", "wander.parquet")}
 
 
 def test_clean_takes_away_claims_of_dead_processes_there(query: str, monkeypatch: pytest.MonkeyPatch) -> None:

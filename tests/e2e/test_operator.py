@@ -173,10 +173,10 @@ def answered(environment: dict[str, str]) -> str:
     """What a flow run asked; it is answered."""
     end = time.monotonic() + 120.0
     while time.monotonic() < end:
-        found = operator(environment)["waiting"]
-        if found:
-            assert operator(environment, found[0]["id"], "--go")["answered"] == "go"
-            return found[0]["question"]
+        waiting = operator(environment)["waiting"]
+        if waiting:
+            assert operator(environment, waiting[0]["id"], "--go")["answered"] == "go"
+            return waiting[0]["question"]
         time.sleep(0.2)
     pytest.fail("no flow run asked for anything")
 

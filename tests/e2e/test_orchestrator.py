@@ -28,10 +28,10 @@ DEPLOYMENTS = ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audi
 def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
     """One server for the tests of this file, with the deployments of the product."""
     home = tmp_path_factory.mktemp("orchestrator")
-    with served(home, PREFECT_UI_STATIC_DIRECTORY=str(home / "ui")) as found:
-        names = python(found.environment, "-m", "pipelines.flows.deploy", "deploy/prefect.yaml").split()
+    with served(home, PREFECT_UI_STATIC_DIRECTORY=str(home / "ui")) as server:
+        names = python(server.environment, "-m", "pipelines.flows.deploy", "deploy/prefect.yaml").split()
         assert names == DEPLOYMENTS
-        yield found
+        yield server
 
 
 def variable(line: Orchestrator, name: str, **how: str) -> int:
@@ -43,9 +43,9 @@ def variable(line: Orchestrator, name: str, **how: str) -> int:
 
 
 def test_scheduled_runs_of_the_line_appear(line: Orchestrator) -> None:
-    found = line.until(lambda: line.runs("production-line", "SCHEDULED"), "a scheduled run of the line", 60.0)
-    assert found[0]["auto_scheduled"]
-    assert found[0]["expected_start_time"][11:19] == "06:00:00"
+    scheduled = line.until(lambda: line.runs("production-line", "SCHEDULED"), "a scheduled run of the line", 60.0)
+    assert scheduled[0]["auto_scheduled"]
+    assert scheduled[0]["expected_start_time"][11:19] == "06:00:00"
 
 
 def test_a_request_with_the_key_from_the_own_page_changes_state(line: Orchestrator) -> None:
@@ -122,8 +122,8 @@ def test_the_files_of_the_server_are_its_own(line: Orchestrator) -> None:
 def test_the_queue_of_the_station_takes_one_run_at_a_time(line: Orchestrator) -> None:
     status, queue = line.ask("/api/work_pools/line/queues/line-1")
     assert (status, queue["concurrency_limit"]) == (200, 1)
-    _, found = line.ask("/api/deployments/filter", {})
-    assert {one["name"]: one["work_queue_name"] for one in found} == {
+    _, deployments = line.ask("/api/deployments/filter", {})
+    assert {one["name"]: one["work_queue_name"] for one in deployments} == {
         "production-line": "line-1",
         "on-demand": "line-1",
         "weekly-audit": "audits",
@@ -131,12 +131,12 @@ def test_the_queue_of_the_station_takes_one_run_at_a_time(line: Orchestrator) ->
 
 
 def test_flows_are_found_by_their_module_so_that_their_folder_hides_no_module_of_python(line: Orchestrator) -> None:
-    _, found = line.ask("/api/deployments/filter", {})
-    assert {one["entrypoint"] for one in found} == {
+    _, deployments = line.ask("/api/deployments/filter", {})
+    assert {one["entrypoint"] for one in deployments} == {
         "pipelines.flows.calibrate.calibrate_lot",
         "pipelines.flows.audit.audit_archive",
     }
-    assert {one["job_variables"]["working_dir"] for one in found} == {str(ROOT)}
+    assert {one["job_variables"]["working_dir"] for one in deployments} == {str(ROOT)}
 
 
 CLOSING = """
@@ -181,19 +181,19 @@ def test_runs_whose_process_is_gone_are_closed_and_others_left_alone(line: Orche
         process.kill()
     assert sorted(closed) == ["another-process", "never-began", "of-this-worker", "power-cut", "waits-without-process"]
     assert missed == []
-    states = {name: line.ask(f"/api/flow_runs/{found}")[1]["state_type"] for name, found in runs.items()}
+    states = {name: line.ask(f"/api/flow_runs/{run_id}")[1]["state_type"] for name, run_id in runs.items()}
     assert {name for name, state in states.items() if state == "CRASHED"} == set(closed)
-    for found in (*runs.values(), alive):
-        line.ask(f"/api/flow_runs/{found}", method="DELETE")
+    for run_id in (*runs.values(), alive):
+        line.ask(f"/api/flow_runs/{run_id}", method="DELETE")
 
 
 def test_credentials_are_refused_as_a_parameter_of_a_flow_and_not_stored(line: Orchestrator) -> None:
     secret = "wJalrXUtnFEMI"
-    _, found = line.ask("/api/deployments/name/calibrate_lot/on-demand")
+    _, deployment = line.ask("/api/deployments/name/calibrate_lot/on-demand")
     parameters = {"archive": f"s3://AKIA:{secret}@factory/archive"}
-    status, told = line.ask(f"/api/deployments/{found['id']}/create_flow_run", {"parameters": parameters})
+    status, told = line.ask(f"/api/deployments/{deployment['id']}/create_flow_run", {"parameters": parameters})
     assert (status, told["exception_message"]) == (422, REFUSED)
-    status, _ = line.ask(f"/api/deployments/{found['id']}", {"parameters": parameters}, "PATCH")
+    status, _ = line.ask(f"/api/deployments/{deployment['id']}", {"parameters": parameters}, "PATCH")
     assert status == 422
     assert [path.name for path in line.home.iterdir() if path.is_file() and secret.encode() in path.read_bytes()] == []
 
@@ -232,8 +232,8 @@ def test_doctor_finds_the_server_good_and_a_wrong_key_at_fault(
     for name in ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING"):
         monkeypatch.setenv(name, line.environment[name])
     monkeypatch.delenv("PREFECT_SERVER_API_AUTH_STRING", raising=False)
-    found = {check.check: check.state for check in orchestrator_checks()}
-    assert found == dict.fromkeys(("reachable", "database", "authenticated", "version", "clock"), "good")
+    states = {check.check: check.state for check in orchestrator_checks()}
+    assert states == dict.fromkeys(("reachable", "database", "authenticated", "version", "clock"), "good")
     monkeypatch.setenv("PREFECT_API_AUTH_STRING", "line:" + "x" * 32)
     faults = [check for check in orchestrator_checks() if check.state == "fault"]
     assert [(check.check, check.found) for check in faults] == [("authenticated", "the key is refused (401)")]

@@ -46,9 +46,9 @@ def test_the_spreadsheet_becomes_a_model_as_the_page_says(tmp_path: Path, monkey
     table = re.search(r"```csv\n(.*?)```", SHEET, flags=re.DOTALL)
     assert table is not None
     Path("positions.csv").write_text(table[1], encoding="utf-8")
-    found = commands(SHEET)
-    assert len(found) == 4
-    for command, printed in found:
+    examples = commands(SHEET)
+    assert len(examples) == 4
+    for command, printed in examples:
         status, out = run(command)
         assert status == (1 if "NOT ADEQUATE" in printed else 0)
         assert re.search(told(printed), out), (command, out)
@@ -68,9 +68,9 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_command_of_the_auditor_runs(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(archive)
     monkeypatch.setenv(VARIABLE, "")
-    found = commands(AUDITOR)
-    assert len(found) == 5
-    for command, _ in found:
+    examples = commands(AUDITOR)
+    assert len(examples) == 5
+    for command, _ in examples:
         status, out = run(command)
         assert status in {0, 1}, (command, status, out)
         assert out, command

@@ -39,17 +39,17 @@ def test_the_command_of_the_page_that_tells_rivals_apart_finds_what_it_says(tmp_
     document = json.loads(done.stdout)
     assert min(row["chi_square"] for row in document["rivals"]) >= 50.0
     assert max(row["textbook"] for row in document["rivals"]) < 1e-3
-    found = re.search(r"(\d+) dwells of 2 s at 25 °C, in (\d+) % of its time, give χ² (\d+)", PAGE)
-    assert found is not None
-    assert document["dwells"] == pytest.approx(int(found[1]), abs=4)
-    assert 100.0 * document["share"] == pytest.approx(int(found[2]), abs=1.0)
-    assert min(row["chi_square"] for row in document["rivals"]) == pytest.approx(float(found[3]), rel=0.2)
+    match = re.search(r"(\d+) dwells of 2 s at 25 °C, in (\d+) % of its time, give χ² (\d+)", PAGE)
+    assert match is not None
+    assert document["dwells"] == pytest.approx(int(match[1]), abs=4)
+    assert 100.0 * document["share"] == pytest.approx(int(match[2]), abs=1.0)
+    assert min(row["chi_square"] for row in document["rivals"]) == pytest.approx(float(match[3]), rel=0.2)
 
 
 def test_every_picture_of_the_page_is_there_and_small():
-    found = re.findall(r"\]\(\.\./pictures/(.*?)\)", PAGE)
-    assert len(found) == 4
-    for name in found:
+    pictures = re.findall(r"\]\(\.\./pictures/(.*?)\)", PAGE)
+    assert len(pictures) == 4
+    for name in pictures:
         assert (ROOT / "docs" / "pictures" / name).stat().st_size < 150_000
 
 

@@ -36,15 +36,15 @@ def optimised(folder, *options):
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
+def optimal(tmp_path_factory):
     """The cheapest recipe with errors up to four times the textbook plan's: little to search."""
     done, target = optimised(tmp_path_factory.mktemp("optimal"), "--factor", "4")
     assert done.exit_code == 0, done.exception
     return json.loads(done.stdout), target
 
 
-def test_the_recipe_that_is_written_is_what_was_told(found):
-    document, target = found
+def test_the_recipe_that_is_written_is_what_was_told(optimal):
+    document, target = optimal
     recipe = load_recipe(str(target))
     told = json.loads(CliRunner().invoke(app, ["plan", str(target), "--device", "analogue", "--json"]).stdout)
     assert told["minutes"] == document["minutes"]
@@ -65,8 +65,8 @@ def test_the_line_after_a_search_measures_the_new_recipe(tmp_path):
     assert CliRunner().invoke(app, [*words, "--direct", "--archive", str(tmp_path / "archive")]).exit_code in {0, 1}
 
 
-def test_the_new_recipe_is_compared_with_the_own_one_and_the_textbook_plan(found):
-    document, target = found
+def test_the_new_recipe_is_compared_with_the_own_one_and_the_textbook_plan(optimal):
+    document, target = optimal
     own = json.loads(
         CliRunner().invoke(app, ["plan", "production", "--device", "analogue", "--effects", THERMAL, "--json"]).stdout
     )
@@ -90,29 +90,29 @@ def test_a_missing_limits_file_is_a_warning_that_names_the_file(tmp_path):
     assert not missing_limits(load_recipe(), tmp_path)
 
 
-def test_every_coefficient_is_as_good_as_wanted_in_less_time(found):
-    document, _ = found
+def test_every_coefficient_is_as_good_as_wanted_in_less_time(optimal):
+    document, _ = optimal
     assert all(row["uncertainty_ug"] <= row["wanted_ug"] for row in document["coefficients"])
     assert len(document["coefficients"]) == 18
     assert document["share"] < 0.6
 
 
-def test_soaks_come_back_and_begin_and_end_with_one_reference_pose(found):
-    recipe = load_recipe(str(found[1]))
+def test_soaks_come_back_and_begin_and_end_with_one_reference_pose(optimal):
+    recipe = load_recipe(str(optimal[1]))
     assert len(set(recipe.temperatures_C)) < len(recipe.temperatures_C)
     ends = {pose.name for k in range(len(recipe.soaks)) for pose in (recipe.poses_at(k)[0], recipe.poses_at(k)[-1])}
     assert len(ends) == 1
 
 
-def test_ageing_and_hysteresis_stay_visible_and_more_physics_than_on_faces(found):
-    seen = {row["effect"]: row for row in found[0]["plan"]["effects"]}
+def test_ageing_and_hysteresis_stay_visible_and_more_physics_than_on_faces(optimal):
+    seen = {row["effect"]: row for row in optimal[0]["plan"]["effects"]}
     for effect in ("aging_linear", "thermal_hysteresis", "cross_coupling", "third_order"):
         assert seen[effect]["left"] > 0.1, effect
-    assert "cross_coupling" in found[0]["seen_besides"]
+    assert "cross_coupling" in optimal[0]["seen_besides"]
 
 
-def test_verification_poses_are_kept_apart_from_those_of_the_fit(found):
-    recipe = load_recipe(str(found[1]))
+def test_verification_poses_are_kept_apart_from_those_of_the_fit(optimal):
+    recipe = load_recipe(str(optimal[1]))
     fit, check = (
         force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in poses]).T)
         for poses in (recipe.poses, recipe.verification)
@@ -121,19 +121,19 @@ def test_verification_poses_are_kept_apart_from_those_of_the_fit(found):
     assert np.degrees(np.arccos(np.max(check @ fit.T))) > 8.0
 
 
-def test_every_verification_pose_is_measured_as_often_as_in_the_recipe_and_at_all_soaks_alike(found):
-    base, recipe = load_recipe(), load_recipe(str(found[1]))
+def test_every_verification_pose_is_measured_as_often_as_in_the_recipe_and_at_all_soaks_alike(optimal):
+    base, recipe = load_recipe(), load_recipe(str(optimal[1]))
     taken = [[pose.name for pose in recipe.verification_at(k)] for k in range(len(recipe.soaks))]
     of_each = Counter(name for names in taken for name in names)
     assert set(of_each.values()) == {len(base.verification) // 6 * len(base.temperatures_C)}
-    assert found[0]["verification_dwells"] == sum(of_each.values())
+    assert optimal[0]["verification_dwells"] == sum(of_each.values())
     assert max(map(len, taken)) - min(map(len, taken)) <= 6
 
 
 def test_poses_for_verification_are_far_from_one_another():
     recipe = load_recipe()
-    found = apart(np.array([[0.0, 0.0], [180.0, 0.0]]), recipe.verification)
-    force = force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in found]).T)
+    poses = apart(np.array([[0.0, 0.0], [180.0, 0.0]]), recipe.verification)
+    force = force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in poses]).T)
     cosines = force @ force.T - 2.0 * np.eye(len(force))
     assert np.degrees(np.arccos(cosines.max())) > 40.0
 
@@ -215,8 +215,8 @@ def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_
     assert np.mean((seldom > 0.1) & (seldom < 0.6), axis=0).min() > 0.3  # where the two curves are apart
 
 
-def test_both_ends_of_the_range_are_met(found):
-    recipe = load_recipe(str(found[1]))
+def test_both_ends_of_the_range_are_met(optimal):
+    recipe = load_recipe(str(optimal[1]))
     assert {min(recipe.temperatures_C), max(recipe.temperatures_C)} == {-10.0, 60.0}
 
 

@@ -32,12 +32,12 @@ COMPARED = {
 
 def outputs(page: Path) -> list[tuple[str, str]]:
     """The commands of the console blocks of a page below which an output stands, with it."""
-    found: list[tuple[str, str]] = []
+    examples: list[tuple[str, str]] = []
     for block in re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
         for command, printed in re.findall(r"^\$ (tumbleline .*)\n((?:(?!\$ ).*\n)*)", block, re.MULTILINE):
             if printed.strip():
-                found.append((command.split("  #")[0].strip(), printed))
-    return found
+                examples.append((command.split("  #")[0].strip(), printed))
+    return examples
 
 
 def test_every_page_that_shows_an_output_is_compared_by_a_test() -> None:

@@ -40,21 +40,23 @@ def deployments(folder: Path) -> str:
 def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
     """A server with the deployments, without a worker; this process is a client of it."""
     home = tmp_path_factory.mktemp("rules")
-    with served(home) as found, pytest.MonkeyPatch.context() as patch:
-        own = {name: found.environment[name] for name in ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING", "PREFECT_HOME")}
+    with served(home) as server, pytest.MonkeyPatch.context() as patch:
+        own = {
+            name: server.environment[name] for name in ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING", "PREFECT_HOME")
+        }
         for name, value in own.items():
             patch.setenv(name, value)
         from prefect.settings import temporary_settings
 
         with temporary_settings(updates=own):
             register(Path(deployments(home)))
-            yield found
+            yield server
 
 
 def test_an_automation_closes_runs_without_a_heartbeat_and_is_there_once(line: Orchestrator) -> None:
     have_automation()  # again, as with every registration
-    _, found = line.ask("/api/automations/filter", {})
-    [automation] = [one for one in found if one["name"] == "tumbleline: runs without a heartbeat"]
+    _, automations = line.ask("/api/automations/filter", {})
+    [automation] = [one for one in automations if one["name"] == "tumbleline: runs without a heartbeat"]
     assert automation["enabled"]
     trigger = automation["trigger"]
     assert (trigger["posture"], trigger["within"]) == ("Proactive", 60)

@@ -157,9 +157,9 @@ def test_positions_logged_back_to_back_are_seen_and_divided(rng, monkeypatch, ca
     assert "positions logged back to back" in err
     assert "--positions 20" in err
     document = imported(tmp_path / "a.csv", tmp_path, *MAPPED, "--positions", "20")
-    found = np.array([one["mean"] for one in document["dwell_list"]])
+    means = np.array([one["mean"] for one in document["dwell_list"]])
     truth = np.array([full.output[a : a + 40].mean(axis=0) for a, _ in full.spans])
-    np.testing.assert_allclose(found, truth, atol=5.0)
+    np.testing.assert_allclose(means, truth, atol=5.0)
 
 
 def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(

@@ -20,7 +20,7 @@ def test_every_option_of_the_guide_is_one_of_the_command(command: str, monkeypat
     shown = CliRunner().invoke(app, [command, "--help"]).output
     lines = [line for line in GUIDE.splitlines() if line.startswith(f"$ tumbleline {command} ")]
     assert lines
-    for option in {found for line in lines for found in re.findall(r"(--[a-z-]+)", line)}:
+    for option in {flag for line in lines for flag in re.findall(r"(--[a-z-]+)", line)}:
         assert option in shown, option
 
 

@@ -31,8 +31,8 @@ WITHIN_S = 60.0 + 15.0
 @pytest.fixture
 def line(tmp_path: Path) -> Iterator[Orchestrator]:
     places = {"TUMBLELINE_ARCHIVE": str(tmp_path / "archive"), "TUMBLELINE_STATE": str(tmp_path / "state")}
-    with served(tmp_path / "orchestrator", **places) as found:
-        yield found
+    with served(tmp_path / "orchestrator", **places) as server:
+        yield server
 
 
 def test_schedules_and_persons_on_two_computers_get_the_station_one_after_the_other(
@@ -87,8 +87,8 @@ def long_run(line: Orchestrator, folder: Path, port: int, crashed: str) -> tuple
 
 def records(folder: Path) -> dict[str, int]:
     """Finished records of the captures of an archive, with the time at which each was published."""
-    found = (folder / "archive" / "captures").glob("*/*/record.json")
-    return {f"{path.parent.parent.name}/{path.parent.name}": path.stat().st_mtime_ns for path in found}
+    files = (folder / "archive" / "captures").glob("*/*/record.json")
+    return {f"{path.parent.parent.name}/{path.parent.name}": path.stat().st_mtime_ns for path in files}
 
 
 def test_a_run_whose_worker_was_killed_goes_on_from_its_checkpoint(line: Orchestrator, tmp_path: Path) -> None:

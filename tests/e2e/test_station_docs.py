@@ -26,8 +26,8 @@ def test_profile_of_the_guide_is_a_profile():
 
 
 def test_links_of_the_guide_are_those_of_a_station():
-    found = re.findall(r"```toml\n(\[devices.*?)```", GUIDE, re.DOTALL)
-    links = [Device.model_validate(next(iter(tomllib.loads(text)["devices"].values()))) for text in found]
+    blocks = re.findall(r"```toml\n(\[devices.*?)```", GUIDE, re.DOTALL)
+    links = [Device.model_validate(next(iter(tomllib.loads(text)["devices"].values()))) for text in blocks]
     assert [device.link for device in links] == ["rtu", "tls"]
     assert not any(device.missing() for device in links)
 

@@ -18,10 +18,10 @@ SECTIONS = {"suspenders": Suspenders, "safety": Safety, "self_test": SelfTest}
 
 
 def sections(text: str) -> dict:
-    found: dict = {}
+    merged: dict = {}
     for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL):
-        found |= tomllib.loads(block)
-    return found
+        merged |= tomllib.loads(block)
+    return merged
 
 
 def test_the_figures_that_hold_by_default_are_those_of_the_text():

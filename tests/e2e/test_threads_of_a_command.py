@@ -37,10 +37,10 @@ def threads(*words: str, change: str = "", **variables: str) -> dict:
 
 
 def test_a_command_computes_on_one_thread() -> None:
-    found = threads("plan", "production", "--json")
-    assert found["loaded"]
-    assert found["pools"]
-    assert set(found["pools"]) == {1}
+    report = threads("plan", "production", "--json")
+    assert report["loaded"]
+    assert report["pools"]
+    assert set(report["pools"]) == {1}
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="BLAS takes no second thread on one processor")

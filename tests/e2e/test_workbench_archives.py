@@ -52,8 +52,8 @@ def named(archive: Archive) -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
+    with chromium() as launched:
+        yield launched
 
 
 def run_of(bench: Served, start: str) -> str:

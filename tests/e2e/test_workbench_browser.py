@@ -89,8 +89,8 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
+    with chromium() as launched:
+        yield launched
 
 
 @pytest.fixture(scope="module")
@@ -177,10 +177,10 @@ def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
 
 def floors_of(one: Tab) -> dict[str, float]:
     """Smallest detected size of every visible effect on the page of a plan, µg."""
-    found = one.page.evaluate(
+    pairs = one.page.evaluate(
         "() => [...document.querySelectorAll('tr[data-effect]')].map((e) => [e.dataset.effect, e.dataset.floor])"
     )
-    return {effect: float(floor) for effect, floor in found if floor}
+    return {effect: float(floor) for effect, floor in pairs if floor}
 
 
 def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_written(

@@ -43,8 +43,8 @@ LONG_DWELLS = (
 def line(tmp_path: Path) -> Iterator[Orchestrator]:
     """A server of its own, for workers whose archive and state lie in the test's folder."""
     places = {"TUMBLELINE_ARCHIVE": str(tmp_path / "archive"), "TUMBLELINE_STATE": str(tmp_path / "state")}
-    with served(tmp_path / "orchestrator", **places) as found:
-        yield found
+    with served(tmp_path / "orchestrator", **places) as server:
+        yield server
 
 
 def deployments(folder: Path, *changes: tuple[str, str]) -> str:
@@ -114,8 +114,8 @@ def test_a_worker_that_is_told_to_end_leaves_its_station_safe_and_its_run_is_clo
         config = modbus_station(port, limits=FAST)
         station = station_file(tmp_path, config)
         order = {"parameters": {"recipe": recipe, "station": str(station)}}
-        _, found = line.ask("/api/deployments/name/calibrate_lot/on-demand")
-        status, _ = line.ask(f"/api/deployments/{found['id']}/create_flow_run", order)
+        _, deployment = line.ask("/api/deployments/name/calibrate_lot/on-demand")
+        status, _ = line.ask(f"/api/deployments/{deployment['id']}/create_flow_run", order)
         assert status == 201
 
         def sampling() -> bool:

@@ -132,11 +132,11 @@ def word_in(rng, data):
 
 
 def number_out(rng, data):
-    found = list(NUMBER.finditer(data)) if len(data) < 200_000 else []
-    if not found:
+    matches = list(NUMBER.finditer(data)) if len(data) < 200_000 else []
+    if not matches:
         return word_in(rng, data)
-    for hit in sorted({int(k) for k in rng.integers(len(found), size=int(rng.choice([1, 1, 1, 3])))}, reverse=True):
-        data = data[: found[hit].start()] + _word(rng) + data[found[hit].end() :]
+    for hit in sorted({int(k) for k in rng.integers(len(matches), size=int(rng.choice([1, 1, 1, 3])))}, reverse=True):
+        data = data[: matches[hit].start()] + _word(rng) + data[matches[hit].end() :]
     return data
 
 
@@ -168,10 +168,10 @@ def lines_moved(rng, data):
 
 def digit(rng, data):
     """One digit another."""
-    found = [k for k, letter in enumerate(data[:100_000]) if 48 <= letter <= 57]
-    if not found:
+    places = [k for k, letter in enumerate(data[:100_000]) if 48 <= letter <= 57]
+    if not places:
         return data
-    at = found[int(rng.integers(len(found)))]
+    at = places[int(rng.integers(len(places)))]
     return data[:at] + str(int(rng.integers(10))).encode() + data[at + 1 :]
 
 

@@ -159,22 +159,22 @@ def recordings_of_others():
     names = list(frame)
     lvm = "\n".join("\t".join(f"{value:.6f}" for value in row) for row in frame.to_numpy())
     head = "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\n***End_of_Header***\nChannels\t3\nDelta_X\t0.1\t0.1\t0.1\n"
-    found = [
+    recordings = [
         (".csv", f"Recorder: R-9\nStarted;12:00\n\n{';'.join(names)}\n{rows}\n".encode()),
         (".csv", "\ufeff0;1;2;3\n".encode("utf-8") + rows.encode()),
         (".lvm", (head + "***End_of_Header***\nX_Value\tax\tay\taz\tComment\n" + lvm + "\n").encode()),
     ]
     sink = io.BytesIO()
     wavfile.write(sink, 10, (20000 * frame[["ax", "ay", "az"]].to_numpy()).astype(np.int16))
-    found.append((".wav", sink.getvalue()))
+    recordings.append((".wav", sink.getvalue()))
     stamped = frame.assign(
         t=(pd.Timestamp("2026-01-01") + pd.to_timedelta(frame["t"], unit="s")).dt.strftime("%d.%m.%Y %H:%M:%S.%f")
     )
-    found.append((".csv", csv(stamped)))
+    recordings.append((".csv", csv(stamped)))
     for make in (_hdf5, _tdms, _uff, _rdata):
         with contextlib.suppress(ImportError):
-            found.append(make(frame))
-    return found
+            recordings.append(make(frame))
+    return recordings
 
 
 def _hdf5(frame):

@@ -82,11 +82,11 @@ def stop_and_wake(process, plant, rng):
 def stopped_many_times(times, seed):
     with served_plant() as (port, plant):
         config = modbus_station(port, limits=QUICK_MOVES, safety={"heartbeat_s": 0.2, "lapse_s": 2.0})
-        rng, found = random.Random(seed), []
+        rng, stops = random.Random(seed), []
         with mover(config, times) as process:
-            found = [stop_and_wake(process, plant, rng) for _ in range(times)]
-    assert [orders for orders, _, _ in found] == [0] * times
-    for _, kind, message in found:
+            stops = [stop_and_wake(process, plant, rng) for _ in range(times)]
+    assert [orders for orders, _, _ in stops] == [0] * times
+    for _, kind, message in stops:
         assert kind == "LeaseLost"
         assert "did not respond" in message
         assert "lost its lease" in message

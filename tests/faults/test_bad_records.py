@@ -95,9 +95,9 @@ def test_units_one_after_another_or_in_turn_may_each_begin_their_own_time(*, alt
     frame = pd.DataFrame({"t": [0.0, 10.0, 20.0] * 2, "sn": ["A"] * 3 + ["B"] * 3, "ax": 0.0, "ay": 0.6, "az": 0.8})
     frame = frame.sort_values("t") if alternating else frame
     how = build({**CONTENT, "columns": {**CONTENT["columns"], "unit": "sn"}, "unit": "", "rows": "dwells"}, "import")
-    found = imported(frame.reset_index(drop=True), how, "f").dwells
-    assert found is not None
-    assert found["unit"].tolist() == ["A"] * 3 + ["B"] * 3
+    dwell_table = imported(frame.reset_index(drop=True), how, "f").dwells
+    assert dwell_table is not None
+    assert dwell_table["unit"].tolist() == ["A"] * 3 + ["B"] * 3
     back = frame.assign(t=[0.0, 10.0, 5.0] * 2).sort_values("sn", kind="stable").reset_index(drop=True)
     with pytest.raises(DataRejected, match="row 3: time runs back by 5 s within A" if not alternating else "runs back"):
         imported(back, how, "f")
@@ -157,8 +157,8 @@ def test_a_fit_that_cannot_be_judged_leaves_with_1(monkeypatch, capsys, tmp_path
         "9.81",
     )
     poses = ",".join(f"{label}={face}" for label, face in faces.items())
-    found = ("--fit", "faces", "--poses", poses, "--archive", tmp_path / "archive")
-    status, out, _ = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *words, *found)
+    fit_options = ("--fit", "faces", "--poses", poses, "--archive", tmp_path / "archive")
+    status, out, _ = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *words, *fit_options)
     assert status == 1
     assert "CANNOT BE JUDGED" in out
 

@@ -80,8 +80,8 @@ def test_a_mounting_that_is_not_confirmed_asks_for_the_operator_and_goes_on_afte
         machine.spin(400.0, -1, 0.5, [0, 1], 0.3)
     assert machine.values.number("rate_read") == 0.0
     monkeypatch.setattr(Centrifuge, "_mount", mount)
-    found = machine.spin(400.0, -1, 0.5, [0, 1], 0.3)
-    assert np.mean(found.outputs[0][:, 2]) < 0.0
+    recording = machine.spin(400.0, -1, 0.5, [0, 1], 0.3)
+    assert np.mean(recording.outputs[0][:, 2]) < 0.0
 
 
 def test_a_device_without_a_command_for_the_radius_is_not_told(machine, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,11 +126,13 @@ def figures(folder: Path, more: str) -> dict[str, dict]:
     part, device = parts_of(recipe)[0], nominal_device(readings)
     outcome = PROCEDURES["centrifuge"].evaluate(part, PROCEDURES["centrifuge"].reduce(part, own, device), device)
     texts = {unit: " · ".join(f.text for f in outcome.findings if f.unit == unit) for unit in outcome.figures}
-    return {unit: {one.figure: one for one in found} | {"text": texts[unit]} for unit, found in outcome.figures.items()}
+    return {
+        unit: {one.figure: one for one in of_unit} | {"text": texts[unit]} for unit, of_unit in outcome.figures.items()
+    }
 
 
 def test_figures_at_two_radii_agree_with_what_arm_and_units_really_are(tmp_path: Path) -> None:
-    found, plant = figures(tmp_path, "radii_m = [0.5, 0.3]\n"), Plant(load_station(), LOT)
+    by_unit, plant = figures(tmp_path, "radii_m = [0.5, 0.3]\n"), Plant(load_station(), LOT)
     holes = [1.0 + radius_error(plant.bench, r) / r for r in (0.5, 0.3)]
     for k, unit in enumerate(plant.serials):
         own, gain = plant.bench.units[k], 1.0 + 1e-6 * plant.truth(unit).scale_ppm[2]
@@ -142,19 +144,19 @@ def test_figures_at_two_radii_agree_with_what_arm_and_units_really_are(tmp_path:
             "centrifuge_third_order_ug_g3": 1e6 * gain * plant.truth(unit).cubic[2],
         }
         for name, value in true.items():
-            one = found[unit][name]
+            one = by_unit[unit][name]
             assert abs(one.value - value) < 4.0 * one.uncertainty, (unit, name)
-        assert found[unit]["centrifuge_mass_offset_um"].uncertainty < 2.0
-        assert "mass_offset: " in found[unit]["text"]
-        assert "does not separate it from" not in found[unit]["text"]
+        assert by_unit[unit]["centrifuge_mass_offset_um"].uncertainty < 2.0
+        assert "mass_offset: " in by_unit[unit]["text"]
+        assert "does not separate it from" not in by_unit[unit]["text"]
 
 
 def test_one_radius_leaves_the_offset_open_and_says_what_closes_it(tmp_path: Path) -> None:
-    found = figures(tmp_path, "radius_m = 0.3\n")["C1"]
-    assert not found["centrifuge_mass_offset_um"].identified
-    assert "radii_m" in found["centrifuge_mass_offset_um"].note
+    by_name = figures(tmp_path, "radius_m = 0.3\n")["C1"]
+    assert not by_name["centrifuge_mass_offset_um"].identified
+    assert "radii_m" in by_name["centrifuge_mass_offset_um"].note
     plant = Plant(load_station(), LOT)
-    one, true = found["centrifuge_sensitivity_percent"], 1e-4 * plant.truth("C1").scale_ppm[2]
+    one, true = by_name["centrifuge_sensitivity_percent"], 1e-4 * plant.truth("C1").scale_ppm[2]
     assert abs(one.value - true) < 3.0 * one.uncertainty  # the station mounts at the radius of the recipe
 
 

@@ -50,15 +50,15 @@ def make(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The archive without a key, the one with a key, and the key."""
-    folder, found = tmp_path_factory.mktemp("made"), {}
+    folder, archives = tmp_path_factory.mktemp("made"), {}
     make_key(folder / "own.key")
     make_key(folder / "foreign.key")
     for name, key in (("unsigned", ""), ("signed", str(folder / "own.key"))):
         (folder / name).mkdir()
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv(VARIABLE, key)
-            found[name] = make(folder / name)
-    return {**found, "own": folder / "own.key", "foreign": folder / "foreign.key"}
+            archives[name] = make(folder / name)
+    return {**archives, "own": folder / "own.key", "foreign": folder / "foreign.key"}
 
 
 @pytest.fixture(params=["unsigned", "signed"])
@@ -72,8 +72,8 @@ def root(request: pytest.FixtureRequest, made: dict[str, Path], tmp_path: Path, 
 
 def runs(root: Path) -> tuple[Run, Run]:
     archive = Archive(root)
-    found = {info.units: archive.run(info.id) for info in archive.runs()}
-    return found[FIRST], found[SECOND]
+    by_units = {info.units: archive.run(info.id) for info in archive.runs()}
+    return by_units[FIRST], by_units[SECOND]
 
 
 def write(path: Path, content: dict, by: str = "") -> None:
@@ -320,8 +320,8 @@ def test_the_archive_is_whole_before_it_is_forged(root: Path) -> None:
 @pytest.mark.parametrize("forge", [*OF_A_RUN, *OF_THE_WHOLE], ids=lambda one: one.__name__)
 def test_a_forgery_is_found(root: Path, made: dict[str, Path], forge: Callable[[Path, dict[str, Path]], str]) -> None:
     wanted = forge(root, made)
-    found = findings(root)
-    assert any(wanted in path for path in found), found
+    paths = findings(root)
+    assert any(wanted in path for path in paths), paths
     if (
         forge is not a_chain_written_anew_behind_other_coefficients
     ):  # two acts, and without the key each entry is one more
@@ -330,7 +330,7 @@ def test_a_forgery_is_found(root: Path, made: dict[str, Path], forge: Callable[[
             exchanged_captures,
             a_last_entry_taken_off,
         }  # two folders; two events without an entry
-        assert len(found) == (2 if forge in two else 1), found
+        assert len(paths) == (2 if forge in two else 1), paths
 
 
 @pytest.mark.parametrize("root", ["unsigned"], indirect=True)  # where no signature helps

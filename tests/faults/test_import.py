@@ -33,11 +33,11 @@ def dwells(n: int = 4) -> pd.DataFrame:
 
 
 def test_a_clean_record_becomes_samples_and_a_dwell(rng: np.random.Generator) -> None:
-    found = imported(table(rng), how(), "file.csv")
-    assert found.samples is not None
-    assert found.dwells is not None
-    assert len(found.samples) == 400
-    assert found.dwells[["out_x", "out_y", "out_z"]].to_numpy()[0] == pytest.approx([0.0, 0.6, 0.8], abs=1e-3)
+    recording = imported(table(rng), how(), "file.csv")
+    assert recording.samples is not None
+    assert recording.dwells is not None
+    assert len(recording.samples) == 400
+    assert recording.dwells[["out_x", "out_y", "out_z"]].to_numpy()[0] == pytest.approx([0.0, 0.6, 0.8], abs=1e-3)
 
 
 def test_axes_signs_and_units_are_applied(rng: np.random.Generator) -> None:
@@ -48,9 +48,9 @@ def test_axes_signs_and_units_are_applied(rng: np.random.Generator) -> None:
         axes=["y", "x", "z"],
         signs=["-", "+", "+"],
     )
-    found = imported(raw.assign(ax=raw.ax * 1e3, ay=raw.ay * 1e3, az=raw.az * 1e3), mapping, "f")
-    assert found.dwells is not None
-    row = found.dwells.iloc[0]
+    recording = imported(raw.assign(ax=raw.ax * 1e3, ay=raw.ay * 1e3, az=raw.az * 1e3), mapping, "f")
+    assert recording.dwells is not None
+    row = recording.dwells.iloc[0]
     assert [row["out_x"], row["out_y"], row["unit_C"]] == pytest.approx([-0.6, 0.0, 27.0], abs=1e-3)
 
 

@@ -74,9 +74,9 @@ def archive(made: Path, tmp_path: Path) -> Archive:
     return Archive(tmp_path / "archive")
 
 
-def rows(found: AuditIndex) -> dict[str, list]:
+def rows(audit_index: AuditIndex) -> dict[str, list]:
     """All rows of an index, without what only tells how it came to be."""
-    tables = {name: found.table(name) for name in TABLES}
+    tables = {name: audit_index.table(name) for name in TABLES}
     tables["runs"] = tables["runs"].drop_columns(["stamp"])
     return {name: sorted(map(repr, table.to_pylist())) for name, table in tables.items()}
 
@@ -136,10 +136,10 @@ def test_a_kill_in_the_middle_leaves_an_index_that_is_gone_on_with(archive: Arch
     process.wait()
     for pipe in (process.stdin, process.stdout, process.stderr):
         pipe.close()
-    found = up_to_date(archive)
-    assert (found.kept, found.made) == (2, 10)
-    assert rows(found) == rows(up_to_date(Archive(made)))
-    del found
+    audit_index = up_to_date(archive)
+    assert (audit_index.kept, audit_index.made) == (2, 10)
+    assert rows(audit_index) == rows(up_to_date(Archive(made)))
+    del audit_index
     left = [place.name for place in (archive.root / "index").iterdir() if place.name.startswith(".tmp-")]
     assert len(left) == 1
     assert [Path(name).name for name in clean(archive).removed] == left
@@ -150,9 +150,9 @@ def test_a_part_without_one_of_its_tables_is_made_again(archive: Archive, made: 
     [part] = up_to_date(archive).parts
     (part / f"{name}.parquet").unlink()
     shutil.copytree(part, part.parent / "0123456789abcdef")
-    found = up_to_date(archive)
-    assert found.made == 12
-    assert rows(found) == rows(up_to_date(Archive(made)))
+    audit_index = up_to_date(archive)
+    assert audit_index.made == 12
+    assert rows(audit_index) == rows(up_to_date(Archive(made)))
 
 
 def test_foreign_files_in_the_index_are_passed_over(archive: Archive, made: Path) -> None:
@@ -166,11 +166,11 @@ def test_foreign_files_in_the_index_are_passed_over(archive: Archive, made: Path
 
 
 def test_a_table_of_the_index_that_is_cut_off_is_told_with_what_to_do(archive: Archive) -> None:
-    found = up_to_date(archive)
-    place = found.parts[0] / "figures.parquet"
+    audit_index = up_to_date(archive)
+    place = audit_index.parts[0] / "figures.parquet"
     place.write_bytes(place.read_bytes()[:1000])
     with pytest.raises(ArchiveUnusable, match=r"index .* cannot be read .*; remove .*, it is made again"):
-        found.table("figures")
+        audit_index.table("figures")
 
 
 def test_a_foreign_table_a_newer_one_and_a_manifest_that_is_none_leave_out_their_runs_alone(archive: Archive) -> None:

@@ -35,8 +35,8 @@ def run(folder: Path, *how: str) -> int:
 
 def records(folder: Path) -> dict[str, tuple[int, int]]:
     """What tells a stored record from one that was measured again: its file and when it was written."""
-    found = {path: path.stat() for path in (folder / "archive").glob("captures/*/[0-9]*/samples.parquet")}
-    return {path.parent.name: (stat.st_ino, stat.st_mtime_ns) for path, stat in found.items()}
+    stats = {path: path.stat() for path in (folder / "archive").glob("captures/*/[0-9]*/samples.parquet")}
+    return {path.parent.name: (stat.st_ino, stat.st_mtime_ns) for path, stat in stats.items()}
 
 
 def killed(folder: Path, how: str) -> None:
@@ -53,8 +53,8 @@ def finish(folder: Path) -> dict[str, bytes]:
     assert run(folder) == 0
     assert {name: records(folder)[name] for name in before} == before
     assert not list(folder.glob("archive/**/.tmp-*"))
-    [found] = (folder / "archive" / "runs").iterdir()
-    return {name: (found / f"{name}.parquet").read_bytes() for name in (*RESULTS, *MORE_RESULTS)}
+    [run_folder] = (folder / "archive" / "runs").iterdir()
+    return {name: (run_folder / f"{name}.parquet").read_bytes() for name in (*RESULTS, *MORE_RESULTS)}
 
 
 @pytest.fixture(scope="module")

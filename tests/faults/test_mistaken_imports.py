@@ -77,10 +77,10 @@ def mistaken(rng: np.random.Generator, content: dict, *, faces: bool) -> tuple[s
 def outcome(frame: pd.DataFrame, content: dict) -> str:
     """The refusal or the remarks that ask to check; empty where the import says nothing."""
     try:
-        found = imported(frame, build(content, "t"), "f.csv")
+        recording = imported(frame, build(content, "t"), "f.csv")
     except TumblelineError as problem:
         return f"refused: {problem}"
-    return "; ".join(remark for remark in found.remarks if "CHECK" in remark)
+    return "; ".join(remark for remark in recording.remarks if "CHECK" in remark)
 
 
 @pytest.mark.parametrize("count", [FEW, pytest.param(MANY, marks=pytest.mark.slow, id="many")])

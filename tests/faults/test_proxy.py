@@ -86,8 +86,8 @@ def test_the_next_frame_is_spoilt_as_asked(action, arrives):
 def test_garbled_frames_differ_in_as_many_bytes_as_asked_at_most():
     with through(WireAction("garble", size=2)) as (_, client):
         client.sendall(frame(1))
-        found = received(client, 13)
-    assert 1 <= sum(a != b for a, b in zip(found, frame(1), strict=True)) <= 2
+        garbled = received(client, 13)
+    assert 1 <= sum(a != b for a, b in zip(garbled, frame(1), strict=True)) <= 2
 
 
 def test_a_late_reply_comes_in_front_of_the_next_one_on_a_new_connection():

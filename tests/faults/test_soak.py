@@ -254,9 +254,9 @@ class Soak:
     def size(self) -> dict[str, tuple[float, int]]:
         """Memory, MB, and open files of the server and of the first process of each worker."""
         assert self.server.process is not None
-        found = {"server": self.server.process.pid} | {name: p.pid for name, (_, p) in self.workers.items()}
+        pids = {"server": self.server.process.pid} | {name: p.pid for name, (_, p) in self.workers.items()}
         out = {}
-        for name, pid in found.items():
+        for name, pid in pids.items():
             process = psutil.Process(pid)
             out[name] = (process.memory_info().rss / 1e6, process.num_fds())
         return out

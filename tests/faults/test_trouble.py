@@ -53,11 +53,11 @@ def test_a_unit_that_falls_silent_is_reported_and_the_others_go_on(spoilt: Run) 
 
 def test_the_others_get_what_they_would_have_got(spoilt: Run, sound: Run) -> None:
     wanted = sound.table("coefficients").query("unit != 'A2'").reset_index(drop=True)
-    found = spoilt.table("coefficients")
-    pd.testing.assert_frame_equal(found[["unit", "axis", "effect"]], wanted[["unit", "axis", "effect"]])
+    coefficients = spoilt.table("coefficients")
+    pd.testing.assert_frame_equal(coefficients[["unit", "axis", "effect"]], wanted[["unit", "axis", "effect"]])
     # the noise is judged by the whole lot, so that weights and errors move a little; the result does not
-    assert ((found["value"] - wanted["value"]).abs() < 0.1 * wanted["standard_error"]).all()
-    assert (found["standard_error"] / wanted["standard_error"]).between(0.9, 1.1).all()
+    assert ((coefficients["value"] - wanted["value"]).abs() < 0.1 * wanted["standard_error"]).all()
+    assert (coefficients["standard_error"] / wanted["standard_error"]).between(0.9, 1.1).all()
 
 
 @pytest.mark.parametrize("table", TABLES_OF_RESULTS)
@@ -84,8 +84,8 @@ def test_the_report_names_the_refused_unit_and_gives_it_no_number(spoilt: Run) -
     assert section is not None
     reasons = r'<ul class="reasons">.*?stopped answering at record 3.*?</ul>'
     for part in (row[0], section[0]):
-        bare, found = re.subn(reasons, "", part, flags=re.DOTALL)
-        assert found == 1
+        bare, count = re.subn(reasons, "", part, flags=re.DOTALL)
+        assert count == 1
         words = re.sub(r"<[^>]*>", " ", bare)
         assert re.findall(r"\d+", words.replace("A2", "")) == ["1"]  # the slot
         assert not re.search(r"<(svg|img|canvas)", bare)

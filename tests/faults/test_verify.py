@@ -77,9 +77,9 @@ def run_of(root: Path) -> Run:
 
 
 def one(root: Path, pattern: str) -> Path:
-    found = sorted(root.glob(pattern))
-    assert found, pattern
-    return found[0]
+    paths = sorted(root.glob(pattern))
+    assert paths, pattern
+    return paths[0]
 
 
 def flip(path: Path) -> None:
@@ -127,8 +127,8 @@ def test_one_changed_bit_of_any_table_is_found(copy: Path, pattern: str) -> None
 def test_a_missing_file_is_found(copy: Path, pattern: str) -> None:
     path = one(copy, pattern)
     path.unlink()
-    found = {f.path for f in verified(copy).checked.findings if f.kind == "missing"}
-    assert any(str(path.relative_to(copy)).startswith(name) for name in found), found
+    missing = {f.path for f in verified(copy).checked.findings if f.kind == "missing"}
+    assert any(str(path.relative_to(copy)).startswith(name) for name in missing), missing
 
 
 def test_a_revocation_that_was_taken_away_is_found(copy: Path) -> None:
@@ -176,8 +176,8 @@ def test_a_table_with_a_manifest_to_match_is_found_by_the_chain(copy: Path) -> N
     path = run.path / "coefficients.parquet"
     path.write_bytes(parquet.table_bytes("coefficients", frame, 1))
     edit(run.path / "coefficients.json", lambda content: content.update(sha256=files.sha256(path)))
-    found = {(f.kind, Path(f.path).name) for f in verified(copy).checked.findings}
-    assert ("edited", "coefficients.json") in found
+    findings = {(f.kind, Path(f.path).name) for f in verified(copy).checked.findings}
+    assert ("edited", "coefficients.json") in findings
 
 
 def test_a_foreign_table_is_found_and_disturbs_nothing(copy: Path) -> None:
@@ -316,8 +316,8 @@ def test_a_file_of_every_kind_that_was_changed_cut_or_taken_away_is_named(copy: 
             path.write_bytes(content)
             assert name in {f.path for f in verified(copy).checked.findings}, (name, len(content))
         path.unlink()
-        found = {f.path for f in verified(copy).checked.findings}
-        assert any(name.startswith(place) for place in found), (name, found)
+        paths = {f.path for f in verified(copy).checked.findings}
+        assert any(name.startswith(place) for place in paths), (name, paths)
         path.write_bytes(data)
     assert verified(copy).whole
 
@@ -356,9 +356,9 @@ def test_a_link_of_the_chain_that_was_taken_off_its_end_is_missed(copy: Path, mo
     monkeypatch.setattr(seals, "JUST_NOW", timedelta(0))
     for count in (1, 2):
         max(copy.glob("chain/*/*.json")).unlink()
-        found = {(f.kind, f.path) for f in verified(copy).checked.findings}
-        assert {kind for kind, _ in found} == {"unchained"}
-        assert len({path for _, path in found}) == (1, 4)[count - 1]
+        findings = {(f.kind, f.path) for f in verified(copy).checked.findings}
+        assert {kind for kind, _ in findings} == {"unchained"}
+        assert len({path for _, path in findings}) == (1, 4)[count - 1]
     max(copy.glob("chain/*/*.json")).unlink()
     assert ("missing", "chain/000000/000000001.json") in {(f.kind, f.path) for f in verified(copy).checked.findings}
 

@@ -126,10 +126,10 @@ def away_and_back(seconds):
         with driver(config) as process:
             away.append(True)
             killed(process)
-            end, found = time.monotonic() + seconds, []
-            while time.monotonic() < end or not found:
+            end, problems = time.monotonic() + seconds, []
+            while time.monotonic() < end or not problems:
                 problem = unsafe_reason(folder.state_folder(), config)
-                found += [problem] if "the watchdog of the driver" in problem and "no answer" in problem else []
+                problems += [problem] if "the watchdog of the driver" in problem and "no answer" in problem else []
                 time.sleep(0.2)
             with pytest.raises(OperatorNeeded, match="is held by the watchdog of the driver"):
                 refused_soon(config)

@@ -198,8 +198,8 @@ def test_every_recorded_quantity_is_in_the_state(lot):
         if row.column == "power_off_s" and state.since_power is None:
             continue
         wide = row.factor * dwells.pivot_table(index="unit", columns="dwell", values=row.column).to_numpy()
-        found = getattr(state, row.attribute) if row.attribute else state.covariates[row.column]
-        np.testing.assert_allclose(found, wide, rtol=1e-14, err_msg=row.column)
+        recorded = getattr(state, row.attribute) if row.attribute else state.covariates[row.column]
+        np.testing.assert_allclose(recorded, wide, rtol=1e-14, err_msg=row.column)
     for column in COVARIATES:
         assert (column in state.covariates) == (column in dwells and not dwells[column].isna().any())
     if "power_off_s" in dwells:

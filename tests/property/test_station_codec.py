@@ -39,9 +39,9 @@ def test_floats_come_back(order, value):
 @given(ORDERS, st.floats(min_value=-400.0, max_value=400.0))
 def test_scaled_values_come_back_within_half_a_step(order, value):
     angle = register("int32", scale=0.001)
-    found = decode(angle, order, encode(angle, order, value))
-    assert isinstance(found, float)
-    assert abs(found - value) <= 0.0005 + 1e-9
+    decoded = decode(angle, order, encode(angle, order, value))
+    assert isinstance(decoded, float)
+    assert abs(decoded - value) <= 0.0005 + 1e-9
 
 
 @given(ORDERS, st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=20).map(str.strip))
@@ -62,8 +62,8 @@ def test_packed_samples_come_back_with_their_numbers(packing, first, data):
     one = st.integers(-top, top - 1)
     counts = np.array(data.draw(st.lists(st.tuples(one, one, one), min_size=1, max_size=40)), dtype=np.int64)
     words = pack_samples(counts, first, packing)
-    found, numbers = unpack_samples(words.reshape(-1), packing)
-    assert np.array_equal(found, counts)
+    unpacked, numbers = unpack_samples(words.reshape(-1), packing)
+    assert np.array_equal(unpacked, counts)
     assert np.array_equal(numbers, (first + np.arange(len(counts))) % (16 if packing == "int20x3" else 256))
 
 
@@ -86,8 +86,8 @@ def test_bits_are_bits():
 def test_decimals_of_a_controller_shift_its_values(decimals, tenths):
     value = round(tenths / 10.0, decimals)
     scaled = register("int32").with_decimals(decimals)
-    found = decode(scaled, "high_first", encode(scaled, "high_first", value))
-    assert found == pytest.approx(value, abs=1e-9)
+    decoded = decode(scaled, "high_first", encode(scaled, "high_first", value))
+    assert decoded == pytest.approx(value, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -69,9 +69,9 @@ def test_two_years_of_drift_beside_weekly_standards_make_no_strangers(rng):
 def test_exchanged_serials_are_found_beside_weekly_standards(rng):
     serials, days, values = yearly(rng, 300)
     values[[1, 3]] = values[[3, 1]]
-    found = calibrations(*joined((serials, days, values), weekly(rng, 4)))
-    strange = strangers(found)
-    assert {(found.unit[s.row], s.looks_like, s.exchanged) for s in strange} == {
+    histories = calibrations(*joined((serials, days, values), weekly(rng, 4)))
+    strange = strangers(histories)
+    assert {(histories.unit[s.row], s.looks_like, s.exchanged) for s in strange} == {
         ("U00000", "U00001", True),
         ("U00001", "U00000", True),
     }
@@ -86,8 +86,8 @@ def test_a_broken_unit_among_many_alike_is_not_taken_for_another(rng, ratio):
         values[..., :3] = ratio * 60.0 * rng.standard_normal((2000, 1, 3)) + 60.0 * rng.standard_normal((2000, 2, 3))
         values[100, 1, :3] += 60.0 * ratio * rng.choice([-1.5, 1.5], 3)
         serials = np.repeat([f"U{u:05d}" for u in range(2000)], 2)
-        found = calibrations(serials, np.tile([200.0, 565.0], 2000), values.reshape(-1, len(NAMES)))
-        strange = [s for s in strangers(found) if found.unit[s.row] == "U00100"]
+        histories = calibrations(serials, np.tile([200.0, 565.0], 2000), values.reshape(-1, len(NAMES)))
+        strange = [s for s in strangers(histories) if histories.unit[s.row] == "U00100"]
         wrong += any(s.looks_like for s in strange)
     assert wrong <= 2
 
@@ -106,9 +106,9 @@ def test_units_are_in_tolerance_when_their_reliability_ends(rng, slope, walk, ti
     values = TOLERANCE * (level + np.hypot(seating, seating) * rng.standard_normal(level.shape))
     serials = np.repeat([f"U{u:05d}" for u in range(units)], times)
     days = np.tile(200.0 + YEAR_D * np.arange(times), units)
-    found = calibrations(serials, days, values.reshape(-1, len(NAMES)), errors=seating * TOLERANCE)
-    every, rules = np.ones(len(found), dtype=bool), load_rules()
-    drifts = unit_drifts(found, every, kind_drifts(found, every, rules, 0.0), rules, {})
+    histories = calibrations(serials, days, values.reshape(-1, len(NAMES)), errors=seating * TOLERANCE)
+    every, rules = np.ones(len(histories), dtype=bool), load_rules()
+    drifts = unit_drifts(histories, every, kind_drifts(histories, every, rules, 0.0), rules, {})
     last = {d.unit: d.reliable_day for own in drifts.values() for d in own}
     ahead = (np.array([last[f"U{u:05d}"] for u in range(units)]) - days[-1]) / YEAR_D
     walked = walk * np.sqrt(ahead)[:, None] * rng.standard_normal((units, len(NAMES)))
@@ -127,8 +127,8 @@ def test_units_that_stand_still_agree_in_nineteen_of_twenty(rng, stated):
         values = REPEAT * rng.standard_normal((units * times, len(NAMES)))
         days = np.cumsum(rng.uniform(100.0, 300.0, (units, times)), axis=1).ravel()
         serials = np.repeat([f"U{u:05d}" for u in range(units)], times)
-        found = calibrations(serials, days, values, errors=stated * REPEAT)
-        kinds = kind_drifts(found, np.ones(len(found), dtype=bool), load_rules(), 0.0)
+        histories = calibrations(serials, days, values, errors=stated * REPEAT)
+        kinds = kind_drifts(histories, np.ones(len(histories), dtype=bool), load_rules(), 0.0)
         beyond += [kind.beyond for kind in kinds]
     assert len(beyond) == 8 * len(OWN)
     assert np.mean(beyond) < 0.062
@@ -151,8 +151,8 @@ def test_second_calibrations_agree_in_nineteen_of_twenty(rng, kind, units):
             pair = np.swapaxes(made.autoregressive(rng, rows, 2, memory).reshape(units, len(NAMES), 2), 1, 2)
         serials = np.repeat([f"U{u:05d}" for u in range(units)], 2)
         values = (REPEAT * pair).reshape(-1, len(NAMES))
-        found = calibrations(serials, days.ravel(), values, errors=0.2 * REPEAT)
-        beyond += [one.beyond for one in kind_drifts(found, np.ones(len(found), dtype=bool), load_rules(), 0.0)]
+        histories = calibrations(serials, days.ravel(), values, errors=0.2 * REPEAT)
+        beyond += [one.beyond for one in kind_drifts(histories, np.ones(len(histories), dtype=bool), load_rules(), 0.0)]
     assert len(beyond) == 6 * len(OWN)
     assert np.mean(beyond) < 0.065
 
@@ -164,8 +164,8 @@ def test_units_that_wander_disagree_all_the_same(rng):
     steps = np.sqrt(np.diff(days, axis=1, prepend=days[:, :1]) / 200.0)[..., None]
     values = np.cumsum(steps * REPEAT * rng.standard_normal((units, times, len(NAMES))), axis=1)
     serials = np.repeat([f"U{u:05d}" for u in range(units)], times)
-    found = calibrations(serials, days.ravel(), values.reshape(-1, len(NAMES)), errors=0.2 * REPEAT)
-    beyond = [one.beyond for one in kind_drifts(found, np.ones(len(found), dtype=bool), load_rules(), 0.0)]
+    histories = calibrations(serials, days.ravel(), values.reshape(-1, len(NAMES)), errors=0.2 * REPEAT)
+    beyond = [one.beyond for one in kind_drifts(histories, np.ones(len(histories), dtype=bool), load_rules(), 0.0)]
     assert np.mean(beyond) > 0.3
 
 
@@ -178,9 +178,11 @@ def told_different(every, columns):
     names = np.repeat(np.array([f"figure_{k}" for k in range(len(columns))], dtype=object), n)
     texts = np.full(names.size, "1", dtype=object)
     rows = np.tile(np.arange(n), len(columns))
-    able, found = abilities(every, Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts))
+    able, differences = abilities(
+        every, Figures(rows, names, np.concatenate(columns), np.full(names.size, LIMIT), texts)
+    )
     held = np.mean([one.ppk.low <= LIMIT / 3.0 <= one.ppk.high for one in able])
-    return any(one.by != "lot" and one.p < 1e-3 and one.comparison.effect > 0.02 for one in found), held
+    return any(one.by != "lot" and one.p < 1e-3 and one.comparison.effect > 0.02 for one in differences), held
 
 
 def test_units_that_come_back_to_their_station_are_no_evidence_against_it(rng):
@@ -224,40 +226,40 @@ def test_lots_that_differ_are_no_evidence_against_their_stations(rng):
 @pytest.mark.parametrize("differing", [0.0, 1.0])
 def test_large_lots_stand_out_no_more_than_small_ones(rng, differing):
     """Distances multiplied by the root of a lot's size made four odd lots of 150, where lots differ as much as units do."""
-    found = 0
+    odd_lots = 0
     for _ in range(4):
         lot = np.repeat(np.arange(150), rng.choice([4, 8, 32], 150, p=[0.2, 0.6, 0.2]))
         values = rng.standard_normal((lot.size, len(NAMES))) + differing * rng.standard_normal((150, len(NAMES)))[lot]
         serials, runs = [f"U{u:05d}" for u in range(lot.size)], [f"r{one:03d}" for one in lot]
         every = calibrations(serials, lot, values, runs=runs)
-        found += sum(odd.kind == "lot" for odd in odd_ones(every, np.ones(len(every), dtype=bool)))
-    assert found <= 1
+        odd_lots += sum(odd.kind == "lot" for odd in odd_ones(every, np.ones(len(every), dtype=bool)))
+    assert odd_lots <= 1
 
 
 @pytest.mark.parametrize(("n", "counted"), [(60, 20), (200, 160)])
 def test_charts_in_control_are_found_out_of_it_as_rarely_as_is_said(rng, n, counted):
     """By mean and variance of the number of alarms a p-value of 6·10⁻⁴, that of eighteen charts, came up 16 times as often."""
     chance, which = false_alarms(n, 40, counted), np.arange(n) >= n - counted
-    found = []
+    p_values = []
     for values in rng.standard_normal((2000, n)):
         rules, moving = signals(values, baseline(values, 40))
-        found.append(chance.p_value(alarms(rules, moving.outside, which)))
-    assert np.mean(np.array(found) < 0.01) == pytest.approx(0.01, abs=0.007)
-    assert np.sum(np.array(found) < 0.01 / 18.0) <= 6  # 1.1 are expected
+        p_values.append(chance.p_value(alarms(rules, moving.outside, which)))
+    assert np.mean(np.array(p_values) < 0.01) == pytest.approx(0.01, abs=0.007)
+    assert np.sum(np.array(p_values) < 0.01 / 18.0) <= 6  # 1.1 are expected
     assert chance.p_value(0) == 1.0
 
 
 def test_a_number_of_alarms_is_the_less_likely_the_larger():
     chance = false_alarms(100, 40, 60)
-    found = [chance.p_value(number) for number in range(61)]
-    assert np.all(np.diff(found) <= 0.0)
-    assert found[-1] > 0.0
+    p_values = [chance.p_value(number) for number in range(61)]
+    assert np.all(np.diff(p_values) <= 0.0)
+    assert p_values[-1] > 0.0
 
 
 @pytest.mark.parametrize("n", [8, 16, 60])
 def test_short_series_change_their_level_no_oftener_than_is_said(rng, n):
     """With σ from a few differences and the normal tail a p-value of 10⁻⁴ came up 30 times as often in eight points."""
-    found = [change_points(values, 1e-2) for values in rng.standard_normal((2000, n))]
-    p = np.array([min((change.p_value for change in own), default=1.0) for own in found])
+    changes = [change_points(values, 1e-2) for values in rng.standard_normal((2000, n))]
+    p = np.array([min((change.p_value for change in own), default=1.0) for own in changes])
     assert np.mean(p < 1e-2) < 0.01
     assert np.sum(p < 1e-4) <= 2

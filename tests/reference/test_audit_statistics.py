@@ -47,10 +47,10 @@ def test_individuals_chart_of_the_handbook():
 
 
 def test_ewma_of_the_handbook():
-    found = ewma(np.array(EWMA_DATA), Baseline(50.0, 2.0539), weight=0.3, width=3.0)
-    assert found.average == pytest.approx(EWMA_PRINTED, abs=0.011)
-    assert 50.0 + found.half_width[-1] == pytest.approx(52.5884, abs=2e-3)
-    assert not found.outside.any()
+    chart = ewma(np.array(EWMA_DATA), Baseline(50.0, 2.0539), weight=0.3, width=3.0)
+    assert chart.average == pytest.approx(EWMA_PRINTED, abs=0.011)
+    assert 50.0 + chart.half_width[-1] == pytest.approx(52.5884, abs=2e-3)
+    assert not chart.outside.any()
 
 
 def test_run_length_of_the_western_electric_rules_is_the_published_one(rng):
@@ -61,11 +61,11 @@ def test_run_length_of_the_western_electric_rules_is_the_published_one(rng):
     lengths, position = [], 0
     values = rng.standard_normal(600_000)
     while position + 2000 < values.size:
-        found = np.flatnonzero(western_electric(values[position : position + 2000], Baseline(0.0, 1.0)).any(axis=0))
-        if not found.size:
+        alarms = np.flatnonzero(western_electric(values[position : position + 2000], Baseline(0.0, 1.0)).any(axis=0))
+        if not alarms.size:
             break
-        lengths.append(found[0] + 1)
-        position += found[0] + 1
+        lengths.append(alarms[0] + 1)
+        position += alarms[0] + 1
     assert np.mean(lengths) == pytest.approx(IN_CONTROL_RUN_LENGTH, rel=0.05)
 
 
@@ -98,15 +98,15 @@ def test_ewma_and_the_rules_agree_with_a_second_way(rng):
 
 
 def test_gauge_study_of_the_manual():
-    found = gauge_study(STUDY)
-    assert found.pooled
-    assert found.interaction_p == pytest.approx(0.974, abs=0.002)  # F = 0.434
-    assert found.repeatability == pytest.approx(0.199933, abs=2e-6)
-    assert found.reproducibility == pytest.approx(0.226838, abs=2e-6)
-    assert found.gauge == pytest.approx(0.302373, abs=2e-6)
-    assert found.part == pytest.approx(1.042327, abs=2e-6)
-    assert found.percent == pytest.approx(27.9, abs=0.05)
-    assert found.categories == 4
+    study = gauge_study(STUDY)
+    assert study.pooled
+    assert study.interaction_p == pytest.approx(0.974, abs=0.002)  # F = 0.434
+    assert study.repeatability == pytest.approx(0.199933, abs=2e-6)
+    assert study.reproducibility == pytest.approx(0.226838, abs=2e-6)
+    assert study.gauge == pytest.approx(0.302373, abs=2e-6)
+    assert study.part == pytest.approx(1.042327, abs=2e-6)
+    assert study.percent == pytest.approx(27.9, abs=0.05)
+    assert study.categories == 4
 
 
 def test_capability_interval_of_the_textbook():
@@ -119,16 +119,16 @@ def test_bissell_s_interval_covers_as_it_says(rng):
     """A second way: of 4000 samples of 50 normal values the interval holds the true Cpk 95 times in a hundred."""
     truth, n = 1.2, 50
     samples = rng.standard_normal((4000, n))
-    found = [cpk(float(x.mean()), float(x.std(ddof=1)), -3.0 * truth, 3.0 * truth + 2.0, n) for x in samples]
-    inside = [one.low <= truth <= one.high for one in found]
+    intervals = [cpk(float(x.mean()), float(x.std(ddof=1)), -3.0 * truth, 3.0 * truth + 2.0, n) for x in samples]
+    inside = [one.low <= truth <= one.high for one in intervals]
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
 
 
 def test_share_of_the_handbook_has_the_exact_interval():
     """e-Handbook 7.2.4.1: 4 of 20, two-sided 90 % limits 0.071354 and 0.401029; here checked at 95 % by its own definition."""
-    found = fraction_interval(4, 20)
-    assert stats.binom.sf(3, 20, found.low) == pytest.approx(0.025)
-    assert stats.binom.cdf(4, 20, found.high) == pytest.approx(0.025)
+    interval = fraction_interval(4, 20)
+    assert stats.binom.sf(3, 20, interval.low) == pytest.approx(0.025)
+    assert stats.binom.cdf(4, 20, interval.high) == pytest.approx(0.025)
     for count, total in ((4, 20), (1, 3), (999, 1000)):
         ends = stats.beta.ppf([0.025, 0.975], [count, count + 1], [total - count + 1, total - count])
         own = fraction_interval(count, total)
@@ -141,10 +141,10 @@ def test_groups_are_compared_as_scipy_does(rng):
     values, groups = np.round(rng.standard_normal(90), 1), np.repeat([0, 1, 2], 30)
     values[groups == 2] += 0.4
     parts = [values[groups == g] for g in range(3)]
-    found = compare(values, groups)
-    assert found is not None
-    assert found.f_p == pytest.approx(stats.f_oneway(*parts).pvalue)
-    assert found.rank_p == pytest.approx(stats.kruskal(*parts).pvalue)
+    comparison = compare(values, groups)
+    assert comparison is not None
+    assert comparison.f_p == pytest.approx(stats.f_oneway(*parts).pvalue)
+    assert comparison.rank_p == pytest.approx(stats.kruskal(*parts).pvalue)
 
 
 def test_sigma_is_that_of_the_median_absolute_deviation(rng):

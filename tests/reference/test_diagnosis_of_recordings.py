@@ -33,20 +33,20 @@ def _as_dwells(table):
 def test_a_lag_fitted_per_axis_takes_the_chamber_cycle_to_the_published_residuals(chamber):
     before = compare(chamber, CUBIC)["by_axis"]
     assert [MM_S2 * before[a] for a in "xyz"] == pytest.approx([6.4, 17.3, 44.2], rel=0.01)
-    found = compare(chamber, [*CUBIC, "thermal_lag"])
-    left = [MM_S2 * found["by_axis"][a] for a in "xyz"]
+    comparison = compare(chamber, [*CUBIC, "thermal_lag"])
+    left = [MM_S2 * comparison["by_axis"][a] for a in "xyz"]
     assert left[0] <= 3.8
     assert left[1] <= 4.9
     assert left[2] <= 11.6
-    assert len(found["nonlinear"]["thermal_lag"]["tau"]) == 3
+    assert len(comparison["nonlinear"]["thermal_lag"]["tau"]) == 3
 
 
 @pytest.mark.slow
 def test_the_rate_of_temperature_drives_the_chamber_cycle_and_a_lag_is_named(chamber):
-    found = diagnose(chamber, effects=CUBIC)
-    assert not found["adequate"]
-    assert "temperature_rate" in {w["driver"] for w in found["where"]}
-    assert {"thermal_lag", "thermal_rate", "thermal_hysteresis"} & set(found["recommended"])
+    diagnosis = diagnose(chamber, effects=CUBIC)
+    assert not diagnosis["adequate"]
+    assert "temperature_rate" in {w["driver"] for w in diagnosis["where"]}
+    assert {"thermal_lag", "thermal_rate", "thermal_hysteresis"} & set(diagnosis["recommended"])
 
 
 @pytest.mark.slow
@@ -59,7 +59,7 @@ def test_the_temperature_offset_of_a_worn_unit_is_found_missing(shared_data):
     frame = frame.assign(
         unit="worn", dwell=range(len(frame)), time_s=[10.0 * k for k in range(len(frame))], n=1, out_unit="g"
     )
-    found = diagnose(exchange.checked(frame, where="worn unit"), effects=["bias", "scale"])
-    assert not found["adequate"]
-    named = {e for c in found["classes"] for e in c["effects"]}
+    diagnosis = diagnose(exchange.checked(frame, where="worn unit"), effects=["bias", "scale"])
+    assert not diagnosis["adequate"]
+    named = {e for c in diagnosis["classes"] for e in c["effects"]}
     assert "bias_temperature" in named

@@ -112,8 +112,8 @@ def test_shock_response_spectrum_of_the_half_sine(q: float) -> None:
     products = np.array([0.1, 0.2, 0.5, 0.8, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0])
     duration, rate = 1.0, 4000.0
     t = np.arange(int(duration * rate) + 1) / rate
-    found = shock_spectrum.shock_spectrum(np.sin(np.pi * t / duration), rate, products / duration, q)
-    assert found == pytest.approx(SRS[q], abs=6e-4)
+    spectrum = shock_spectrum.shock_spectrum(np.sin(np.pi * t / duration), rate, products / duration, q)
+    assert spectrum == pytest.approx(SRS[q], abs=6e-4)
 
 
 def test_the_recursion_is_exact_for_straight_segments() -> None:
@@ -134,9 +134,9 @@ def test_the_largest_response_and_the_undamped_residual() -> None:
         (10.0, 1.6516, 0.823),
         (5.0, 1.5584, 0.834),
     ):
-        found = shock_spectrum.shock_spectrum(np.sin(np.pi * t), 2000.0, x, q)
-        assert found.max() == pytest.approx(largest, abs=3e-4)
-        assert x[int(np.argmax(found))] == pytest.approx(place, abs=0.004)
+        spectrum = shock_spectrum.shock_spectrum(np.sin(np.pi * t), 2000.0, x, q)
+        assert spectrum.max() == pytest.approx(largest, abs=3e-4)
+        assert x[int(np.argmax(spectrum))] == pytest.approx(place, abs=0.004)
     assert shock_spectrum.undamped_residual(0.5) == pytest.approx(np.pi / 2.0)
     assert shock_spectrum.undamped_residual(0.1) == pytest.approx(0.3963, abs=1e-4)
     with pytest.raises(NotIdentified, match="sample faster"):
@@ -196,8 +196,8 @@ def test_response_by_h1_and_h2_and_its_random_error(rng: np.random.Generator) ->
     scatter = []
     for _ in range(40):
         a = rng.normal(size=6528)
-        found = spectra.response(a, a + 0.436 * rng.normal(size=a.size), 1.0, segment=256)
-        scatter.append((np.abs(found.h1[5:-5]) - 1.0) / found.error[5:-5])
+        response = spectra.response(a, a + 0.436 * rng.normal(size=a.size), 1.0, segment=256)
+        scatter.append((np.abs(response.h1[5:-5]) - 1.0) / response.error[5:-5])
     assert np.std(scatter) == pytest.approx(1.0, abs=0.08)
 
 
@@ -215,8 +215,8 @@ def test_confidence_of_a_density_and_butterworth_figures() -> None:
 
 def test_what_five_times_the_bandwidth_leaves_folded() -> None:
     for times, second, one in ((5, -24, -12), (10, -38, -19), (20, -51, -26)):
-        found = [20 * np.log10(spectra.folded_share(times, 1.0, order)) for order in (2, 1)]
-        assert found == pytest.approx([second, one], abs=0.6)
+        folded = [20 * np.log10(spectra.folded_share(times, 1.0, order)) for order in (2, 1)]
+        assert folded == pytest.approx([second, one], abs=0.6)
 
 
 def test_rectification_by_clipping_and_the_hann_mean(rng: np.random.Generator) -> None:
@@ -262,8 +262,8 @@ def test_budget_of_a_shaker_by_the_gum() -> None:
 def test_limits_of_the_exciter_decide_the_level() -> None:
     assert exciter.stroke(5.0, 5.0) == pytest.approx((0.0497, 1.56), rel=2e-3)
     for stroke, start in ((0.005, 15.8), (0.0127, 9.9), (0.0254, 7.0)):
-        found = exciter.largest_level(start, displacement_m=stroke, velocity_m_s=10.0, acceleration_g=50.0)
-        assert found == pytest.approx(5.0, rel=0.01)
+        level = exciter.largest_level(start, displacement_m=stroke, velocity_m_s=10.0, acceleration_g=50.0)
+        assert level == pytest.approx(5.0, rel=0.01)
 
 
 def test_centrifuge_relations() -> None:
@@ -276,15 +276,15 @@ def test_centrifuge_relations() -> None:
     slope = 0.5 / centrifuge.STANDARD_GRAVITY
     for distance, ppm in ((0.02, 440), (0.05, 179), (0.1, 92), (0.2, 50)):
         far = slope * (0.5 + distance) / 0.5
-        found, error = centrifuge.scale_from_two_radii((slope, far), (1e-5 * slope, 1e-5 * far), distance, 5e-6)
-        assert found == pytest.approx(1.0)
+        estimate, error = centrifuge.scale_from_two_radii((slope, far), (1e-5 * slope, 1e-5 * far), distance, 5e-6)
+        assert estimate == pytest.approx(1.0)
         assert 1e6 * error == pytest.approx(ppm, rel=0.04)
     x = np.linspace(0.1, 1.0, 10)
     for largest, k2, k3 in ((1.0, 69, 127), (10.0, 0.69, 0.13), (100.0, 0.0069, 0.00013)):
         a = np.sqrt(x) * largest if False else np.concatenate([x, -x]) * largest
-        found = centrifuge.fit_polynomial(a, a, np.full(20, 1e-4), centrifuge.TERMS[:4])
-        assert 1e6 * found.of("second_order")[1] == pytest.approx(k2, rel=0.35)
-        assert 1e6 * found.of("third_order")[1] == pytest.approx(k3, rel=0.35)
+        estimate = centrifuge.fit_polynomial(a, a, np.full(20, 1e-4), centrifuge.TERMS[:4])
+        assert 1e6 * estimate.of("second_order")[1] == pytest.approx(k2, rel=0.35)
+        assert 1e6 * estimate.of("third_order")[1] == pytest.approx(k3, rel=0.35)
 
 
 def test_linearity_says_which_line() -> None:
@@ -301,15 +301,15 @@ def test_one_plane_of_tilt_gives_the_known_uncertainties() -> None:
         assert (plain.of("bias")[1], plain.scale[1]) == pytest.approx(first, abs=6e-3)
         assert plain.phase[1] == pytest.approx(first[1], abs=6e-3)
         whole = tilt.fit_tilt(angle, np.sin(angle), np.ones(n), orders=3)
-        found = (whole.of("bias")[1], whole.scale[1], whole.of("second_order")[1], whole.of("third_order")[1])
-        assert found == pytest.approx(more, abs=0.01)
+        uncertainties = (whole.of("bias")[1], whole.scale[1], whole.of("second_order")[1], whole.of("third_order")[1])
+        assert uncertainties == pytest.approx(more, abs=0.01)
 
 
 def test_a_cubic_raises_the_scale_by_three_quarters() -> None:
     angle = 2 * np.pi * np.arange(24) / 24
-    found = tilt.fit_tilt(angle, np.sin(angle) + 1e-3 * np.sin(angle) ** 3, np.ones(24))
-    assert found.scale[0] - 1.0 == pytest.approx(0.75e-3, rel=1e-6)
-    assert found.residuals == pytest.approx(-0.25e-3 * np.sin(3 * angle), abs=1e-12)
+    fit = tilt.fit_tilt(angle, np.sin(angle) + 1e-3 * np.sin(angle) ** 3, np.ones(24))
+    assert fit.scale[0] - 1.0 == pytest.approx(0.75e-3, rel=1e-6)
+    assert fit.residuals == pytest.approx(-0.25e-3 * np.sin(3 * angle), abs=1e-12)
 
 
 def test_definitions_of_bias_stability_differ(rng: np.random.Generator) -> None:
@@ -340,12 +340,12 @@ def test_factors_of_a_standard_deviation_from_few_cycles() -> None:
 
 
 def test_own_error_of_the_cycles_is_removed(rng: np.random.Generator) -> None:
-    found = [
+    estimates = [
         stability.repeatability(20.0 * rng.normal(size=10) + 15.0 * rng.normal(size=10), 15.0) for _ in range(2000)
     ]
-    assert np.mean([one.value == 0.0 for one in found]) == pytest.approx(0.05, abs=0.03)
-    assert np.sqrt(np.mean([one.value**2 for one in found])) == pytest.approx(20.0, rel=0.06)
-    assert np.mean([one.low <= 20.0 <= one.high for one in found]) == pytest.approx(0.95, abs=0.03)
+    assert np.mean([one.value == 0.0 for one in estimates]) == pytest.approx(0.05, abs=0.03)
+    assert np.sqrt(np.mean([one.value**2 for one in estimates])) == pytest.approx(20.0, rel=0.06)
+    assert np.mean([one.low <= 20.0 <= one.high for one in estimates]) == pytest.approx(0.95, abs=0.03)
 
 
 OVERALL = {

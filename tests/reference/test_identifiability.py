@@ -158,8 +158,10 @@ def test_soaks_up_and_down_show_all_of_ageing():
 def test_shuffled_soaks_show_most_of_ageing(rng):
     parts = []
     for _ in range(60):
-        found = visibility.visibilities(soaks(rng.permutation(CLOSED)), THERMAL, 1e-5, ["aging_linear", "scale_aging"])
-        parts.append([s.remaining_fraction for s in found])
+        visibilities = visibility.visibilities(
+            soaks(rng.permutation(CLOSED)), THERMAL, 1e-5, ["aging_linear", "scale_aging"]
+        )
+        parts.append([s.remaining_fraction for s in visibilities])
     ageing, scale_ageing = np.mean(parts, axis=0)
     assert ageing == pytest.approx(0.93, abs=0.05)
     assert 0.86 - 0.03 < scale_ageing < 1.0

@@ -91,14 +91,15 @@ def again(plan, count):
 
 def test_the_proposal_brings_five_times_the_information_of_repeating_the_plan():
     model, group = ambiguous(measured())
-    found = proposal(model, group, Circumstances(budget=8.0, pace=StationPace(dwell_s=10.0)))
-    count = len(found.steps)
+    proposed = proposal(model, group, Circumstances(budget=8.0, pace=StationPace(dwell_s=10.0)))
+    count = len(proposed.steps)
     assert 3 <= count <= 12
-    got = information(model, group, found.steps)
+    got = information(model, group, proposed.steps)
     # what was measured so far says what it says; the steps add what is expected of them
-    assert min(chi for _, chi in found.if_true) == found.after
+    assert min(chi for _, chi in proposed.if_true) == proposed.after
     added = {
-        name: chi - sign * observed(model, group) for (name, chi), sign in zip(found.if_true, (1.0, -1.0), strict=True)
+        name: chi - sign * observed(model, group)
+        for (name, chi), sign in zip(proposed.if_true, (1.0, -1.0), strict=True)
     }
     assert min(added.values()) == pytest.approx(got - information(model, group, []), rel=0.05)
     faces = information(model, group, again("six", count))
@@ -109,8 +110,8 @@ def test_the_proposal_brings_five_times_the_information_of_repeating_the_plan():
 
 def test_the_proposal_goes_where_the_two_curves_part():
     model, group = ambiguous(measured())
-    found = proposal(model, group, Circumstances(budget=8.0))
-    force = np.abs([frames.force_from_angles(s.outer, s.inner) for s in found.steps])
+    proposed = proposal(model, group, Circumstances(budget=8.0))
+    force = np.abs([frames.force_from_angles(s.outer, s.inner) for s in proposed.steps])
     for axis in range(3):
         assert np.any(np.abs(force[:, axis] - 0.27) < 0.08)
 
@@ -118,10 +119,10 @@ def test_the_proposal_goes_where_the_two_curves_part():
 def test_the_separation_expected_is_the_separation_found():
     """Of 300 units, measured again as proposed, the wrong rival leaves the chi-square that was expected: by numpy alone."""
     model, group = ambiguous(measured(units=300))
-    found = proposal(model, group, Circumstances(budget=8.0))
+    proposed = proposal(model, group, Circumstances(budget=8.0))
     before = information(model, group, [])
     rng = np.random.default_rng(8)
-    force = np.vstack([forces("twenty_six"), [frames.force_from_angles(s.outer, s.inner) for s in found.steps]])
+    force = np.vstack([forces("twenty_six"), [frames.force_from_angles(s.outer, s.inner) for s in proposed.steps]])
 
     def lost(draw):
         total = 0.0
@@ -138,7 +139,7 @@ def test_the_separation_expected_is_the_separation_found():
     exact = 300 * lost(np.zeros)
     drawn = sum(lost(lambda n: NOISE * rng.standard_normal(n)) for _ in range(300))
     assert abs(drawn - exact) < 3.0 * 2.0 * np.sqrt(exact)
-    assert found.after > 3.0 * before
+    assert proposed.after > 3.0 * before
     # the 300 units measure the first plan anew as well, without the luck that the lot had with it
-    expected = dict(found.if_true)["third_order"] - observed(model, group) + before
+    expected = dict(proposed.if_true)["third_order"] - observed(model, group) + before
     assert expected == pytest.approx(exact, rel=0.1)

@@ -77,10 +77,10 @@ class TestFerraris:
 
     def test_the_published_calibration_comes_back(self, session: tuple, shared_data: Path) -> None:
         expected = json.loads((shared_data / "ferraris" / "expected_calibration.json").read_text())
-        found = ferraris(session[0], session[1], 9.81)
-        np.testing.assert_allclose(found.scale, expected["K_a"], rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(found.rotation, expected["R_a"], rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(found.bias, expected["b_a"], rtol=1e-9)
+        calibration = ferraris(session[0], session[1], 9.81)
+        np.testing.assert_allclose(calibration.scale, expected["K_a"], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(calibration.rotation, expected["R_a"], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(calibration.bias, expected["b_a"], rtol=1e-9)
 
     def test_all_eighteen_means_fit_better_and_show_the_lack_of_fit(self, session: tuple) -> None:
         up, down, error = session

@@ -29,8 +29,8 @@ def covariance(time, density, instability, walk):
     f = np.geomspace(1.0 / (4.0 * time.max()), 20.0 / DWELL_S, 3000)
     power = instability**2 / (np.pi * f) * np.sinc(f * DWELL_S) ** 2
     lags = np.unique(gap)
-    found = np.trapezoid(power * np.cos(2.0 * np.pi * f * lags[:, None]) * f, np.log(f), axis=-1)
-    flicker = np.interp(gap, lags, found)
+    by_lag = np.trapezoid(power * np.cos(2.0 * np.pi * f * lags[:, None]) * f, np.log(f), axis=-1)
+    flicker = np.interp(gap, lags, by_lag)
     slow = walk**2 * (np.minimum(time[:, None], time) - np.eye(len(time)) * DWELL_S / 6.0)
     return 1e-12 * (density**2 / (2.0 * DWELL_S) * np.eye(len(time)) + flicker + slow)
 
@@ -39,14 +39,14 @@ def pulls(rng, state, kind, units, lots):
     """Errors over stated errors, (lots·units, 3, p), and the errors themselves."""
     root = np.linalg.cholesky(covariance(state.time, *KINDS[kind]))
     white = 1e-6 * KINDS[kind][0] / np.sqrt(2.0 * DWELL_S)
-    found, errors = [], []
+    ratios, errors = [], []
     for _ in range(lots):
         noise = root @ rng.standard_normal((units, 3, len(root), 1))
         out = state.force + np.swapaxes(noise[..., 0], -1, -2)
         fit = fit_lot_with_wander(LINEAR, state, out, np.full(out.shape, white)).fit
         errors.append(fit.coefficients - [0.0, 1.0, 0.0, 0.0])
-        found.append(errors[-1] / fit.standard_errors)
-    return np.concatenate(found), np.concatenate(errors)
+        ratios.append(errors[-1] / fit.standard_errors)
+    return np.concatenate(ratios), np.concatenate(errors)
 
 
 def within(values):
@@ -57,16 +57,16 @@ def within(values):
 @pytest.mark.parametrize("kind", ["white", "flicker", "all"])
 def test_six_faces_are_as_good_as_they_say(rng, kind, units):
     """Taken for white, the scatter of so few dwells left half of the biases outside two standard errors."""
-    found, _ = pulls(rng, plan("six"), kind, units, 96 // units)
-    assert within(found[..., 0]) > 0.84  # the walk before the first dwell is the bias's, and not seen
-    assert 0.93 < within(found[..., 1:]) < 0.995
+    ratios, _ = pulls(rng, plan("six"), kind, units, 96 // units)
+    assert within(ratios[..., 0]) > 0.84  # the walk before the first dwell is the bias's, and not seen
+    assert 0.93 < within(ratios[..., 1:]) < 0.995
 
 
 @pytest.mark.parametrize("kind", ["white", "flicker", "all"])
 def test_coefficients_of_many_dwells_are_as_good_as_they_say(rng, kind):
-    found, errors = pulls(rng, plan("twelve", repeats=3), kind, 4, 40)
-    assert within(found[..., 0]) > 0.92
-    assert within(found[..., 1:]) == pytest.approx(0.9545, abs=0.02)
+    ratios, errors = pulls(rng, plan("twelve", repeats=3), kind, 4, 40)
+    assert within(ratios[..., 0]) > 0.92
+    assert within(ratios[..., 1:]) == pytest.approx(0.9545, abs=0.02)
     noise = DwellNoise(*(1e-6 * x for x in KINDS[kind]))
     state = plan("twelve", repeats=3)
     expected = expected_errors(LINEAR, state, dwell_covariance(state.time, DWELL_S, noise)).errors

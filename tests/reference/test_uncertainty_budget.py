@@ -75,7 +75,7 @@ def unit(axis: int) -> tuple[float, float, float]:
 
 def station(state: State, s: dict[str, float]) -> tuple[list[InputQuantity], list[Scattered]]:
     """The influences of a station of these standard uncertainties."""
-    found = [
+    quantities = [
         InputQuantity("gravity", Errors(gravity=1.0), s["gravity"]),
         InputQuantity("level", Errors(level=(1.0, 0.0)), s["level_1"]),
         InputQuantity("level", Errors(level=(0.0, 1.0)), s["level_2"]),
@@ -90,15 +90,19 @@ def station(state: State, s: dict[str, float]) -> tuple[list[InputQuantity], lis
     ]
     for order in (1, 2):
         for phase in ("sin", "cos"):
-            found.append(InputQuantity("harmonics", Errors(outer=harmonic(state.outer, order, phase)), s["harmonics"]))
-            found.append(InputQuantity("harmonics", Errors(inner=harmonic(state.inner, order, phase)), s["harmonics"]))
-    found += [InputQuantity("seat", Errors(seat=unit(k)), s["seat"], "mount") for k in range(3)]
-    found += [InputQuantity("reader", Errors(offset=unit(k)), s["reader"], "slot") for k in range(3)]
+            quantities.append(
+                InputQuantity("harmonics", Errors(outer=harmonic(state.outer, order, phase)), s["harmonics"])
+            )
+            quantities.append(
+                InputQuantity("harmonics", Errors(inner=harmonic(state.inner, order, phase)), s["harmonics"])
+            )
+    quantities += [InputQuantity("seat", Errors(seat=unit(k)), s["seat"], "mount") for k in range(3)]
+    quantities += [InputQuantity("reader", Errors(offset=unit(k)), s["reader"], "slot") for k in range(3)]
     for one in np.unique(state.temperature):
-        found.append(
+        quantities.append(
             InputQuantity("soak", Errors(temperature=(state.temperature == one).astype(float)), s["soak"], "soak")
         )
-    return found, [Scattered("pose", s["pose"], s["pose"])]
+    return quantities, [Scattered("pose", s["pose"], s["pose"])]
 
 
 def through(plan: str, influences=None, scattered=()):
@@ -116,7 +120,7 @@ def combined(errors: np.ndarray) -> np.ndarray:
     return 1e6 * np.sqrt(np.sum(errors**2, axis=-1))
 
 
-def output(found, effects, force, temperature) -> np.ndarray:
+def output(influences, effects, force, temperature) -> np.ndarray:
     """u of the corrected output (3,), µg."""
     at = State(
         force=np.array([force]),
@@ -125,7 +129,7 @@ def output(found, effects, force, temperature) -> np.ndarray:
         outer=np.zeros(1),
         inner=np.zeros(1),
     )
-    return combined(found.output_errors(design.local_columns(design.split(effects)[0], at, {}))[0])
+    return combined(influences.output_errors(design.local_columns(design.split(effects)[0], at, {}))[0])
 
 
 WHOLE = {  # bias x, y, z µg; scale ppm; Kxy, Kxz, Kyz, Kyx, Kzx, Kzy µrad
@@ -150,28 +154,28 @@ OUTPUTS = {
 
 @pytest.mark.parametrize("plan", PLANS)
 def test_the_whole_budget_of_a_workshop_station(plan: str) -> None:
-    _, effects, _, found = through(plan)
-    u = combined(found.coefficients)
+    _, effects, _, influences = through(plan)
+    u = combined(influences.coefficients)
     bias, scale, misalignment = WHOLE[plan]
     np.testing.assert_allclose(u[:, 0], bias, rtol=2e-5)
     np.testing.assert_allclose(u[:, 1], scale, rtol=2e-5)
     np.testing.assert_allclose(u[:, 2:4].ravel(), misalignment, rtol=2e-5)
     for force, temperature, axis, expected in OUTPUTS[plan]:
-        assert output(found, effects, force, temperature)[axis] == pytest.approx(expected, rel=2e-5)
+        assert output(influences, effects, force, temperature)[axis] == pytest.approx(expected, rel=2e-5)
 
 
 @pytest.mark.parametrize(
     ("plan", "u"), [("twelve", [0.3548, 0.3548, 0.3925, 0.9646]), ("fib", [0.2335, 0.2313, 0.2479, 0.7541])]
 )
 def test_the_temperature_coefficients_of_a_workshop_station(plan: str, u: list[float]) -> None:
-    _, _, _, found = through(plan)
-    got = combined(found.coefficients)
+    _, _, _, influences = through(plan)
+    got = combined(influences.coefficients)
     np.testing.assert_allclose([*got[:, 4], got[0, 6]], u, atol=6e-5)
 
 
 def test_what_rules_the_bias_of_z() -> None:
-    _, _, _, found = through("fib")
-    names, errors = np.array(found.source.contributions), 1e6 * found.coefficients[2, 0]
+    _, _, _, influences = through("fib")
+    names, errors = np.array(influences.source.contributions), 1e6 * influences.coefficients[2, 0]
     shares = {name: 100.0 * np.sum(errors[names == name] ** 2) / np.sum(errors**2) for name in set(names.tolist())}
     expected = {
         "level": 63.1,
@@ -221,10 +225,10 @@ def test_the_second_outer_sine_does_nothing_on_six_faces_and_moves_scales_on_twe
 
 
 def test_the_visible_shares() -> None:
-    _, _, fit, found = through("fib")
-    shares = fit.visible_share(found.source.changes)
+    _, _, fit, influences = through("fib")
+    shares = fit.visible_share(influences.source.changes)
     by_name = {}
-    for name, share in zip(found.source.contributions, shares, strict=True):
+    for name, share in zip(influences.source.contributions, shares, strict=True):
         by_name.setdefault(name, []).append(float(share))
     for name in ("gravity", "thermometer_offset", "thermometer_slope", "supply", "gain"):
         assert max(by_name[name]) < 1e-6
@@ -249,13 +253,13 @@ SHOWN = [  # influence, size, error of the worst axis shown and true, of the nor
 def test_what_the_stations_own_verification_shows_of_an_error(
     name, errors, size, shown, true, norm_shown, norm_true
 ) -> None:
-    _, effects, _, found = through("fib", lambda state: [InputQuantity(name, errors(state), size)])
+    _, effects, _, influences = through("fib", lambda state: [InputQuantity(name, errors(state), size)])
     at = state_of(np.array(VERIFICATION), PLANS["fib"][1])
     own = sensitivity(model_of(effects), at, [InputQuantity(name, errors(at), size)])
     columns_ = design.local_columns(design.split(effects)[0], at, {})
     for errors_, of_axis, of_norm in (
-        (found.output_errors(columns_), true, norm_true),
-        (found.shown_errors(columns_, own.changes), shown, norm_shown),
+        (influences.output_errors(columns_), true, norm_true),
+        (influences.shown_errors(columns_, own.changes), shown, norm_shown),
     ):
         worst = 1e6 * np.max(np.sqrt(np.mean(errors_[..., 0] ** 2, axis=0)))
         assert worst == pytest.approx(of_axis, abs=max(0.6, 0.006 * of_axis))
@@ -265,12 +269,12 @@ def test_what_the_stations_own_verification_shows_of_an_error(
 
 
 def test_a_rotation_of_the_whole_unit_is_no_error_in_its_own_frame() -> None:
-    _, effects, _, found = through(
+    _, effects, _, influences = through(
         "fib", lambda state: [InputQuantity("seat", Errors(seat=unit(k)), 1e-3) for k in range(3)]
     )
     at = state_of(np.array(VERIFICATION), (25.0,))
     columns_ = design.local_columns(design.split(effects)[0], at, {})
-    fixture, own = (found.user_errors(columns_, at.force, intrinsic=flag) for flag in (False, True))
+    fixture, own = (influences.user_errors(columns_, at.force, intrinsic=flag) for flag in (False, True))
     assert 1e6 * np.sqrt(np.mean(np.sum(fixture**2, axis=-1))) > 500.0
     assert 1e6 * np.max(np.abs(own)) < 2.0
 
@@ -279,7 +283,7 @@ def test_a_rotation_of_the_whole_unit_is_no_error_in_its_own_frame() -> None:
 def test_a_monte_carlo_of_an_independent_station_agrees_to_5_percent(plan: str, trials: int) -> None:
     """JCGM 101 with a forward model and a fit of its own; two standard errors of a deviation are 2.5 %."""
     name, temperatures = PLANS[plan]
-    state, _, _, found = through(plan)
+    state, _, _, influences = through(plan)
     rng = np.random.default_rng(20261122)
     outer, inner = np.radians(np.tile(poses.plan(name), (len(temperatures), 1))).T
     soak = np.repeat(np.arange(len(temperatures)), len(poses.plan(name)))
@@ -295,9 +299,9 @@ def test_a_monte_carlo_of_an_independent_station_agrees_to_5_percent(plan: str, 
     np.testing.assert_allclose(
         fitted(force, read, outputs(outer, inner, read, soak, quiet), temperature=warm), got.mean(axis=0), atol=5e-5
     )
-    ratio = np.std(got, axis=0, ddof=1) / np.sqrt(np.sum(found.coefficients**2, axis=-1))
+    ratio = np.std(got, axis=0, ddof=1) / np.sqrt(np.sum(influences.coefficients**2, axis=-1))
     assert np.max(np.abs(ratio - 1.0)) < 0.05
-    own = found.covariance()
+    own = influences.covariance()
     spread = np.sqrt(np.diagonal(own))
     sampled = np.corrcoef(got.reshape(trials, -1).T)
     assert np.max(np.abs(sampled - own / np.outer(spread, spread))) < 0.07
@@ -323,13 +327,13 @@ RISKS = [  # mean, process, u, tolerance, acceptance, PFA, PFR, accepted
 
 @pytest.mark.parametrize(("mean", "process", "u", "tolerance", "accept", "pfa", "pfr", "accepted"), RISKS)
 def test_global_risks_are_those_of_suncal(mean, process, u, tolerance, accept, pfa, pfr, accepted) -> None:
-    found = global_risk(mean, process, u, (-tolerance, tolerance), (-accept, accept))
-    assert (found.pfa, found.pfr, found.accepted) == pytest.approx((pfa, pfr, accepted), abs=6e-9)
+    risk = global_risk(mean, process, u, (-tolerance, tolerance), (-accept, accept))
+    assert (risk.pfa, risk.pfr, risk.accepted) == pytest.approx((pfa, pfr, accepted), abs=6e-9)
 
 
 def test_suncals_risks_by_share_in_tolerance_and_ratio() -> None:
-    found = global_risk(0.0, process_for(0.95, 1.0), 0.125, (-1.0, 1.0), (-1.0, 1.0))
-    assert (found.pfa, found.pfr) == pytest.approx((0.00858266, 0.01553651), abs=6e-9)
+    risk = global_risk(0.0, process_for(0.95, 1.0), 0.125, (-1.0, 1.0), (-1.0, 1.0))
+    assert (risk.pfa, risk.pfr) == pytest.approx((0.00858266, 0.01553651), abs=6e-9)
     for ratio, expected in (
         (1.0, (0.044473, 0.032509, 0.018012, 0.004064)),
         (2.0, (0.029522, 0.022638, 0.013373, 0.003312)),
@@ -487,5 +491,5 @@ def test_published_sites_lie_within_60_ppm_of_the_formula() -> None:
 
 
 def test_the_model_that_lacks_temperature_is_moved_by_the_devices_own_coefficient() -> None:
-    _, _, _, found = through("six", lambda state: [InputQuantity("thermometer", Errors(temperature=1.0), 1.0)])
-    assert 1e6 * np.abs(found.coefficients[0, 0, 0]) == pytest.approx(50.0, rel=1e-6)
+    _, _, _, influences = through("six", lambda state: [InputQuantity("thermometer", Errors(temperature=1.0), 1.0)])
+    assert 1e6 * np.abs(influences.coefficients[0, 0, 0]) == pytest.approx(50.0, rel=1e-6)

@@ -97,18 +97,18 @@ def _command(*words: object) -> str:
 def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     place = ("--archive", run.archive.root)
     whole = json.loads(_command("diagnose", run.id, "--json", *place))
-    found = adequacy_of(run)
-    assert found is not None
-    assert found["adequate"] is whole["adequate"]
-    assert {name: found[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
-    print_adequacy(found)
+    document = adequacy_of(run)
+    assert document is not None
+    assert document["adequate"] is whole["adequate"]
+    assert {name: document[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
+    print_adequacy(document)
     line = capsys.readouterr().out.strip()
     assert line.startswith("model ")
     assert verdict(whole).startswith(line.removeprefix("model").strip())
     panel = model_adequacy.render(ReportContext(run, {}))
     assert panel is not None
     cards = re.findall(r"<b>(.*?)</b>", panel)
-    assert cards == [f"{significant(found[n])} µg" for n in FIGURES[:2]] + [chance(found["p_value"])]
+    assert cards == [f"{significant(document[n])} µg" for n in FIGURES[:2]] + [chance(document["p_value"])]
     assert f"tumbleline diagnose {run.id}" in panel
 
 
@@ -129,10 +129,10 @@ class Pictured:
 
 def test_a_run_whose_units_were_all_refused_says_what_is_missing(tmp_path: Path) -> None:
     run = small_run(tmp_path, dict.fromkeys(("A1", "A2", "A3"), "silent"))
-    found = adequacy_of(run)
-    assert found is not None
-    assert found["adequate"] is None
-    assert "refused" in str(found["reason"])
+    document = adequacy_of(run)
+    assert document is not None
+    assert document["adequate"] is None
+    assert "refused" in str(document["reason"])
     panel = model_adequacy.render(Pictured(run))  # pyright: ignore[reportArgumentType]
     assert panel is not None
     assert "Cannot be judged: every unit was refused" in panel

@@ -44,8 +44,8 @@ def known(root: Path, *events: LedgerEntry, captures: dict[str, str] | None = No
 
 def told(all_: Calibrations, certificates: Certificates) -> tuple[str, str, str, bool]:
     """Of the one unit: when it is due, why, by which certificate, and whether one holds."""
-    found = due(all_, np.ones(len(all_), dtype=bool), RULES, [], {}, certificates)
-    return date_of(found.day[0]), str(found.because[0]), str(found.certificate[0]), bool(found.valid[0])
+    due_units = due(all_, np.ones(len(all_), dtype=bool), RULES, [], {}, certificates)
+    return date_of(due_units.day[0]), str(due_units.because[0]), str(due_units.certificate[0]), bool(due_units.valid[0])
 
 
 def test_a_unit_is_due_when_its_certificate_ends_and_not_when_the_interval_does(tmp_path: Path) -> None:
@@ -78,15 +78,15 @@ def test_a_revocation_that_was_written_after_the_day_is_not_known_on_it(tmp_path
 def test_what_passed_and_was_never_certified_is_told_and_due_by_its_interval(tmp_path: Path) -> None:
     ledger = known(tmp_path, event(serial="B1", start="2026-01-02"))
     all_ = measured(("A1", "r-1", "2026-02-01"), ("B1", "r-1", "2026-01-01"))
-    found = due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger)
-    assert [str(all_.unit[found.row[k]]) for k in uncertified(all_, found, ledger)] == ["A1"]
-    assert (date_of(found.day[0]), found.because[0], found.valid[0]) == ("2027-02-01", "fixed", False)
+    due_units = due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger)
+    assert [str(all_.unit[due_units.row[k]]) for k in uncertified(all_, due_units, ledger)] == ["A1"]
+    assert (date_of(due_units.day[0]), due_units.because[0], due_units.valid[0]) == ("2027-02-01", "fixed", False)
 
 
 def test_without_a_ledger_nothing_is_told_as_uncertified(tmp_path: Path) -> None:
     all_, ledger = measured(("A1", "r-1", "2026-02-01")), known(tmp_path)
-    found = due(all_, np.ones(1, dtype=bool), RULES, [], {}, ledger)
-    assert uncertified(all_, found, ledger).size == 0
+    due_units = due(all_, np.ones(1, dtype=bool), RULES, [], {}, ledger)
+    assert uncertified(all_, due_units, ledger).size == 0
     assert told(all_, ledger) == ("2027-02-01", "fixed", "", False)
 
 
@@ -94,8 +94,8 @@ def test_a_newer_pass_that_is_not_certified_leaves_the_older_certificate_standin
     ledger = known(tmp_path, event(start="2025-08-01", until="2026-08-01"))
     all_ = measured(("A1", "r-1", "2025-07-31"), ("A1", "r-2", "2026-06-01"))
     assert told(all_, ledger) == ("2026-08-01", "certificate", "A1/1", True)
-    found = due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger)
-    assert uncertified(all_, found, ledger).size == 1
+    due_units = due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger)
+    assert uncertified(all_, due_units, ledger).size == 1
 
 
 def test_a_unit_that_failed_is_due_although_its_certificate_holds(tmp_path: Path) -> None:
@@ -107,8 +107,8 @@ def test_a_unit_that_failed_is_due_although_its_certificate_holds(tmp_path: Path
 def test_a_run_again_of_the_same_capture_certifies_the_measurement(tmp_path: Path) -> None:
     ledger = known(tmp_path, event(run="again-1", start="2026-01-02"), captures={"r-1": "c", "again-1": "c"})
     all_ = measured(("A1", "r-1", "2026-01-01"))
-    found = due(all_, np.ones(1, dtype=bool), RULES, [], {}, ledger)
-    assert found.entered.all()
+    due_units = due(all_, np.ones(1, dtype=bool), RULES, [], {}, ledger)
+    assert due_units.entered.all()
 
 
 def test_one_serial_on_another_kind_of_device_has_no_certificate(tmp_path: Path) -> None:
@@ -144,8 +144,8 @@ def test_whether_a_certificate_holds_is_what_the_ledger_says_on_that_day(
         except WrongUse:
             continue
     everything = certificates_of(root, day_of("2100-01-01"), {})
-    found = Certificates(day, everything.of, {}, {})
-    standing = found.standing("ADXL355", "A1", "r-0")
+    certificates = Certificates(day, everything.of, {}, {})
+    standing = certificates.standing("ADXL355", "A1", "r-0")
     held = ledger.valid_at("A1", day)
     if held is None:
         assert standing is None or standing.state != "valid"

@@ -96,10 +96,10 @@ def test_a_change_of_level_is_placed_inside_its_interval(rng):
     for _ in range(100):
         values = rng.standard_normal(200)
         values[120:] += 1.5
-        found = change_points(values)
-        assert len(found) == 1
-        assert found[0].shift == pytest.approx(1.5, abs=5.0 * found[0].error)
-        hit += found[0].low <= 120 <= found[0].high
+        changes = change_points(values)
+        assert len(changes) == 1
+        assert changes[0].shift == pytest.approx(1.5, abs=5.0 * changes[0].error)
+        hit += changes[0].low <= 120 <= changes[0].high
     assert hit >= 90
 
 
@@ -140,8 +140,8 @@ def test_units_and_places_are_taken_apart(rng):
     units, places = np.repeat(np.arange(200), 8), rng.integers(0, 12, 1600)
     values = unit[units] + place[places] + 0.1 * rng.standard_normal(1600)
     values[7] += 50.0
-    _, found = unit_and_place(values, units, places)
-    assert found == pytest.approx(place - np.median(place), abs=0.06)
+    _, estimated = unit_and_place(values, units, places)
+    assert estimated == pytest.approx(place - np.median(place), abs=0.06)
 
 
 def test_no_value_of_a_small_population_stands_out_by_chance(rng):

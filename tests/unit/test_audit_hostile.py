@@ -34,11 +34,11 @@ def calibrations(*rows: tuple[str, str, str, float], values: np.ndarray | None =
     n = len(rows)
     run = np.array([f"{s}-{d}" for s, d in zip(station, day, strict=True)], dtype=object)
     content = np.zeros((n, len(NAMES))) if values is None else values
-    found = Calibrations(
+    unsorted = Calibrations(
         run, unit, device, station, np.zeros(n, dtype=np.int64), np.full(n, "pass", dtype=object), day.astype(float),
         content, np.full(content.shape, 0.01),
     )  # fmt: skip
-    return found.chosen(order)
+    return unsorted.chosen(order)
 
 
 def test_one_serial_on_two_kinds_of_device_is_two_units() -> None:
@@ -58,8 +58,8 @@ def test_exchanged_serials_are_told_among_four_units_too(rng: np.random.Generato
     own = 5000.0 * rng.standard_normal((4, len(NAMES)))
     values = np.repeat(own, 2, axis=0) + 0.1 * rng.standard_normal((8, len(NAMES)))
     values[[1, 5]] = values[[5, 1]]  # A and C on the second day
-    found = strangers(calibrations(*rows, values=values), RULES)
-    assert [(one.row, one.looks_like, one.exchanged) for one in found] == [(1, "C", True), (5, "A", True)]
+    strange = strangers(calibrations(*rows, values=values), RULES)
+    assert [(one.row, one.looks_like, one.exchanged) for one in strange] == [(1, "C", True), (5, "A", True)]
 
 
 def test_among_few_units_one_that_changed_is_not_called_exchanged(rng: np.random.Generator) -> None:
@@ -75,15 +75,15 @@ def test_a_unit_with_one_calibration_and_one_that_came_back_early_count_from_the
 ) -> None:
     start = day_of("2024-01-10")
     all_ = calibrations(("A", "X", "s", start), ("B", "X", "s", start), ("B", "X", "s", start + 20.0))
-    found = due(all_, np.ones(3, dtype=bool), RULES, [], {})
-    assert [date_of(day) for day in found.day] == ["2025-01-10", "2025-01-30"]
+    due_units = due(all_, np.ones(3, dtype=bool), RULES, [], {})
+    assert [date_of(day) for day in due_units.day] == ["2025-01-10", "2025-01-30"]
 
 
 def test_a_unit_that_another_station_measured_since_is_not_due_at_the_first_one() -> None:
     start = day_of("2024-01-10")
     all_ = calibrations(("A", "X", "s", start), ("A", "X", "t", start + 300.0), ("B", "X", "s", start))
-    found = last_measured(all_, due(all_, np.ones(3, dtype=bool), RULES, [], {}), "s")
-    assert [str(all_.unit[row]) for row in found.row] == ["B"]
+    due_units = last_measured(all_, due(all_, np.ones(3, dtype=bool), RULES, [], {}), "s")
+    assert [str(all_.unit[row]) for row in due_units.row] == ["B"]
 
 
 @pytest.fixture(scope="module")
@@ -101,26 +101,26 @@ def test_clocks_that_were_never_set_or_run_ahead_leave_out_their_runs_and_are_to
         about = json.loads((run / "run.json").read_bytes())
         (run / "run.json").write_text(json.dumps({**about, "when": moment}), encoding="utf-8")
     until = day_of("2022-02-01")
-    found = audit(Archive(tmp_path / "archive"), RULES, Scope(day_of("2021-01-01"), until, tomorrow=until))
-    told = {finding.subject: finding for finding in findings(found) if finding.who == "archive"}
+    audited = audit(Archive(tmp_path / "archive"), RULES, Scope(day_of("2021-01-01"), until, tomorrow=until))
+    told = {finding.subject: finding for finding in findings(audited) if finding.who == "archive"}
     assert set(told) == {run.name for run in runs}
     assert "is in the future" in told[runs[0].name].message
     assert "its date 'yesterday' is invalid" in told[runs[1].name].message
     assert "a clock that was never set" in told[runs[2].name].message
-    assert not set(found.all.run) & {run.name for run in runs}
+    assert not set(audited.all.run) & {run.name for run in runs}
 
 
 def test_a_serial_that_two_runs_have_at_once_is_told_with_both_runs(made: Path) -> None:
     scope = Scope(day_of("2021-01-01"), day_of("2022-02-01"))
-    found = audit(Archive(made), RULES, scope)
-    unit = found.all.unit.copy()
+    audited = audit(Archive(made), RULES, scope)
+    unit = audited.all.unit.copy()
     once = np.array([str(one).startswith("N") for one in unit])  # of those that did not come back
-    a, b = (np.flatnonzero(once & (found.all.device == device))[0] for device in ("ADXL355", "SF1500"))
+    a, b = (np.flatnonzero(once & (audited.all.device == device))[0] for device in ("ADXL355", "SF1500"))
     unit[b] = unit[a]
-    told = findings(replace(found, all=replace(found.all, unit=unit)))
+    told = findings(replace(audited, all=replace(audited.all, unit=unit)))
     [finding] = [one for one in told if one.kind == "two_units"]
     assert finding.units == (str(unit[a]),)
-    assert set(finding.evidence["runs"]) == {str(found.all.run[a]), str(found.all.run[b])}
+    assert set(finding.evidence["runs"]) == {str(audited.all.run[a]), str(audited.all.run[b])}
 
 
 def test_units_that_failed_under_a_valid_certificate_make_one_finding_for_their_kind(
@@ -134,8 +134,8 @@ def test_units_that_failed_under_a_valid_certificate_make_one_finding_for_their_
     all_ = first.all
     columns = (all_.unit, all_.device, all_.run, all_.station)
     write_ledger(archive.root, [(*(str(column[row]) for column in columns), "2021-12-01") for row in failed])
-    found = audit(archive, RULES, scope)
-    told = {finding.subject: finding for finding in findings(found) if finding.kind == "held_but_failed"}
+    audited = audit(archive, RULES, scope)
+    told = {finding.subject: finding for finding in findings(audited) if finding.kind == "held_but_failed"}
     assert {unit for finding in told.values() for unit in finding.units} == {str(first.all.unit[row]) for row in failed}
     assert set(told) == {str(first.all.device[row]) for row in failed}
-    assert "uncertified" in {finding.kind for finding in findings(found)}
+    assert "uncertified" in {finding.kind for finding in findings(audited)}

@@ -27,10 +27,10 @@ def calibrations(rows: list[tuple], values: np.ndarray) -> Calibrations:
     days = START + day.astype(float)
     run = np.array([f"{s}-{d:.3f}" for s, d in zip(station, day.astype(float), strict=True)], dtype=object)
     same = np.full(len(rows), "ADXL355", dtype=object), np.full(len(rows), "pass", dtype=object)
-    found = Calibrations(
+    unsorted = Calibrations(
         run, unit, same[0], station, slot.astype(np.int64), same[1], days, values, np.full(values.shape, ERROR)
     )
-    return found.chosen(order)
+    return unsorted.chosen(order)
 
 
 def units_again(rng: np.random.Generator, units: int = 60, times: int = 6, spread: float = 1.0):
@@ -49,8 +49,8 @@ def coded(texts: list[str]) -> tuple[list[str], np.ndarray]:
     return known.tolist(), numbers
 
 
-def everything(found: Calibrations) -> np.ndarray:
-    return np.ones(len(found), dtype=bool)
+def everything(histories: Calibrations) -> np.ndarray:
+    return np.ones(len(histories), dtype=bool)
 
 
 def test_a_check_standard_that_moves_is_out_of_control_and_one_that_stands_is_not(rng):
@@ -61,13 +61,13 @@ def test_a_check_standard_that_moves_is_out_of_control_and_one_that_stands_is_no
             values.append(rng.standard_normal(len(NAMES)))
             if station == "line-2" and week >= 100:
                 values[-1][NAMES.index("bias_x")] += 2.0
-    found = charts(calibrations(rows, np.array(values)), load_rules(), START)
-    out = [(chart.station, chart.parameter) for chart in found if not chart.in_control]
+    control_charts = charts(calibrations(rows, np.array(values)), load_rules(), START)
+    out = [(chart.station, chart.parameter) for chart in control_charts if not chart.in_control]
     assert out == [("line-2", "bias_x")]
-    chart = next(c for c in found if c.station == "line-2" and c.parameter == "bias_x")
+    chart = next(c for c in control_charts if c.station == "line-2" and c.parameter == "bias_x")
     first = chart.day[np.argmax(chart.outside)]
     assert START + 7.0 * 98 <= first <= START + 7.0 * 112
-    assert len(found) == 2 * 15  # the turn belongs to the seat and is not charted
+    assert len(control_charts) == 2 * 15  # the turn belongs to the seat and is not charted
 
 
 def test_a_slot_that_is_knocked_is_told_with_its_day(rng):
@@ -76,8 +76,8 @@ def test_a_slot_that_is_knocked_is_told_with_its_day(rng):
     for k, (_, station, slot, day) in enumerate(rows):
         if (station, slot) == ("line-2", 1) and day >= 700.0:
             values[k, turn] += 1.0
-    found = calibrations(rows, values)
-    series, means = slot_series(found, everything(found))
+    histories = calibrations(rows, values)
+    series, means = slot_series(histories, everything(histories))
     moved = [(s.station, s.where, s.parameter) for s in series if s.changes]
     assert moved == [("line-2", "slot 1", "rotation_z")]
     [change] = next(s for s in series if s.changes).changes
@@ -90,16 +90,18 @@ def test_exchanged_serials_are_told_both_ways_and_leave_the_histories_alone(rng)
     a, b = 5 * 6 + 3, 9 * 6 + 3
     values[[a, b]] = values[[b, a]]
     rows[b] = (*rows[b][:3], rows[a][3])
-    found = calibrations(rows, values)
-    strange = strangers(found)
-    assert [(found.unit[s.row], s.looks_like, s.exchanged) for s in strange] == [
+    histories = calibrations(rows, values)
+    strange = strangers(histories)
+    assert [(histories.unit[s.row], s.looks_like, s.exchanged) for s in strange] == [
         ("U005", "U009", True),
         ("U009", "U005", True),
     ]
-    good = everything(found)
+    good = everything(histories)
     good[[s.row for s in strange]] = False
-    pairs = pairs_of(found, good)
-    assert np.abs(found.column("bias_x")[pairs.later] - found.column("bias_x")[pairs.earlier]).max() < 10 * ERROR
+    pairs = pairs_of(histories, good)
+    assert (
+        np.abs(histories.column("bias_x")[pairs.later] - histories.column("bias_x")[pairs.earlier]).max() < 10 * ERROR
+    )
 
 
 def test_a_unit_that_is_broken_fits_nobody(rng):
@@ -117,8 +119,8 @@ def test_a_gauge_study_is_found_among_the_runs(rng):
             for part in range(10):
                 rows.append((f"G{part}", station, part % 4, 500.0 + mount + 0.5 * (station == "line-2")))
                 values = np.vstack([values, own[part] + offset + 0.1 * rng.standard_normal(len(NAMES))])
-    found = calibrations(rows, values)
-    all_ = studies(found, everything(found), load_rules())
+    histories = calibrations(rows, values)
+    all_ = studies(histories, everything(histories), load_rules())
     assert {(s.stations, s.gauge.parts, s.gauge.mounts) for s in all_} == {(("line-1", "line-2"), 10, 3)}
     assert np.median([s.gauge.repeatability for s in all_]) == pytest.approx(0.1, rel=0.15)
     assert np.median([s.gauge.reproducibility for s in all_]) == pytest.approx(0.3 / np.sqrt(2.0), rel=0.3)
@@ -126,12 +128,12 @@ def test_a_gauge_study_is_found_among_the_runs(rng):
 
 def test_fixed_intervals_count_calendar_months_from_the_last_pass(rng):
     rows = [("A", "line-1", 0, 0.0), ("A", "line-1", 0, day_of("2022-08-31") - START), ("B", "line-1", 1, 30.0)]
-    found = calibrations(rows, rng.standard_normal((3, len(NAMES))))
-    outcome = found.outcome.copy()
+    histories = calibrations(rows, rng.standard_normal((3, len(NAMES))))
+    outcome = histories.outcome.copy()
     outcome[2] = "fail"
-    found = replace(found, outcome=outcome)
+    histories = replace(histories, outcome=outcome)
     rules = load_rules().model_copy(update={"interval_months": 6})
-    answer = due(found, everything(found), rules, [], {})
+    answer = due(histories, everything(histories), rules, [], {})
     assert [date_of(day) for day in answer.day] == ["2023-02-28", date_of(START + 30.0)]
     assert answer.because.tolist() == ["fixed", "did not pass"]
 
@@ -143,12 +145,12 @@ def test_a_unit_that_drifts_is_due_earlier_when_drift_decides(rng):
     for k, (unit, *_, day) in enumerate(rows):
         if unit == "U007":
             values[k, bias] += 1500.0 * day / 365.25
-    found = calibrations(rows, values)
+    histories = calibrations(rows, values)
     rules = load_rules().model_copy(update={"interval": "drift"})
-    kinds = kind_drifts(found, everything(found), rules, START)
-    units = unit_drifts(found, everything(found), kinds, rules, {("ADXL355", "bias"): 20000.0})
-    answer = due(found, everything(found), rules, kinds, units)
-    months = dict(zip(found.unit[answer.row], answer.months, strict=True))
+    kinds = kind_drifts(histories, everything(histories), rules, START)
+    units = unit_drifts(histories, everything(histories), kinds, rules, {("ADXL355", "bias"): 20000.0})
+    answer = due(histories, everything(histories), rules, kinds, units)
+    months = dict(zip(histories.unit[answer.row], answer.months, strict=True))
     assert months["U007"] < 13.0
     assert np.median(list(months.values())) == rules.longest_months
     [drift] = [d for d in units["ADXL355 U007"] if d.parameter == "bias_x"]
@@ -165,10 +167,10 @@ def test_a_lot_that_stands_out_is_told_once_and_not_unit_by_unit(rng):
             rows.append((f"L{lot:02d}-{place}", "line-1", place, float(lot)))
             values.append(rng.standard_normal(len(NAMES)) + (6.0 if lot == 33 else 0.0))
     values[205][NAMES.index("scale_y")] = 15.0
-    found = calibrations(rows, np.array(values))
-    odd = odd_ones(found, everything(found))
+    histories = calibrations(rows, np.array(values))
+    odd = odd_ones(histories, everything(histories))
     assert [(one.kind, one.name) for one in odd] == [("lot", "line-1-33.000"), ("unit", "L20-5")]
-    assert next(one for one in yields(found, everything(found)) if one.of == "all").passed == 600
+    assert next(one for one in yields(histories, everything(histories)) if one.of == "all").passed == 600
 
 
 def test_parameters_come_from_coefficients_by_their_definitions():
@@ -176,9 +178,9 @@ def test_parameters_come_from_coefficients_by_their_definitions():
     rows += [("misalignment", "Kxy", "x", 0.004), ("misalignment", "Kyx", "y", 0.002)]
     texts = {name: coded([r[k] for r in rows]) for k, name in enumerate(("effect", "name", "axis"))}
     value, error = np.array([r[3] for r in rows]), np.full(len(rows), 2e-6)
-    found = parameters_of(np.zeros(len(rows), dtype=np.int64), texts, value, error, np.array([1.5]))
-    assert found["bias_x"][0] == pytest.approx(1000.0)  # µg
-    assert found["bias_x_error"][0] == pytest.approx(1.0)
-    assert found["square_xy"][0] == pytest.approx(3.0)  # mrad
-    assert found["rotation_z"][0] == pytest.approx(-0.5)
-    assert np.isnan(found["bias_temperature_x"][0])
+    parameters = parameters_of(np.zeros(len(rows), dtype=np.int64), texts, value, error, np.array([1.5]))
+    assert parameters["bias_x"][0] == pytest.approx(1000.0)  # µg
+    assert parameters["bias_x_error"][0] == pytest.approx(1.0)
+    assert parameters["square_xy"][0] == pytest.approx(3.0)  # mrad
+    assert parameters["rotation_z"][0] == pytest.approx(-0.5)
+    assert np.isnan(parameters["bias_temperature_x"][0])

@@ -104,11 +104,11 @@ def test_nis_and_nees_of_its_own_model_lie_in_their_bounds(rng: np.random.Genera
     known[80:150] = np.nan  # nothing is known for 70 s
     nees, nis = [], []
     for b, y in zip(truth, output, strict=True):
-        found = track(model, np.arange(n, dtype=float), y, known, np.full(n, np.nan), 1.0)
+        estimate = track(model, np.arange(n, dtype=float), y, known, np.full(n, np.nan), 1.0)
         for k in (79, 149, 199):
-            e = found.bias[k] - b[k]
-            nees.append(e @ np.linalg.solve(found.covariance[k], e))
-        nis.append(found.consistency)
+            e = estimate.bias[k] - b[k]
+            nees.append(e @ np.linalg.solve(estimate.covariance[k], e))
+        nis.append(estimate.consistency)
     assert 0.8 < np.mean(nees) / 3.0 < 1.2  # 270 values of χ²(1): ±0.17 at 95 %
     assert np.mean([c.stated == "consistent" for c in nis]) > 0.75  # two tests at 95 %
     assert 0.97 < np.mean([c.nis for c in nis]) < 1.03
@@ -125,8 +125,8 @@ def test_a_wrong_model_of_the_noise_is_not_consistent(
     wrong = one_process(2e-5 * white, 1e-4 * sd, 100.0)
     truth = processes(rng, right, 1, 1000, 1.0)[0]
     output = truth + 2e-5 * rng.standard_normal(truth.shape)
-    found = track(wrong, np.arange(1000.0), output, np.zeros((1000, 3)), np.full(1000, np.nan), 1.0)
-    assert found.consistency.stated == stated
+    estimate = track(wrong, np.arange(1000.0), output, np.zeros((1000, 3)), np.full(1000, np.nan), 1.0)
+    assert estimate.consistency.stated == stated
 
 
 def test_flicker_after_ten_minutes_of_updates_and_an_hour_without_stays_in_its_stated_deviation(
@@ -145,10 +145,10 @@ def test_flicker_after_ten_minutes_of_updates_and_an_hour_without_stays_in_its_s
     pulls, errors, stated = [], [], []
     for truth in means[:, steps]:
         output = truth + 2e-5 / np.sqrt(block) * rng.standard_normal(truth.shape)
-        found = track(model, float(block) * steps, output, known, np.full(len(steps), np.nan), block)
-        sd = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
-        pulls.append((found.bias - truth)[updates:] / sd[updates:])
-        errors.append((found.bias - truth)[-1])
+        estimate = track(model, float(block) * steps, output, known, np.full(len(steps), np.nan), block)
+        sd = np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2))
+        pulls.append((estimate.bias - truth)[updates:] / sd[updates:])
+        errors.append((estimate.bias - truth)[-1])
         stated.append(sd[-1])
     assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.2  # 480 pulls of 120 channels
     assert np.sqrt(np.mean(np.square(errors))) < 1.3 * np.mean(stated)
@@ -163,22 +163,22 @@ def test_flicker_after_ten_minutes_of_updates_and_an_hour_without_stays_in_its_s
 def test_without_a_known_force_the_bias_stays_unknown() -> None:
     model = one_process(1e-4, 1e-3, 100.0, turn_on=2e-3)
     nothing = np.full((500, 3), np.nan)
-    found = track(model, np.arange(500.0), np.zeros((500, 3)), nothing, nothing[:, 0], 1.0)
-    assert not found.updated.any()
-    assert np.all(np.sqrt(found.covariance[-1].diagonal()) > 0.999 * np.hypot(1e-3, 2e-3))
-    assert found.consistency.stated is None
+    estimate = track(model, np.arange(500.0), np.zeros((500, 3)), nothing, nothing[:, 0], 1.0)
+    assert not estimate.updated.any()
+    assert np.all(np.sqrt(estimate.covariance[-1].diagonal()) > 0.999 * np.hypot(1e-3, 2e-3))
+    assert estimate.consistency.stated is None
 
 
 def test_rest_in_one_pose_tells_the_bias_along_the_force_only(rng: np.random.Generator) -> None:
     model = one_process(2e-5, 1e-6, 1000.0, turn_on=1e-3)
     bias = np.array([6e-4, -4e-4, 8e-4])
     force = np.array([0.6, 0.0, 0.8]) + bias + 2e-5 * rng.standard_normal((400, 3))
-    found = track(model, np.arange(400.0), force, np.full((400, 3), np.nan), np.ones(400), 1.0)
+    estimate = track(model, np.arange(400.0), force, np.full((400, 3), np.nan), np.ones(400), 1.0)
     along = np.array([0.6, 0.0, 0.8])
-    sd_along = np.sqrt(along @ found.covariance[-1] @ along)
+    sd_along = np.sqrt(along @ estimate.covariance[-1] @ along)
     assert sd_along < 5e-6
-    assert abs(along @ (found.bias[-1] - bias)) < 4.0 * sd_along + 1e-6  # second order: |b|²/2
-    assert np.sqrt(found.covariance[-1][1, 1]) == pytest.approx(1e-3, rel=0.01)
+    assert abs(along @ (estimate.bias[-1] - bias)) < 4.0 * sd_along + 1e-6  # second order: |b|²/2
+    assert np.sqrt(estimate.covariance[-1][1, 1]) == pytest.approx(1e-3, rel=0.01)
 
 
 def test_an_outlier_is_counted_and_not_used() -> None:
@@ -192,12 +192,14 @@ def test_an_outlier_is_counted_and_not_used() -> None:
 def test_consistency_has_the_bounds_of_chi_square() -> None:
     """n = 50, 100, 1000: .647–1.428, .742–1.296, .914–1.090 (facts, F)."""
     for n, low, high in ((50, 0.647, 1.428), (100, 0.742, 1.296), (1000, 0.914, 1.090)):
-        found = consistency([(0, 1.0)] * n)
-        assert (found.low, found.high) == pytest.approx((low, high), abs=1e-3)
+        bounds = consistency([(0, 1.0)] * n)
+        assert (bounds.low, bounds.high) == pytest.approx((low, high), abs=1e-3)
 
 
 def test_a_step_whose_innovations_are_rejected_has_updated_nothing() -> None:
     nothing = np.full(3, np.nan)
-    found = track(one_process(1e-5, 1e-4, 100.0), np.arange(3.0), np.full((3, 3), 0.5), np.zeros((3, 3)), nothing, 1.0)
-    assert found.rejected == 9
-    assert not found.updated.any()
+    estimate = track(
+        one_process(1e-5, 1e-4, 100.0), np.arange(3.0), np.full((3, 3), 0.5), np.zeros((3, 3)), nothing, 1.0
+    )
+    assert estimate.rejected == 9
+    assert not estimate.updated.any()

@@ -50,16 +50,16 @@ def test_the_innovations_of_flicker_noise_are_white_and_as_large_as_stated(rng: 
     model = bias_model([0.05] * 3, [1.0] * 3, [0.0] * 3, [3.0] * 3, flicker_of_steps(1.0, n))
     truth = flicker_means(rng, 3 * runs, n).reshape(runs, 3, n).transpose(0, 2, 1)
     known = np.zeros((n, 3))
-    found = [
+    estimates = [
         track(model, np.arange(float(n)), one + 0.05 * rng.standard_normal(one.shape), known, np.full(n, np.nan), 1.0)
         for one in truth
     ]
     values = 3 * n * runs
     low, high = chi2.ppf([0.005, 0.995], values) / values
     # the approximation of 1/f by five processes is allowed one per cent
-    assert low - 0.01 < np.mean([one.consistency.nis for one in found]) < high + 0.01
-    assert abs(np.mean([one.consistency.lag_1 for one in found])) < 2.58 / np.sqrt(values) + 0.01
-    assert np.mean([one.consistency.stated == "consistent" for one in found]) >= 0.6
+    assert low - 0.01 < np.mean([one.consistency.nis for one in estimates]) < high + 0.01
+    assert abs(np.mean([one.consistency.lag_1 for one in estimates])) < 2.58 / np.sqrt(values) + 0.01
+    assert np.mean([one.consistency.stated == "consistent" for one in estimates]) >= 0.6
 
 
 @pytest.mark.parametrize(("white", "walk"), [(0.05, 0.0), (1.0, 0.0), (0.05, 0.05)])
@@ -80,10 +80,10 @@ def test_a_record_and_its_allan_fit_state_the_error_of_the_bias(white: float, wa
             terms.white, terms.instability, terms.walk, [3.0] * 3, flicker_of_steps(1.0, float(steps[-1]))
         )
         truth, seen = ((one[:, record:] - bias[:, :record].mean(axis=1, keepdims=True)).T for one in (bias, output))
-        found = track(model, steps.astype(float), seen[steps], known, np.full(len(steps), np.nan), 1.0)
+        estimate = track(model, steps.astype(float), seen[steps], known, np.full(len(steps), np.nan), 1.0)
         at = [UPDATES - 1, *range(UPDATES, UPDATES + len(GAPS) - 1)]
-        error = found.bias[at] - truth[UPDATES - 1 + np.array(GAPS)]
-        pulls.append(error / np.sqrt(np.diagonal(found.covariance[at], axis1=1, axis2=2)))
+        error = estimate.bias[at] - truth[UPDATES - 1 + np.array(GAPS)]
+        pulls.append(error / np.sqrt(np.diagonal(estimate.covariance[at], axis1=1, axis2=2)))
     nees = np.mean(np.square(pulls), axis=(0, 2))
     low, high = chi2.ppf([0.005, 0.995], 3 * runs) / (3 * runs)
     assert np.all(nees[1:] > low), nees
@@ -93,17 +93,17 @@ def test_a_record_and_its_allan_fit_state_the_error_of_the_bias(white: float, wa
 
 def test_one_walk_for_all_channels_is_the_true_one_where_it_shows_and_none_where_there_is_none() -> None:
     rng = np.random.default_rng(77)
-    found = {0.0: [], 0.2: []}
-    for walk, own in found.items():
+    walks = {0.0: [], 0.2: []}
+    for walk, own in walks.items():
         for _ in range(5):
             x = flicker_means(rng, 3, 1800) + walk * np.cumsum(rng.standard_normal((3, 1800)), axis=1)
             curve = overlapping(x, 1.0)
             terms = likely_terms(curve.deviation, curve.m, curve.n, 1.0)
             assert np.all(terms.white > 0.0)
             own.append(float(np.sqrt(np.mean(terms.walk**2))))
-    assert np.median(found[0.0]) == 0.0
-    assert max(found[0.0]) < 0.15
-    assert np.median(found[0.2]) == pytest.approx(0.2, rel=0.3)
+    assert np.median(walks[0.0]) == 0.0
+    assert max(walks[0.0]) < 0.15
+    assert np.median(walks[0.2]) == pytest.approx(0.2, rel=0.3)
 
 
 def test_samples_scatter_about_the_mean_of_their_step_as_stated(rng: np.random.Generator) -> None:
@@ -113,7 +113,7 @@ def test_samples_scatter_about_the_mean_of_their_step_as_stated(rng: np.random.G
     samples = fast + generate.white(rng, fast.shape, white * np.sqrt(2.0), rate)
     samples = samples + generate.random_walk(rng, fast.shape, walk, rate)
     parts = samples.reshape(6, steps, per)
-    found = float(np.mean((parts - parts.mean(axis=-1, keepdims=True)) ** 2))
+    scatter = float(np.mean((parts - parts.mean(axis=-1, keepdims=True)) ** 2))
     stated = _within_a_step(LikelyTerms(np.array([white]), np.array([1.0]), np.array([walk])), per, rate)[0]
     # the white noise of the mean of a step is its own, as that of the samples is counted in full
-    assert found == pytest.approx(float(stated), rel=0.05)
+    assert scatter == pytest.approx(float(stated), rel=0.05)

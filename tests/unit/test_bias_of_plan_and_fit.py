@@ -53,11 +53,11 @@ def scattered(noise: DwellNoise, seed: int) -> Scatter:
             )
             for u in range(UNITS)
         ]  # fmt: skip
-        found = fit(pd.concat(rows, ignore_index=True), lots.NO_HISTORY, RECIPE.effects)
-        bias = found["coefficients"].query("effect == 'bias'").sort_values(["unit", "axis"])["value"].to_numpy() / UG
+        fitted = fit(pd.concat(rows, ignore_index=True), lots.NO_HISTORY, RECIPE.effects)
+        bias = fitted["coefficients"].query("effect == 'bias'").sort_values(["unit", "axis"])["value"].to_numpy() / UG
         record, day = slow[:, first:last].mean(axis=1), slow[:, last:].mean(axis=1)
         wrong.append([bias - record, bias - day])
-        own = found["wander"].sort_values(["unit", "axis"])
+        own = fitted["wander"].sort_values(["unit", "axis"])
         stated.append([own["bias_record_u_ug"], own["bias_long_u_ug"]])
     return Scatter(
         np.median(np.array(stated), axis=(0, 2)), np.sqrt(np.mean(np.square(np.array(wrong, dtype=float)), axis=(0, 2)))
@@ -74,14 +74,14 @@ NOISES = {
 @pytest.mark.parametrize("name", NOISES)
 def test_plan_and_fit_state_the_bias_s_uncertainty_alike_and_lots_scatter_no_more(name: str) -> None:
     noise = NOISES[name]
-    found = scattered(noise, 20_261_130 + len(name))
+    scatter = scattered(noise, 20_261_130 + len(name))
     expected = plan(plan_context(RECIPE, load_station(), noise))["bias"]
     planned = np.array([expected["record_u_ug"], expected["long_u_ug"]])
-    assert np.all(found.real < 1.25 * planned)
-    assert np.all(found.real < 1.25 * found.stated)
-    assert found.stated[0] / planned[0] == pytest.approx(1.0, abs=0.45)
+    assert np.all(scatter.real < 1.25 * planned)
+    assert np.all(scatter.real < 1.25 * scatter.stated)
+    assert scatter.stated[0] / planned[0] == pytest.approx(1.0, abs=0.45)
     # a fit cannot exclude a walk where there is flicker alone, and carries it over the day as far as it may be there
-    assert 0.7 < found.stated[1] / planned[1] < (3.0 if name == "flicker" else 1.35)
+    assert 0.7 < scatter.stated[1] / planned[1] < (3.0 if name == "flicker" else 1.35)
 
 
 def test_nothing_is_stated_of_the_next_switch_on_and_the_plan_says_why() -> None:

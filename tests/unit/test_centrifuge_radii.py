@@ -43,7 +43,7 @@ def spun(points: Spins, true: dict[str, float], rng: np.random.Generator) -> tup
 
 
 def pulls(signs: tuple[float, ...], count: int) -> dict[str, np.ndarray]:
-    points, found = spins(signs), dict[str, list[float]]()
+    points, by_name = spins(signs), dict[str, list[float]]()
     for k in range(count):
         out, error, holes = spun(points, TRUE, np.random.default_rng([4711, len(signs), k]))
         fit = fit_radii(points.acceleration, points.radius_m, out, error, RADIUS_ERROR)
@@ -57,15 +57,15 @@ def pulls(signs: tuple[float, ...], count: int) -> dict[str, np.ndarray]:
             for j, r in enumerate((0.5, 0.3)):
                 seen[f"radius {r}"] = (fit.radius_errors_m[j], holes[r] - r)
         for name, ((value, u), one) in seen.items():
-            found.setdefault(name, []).append((value - one) / u)
-    return {name: np.array(values) for name, values in found.items()}
+            by_name.setdefault(name, []).append((value - one) / u)
+    return {name: np.array(values) for name, values in by_name.items()}
 
 
 @pytest.mark.parametrize("signs", [(1.0, -1.0), (1.0,)])
 def test_every_parameter_is_recovered_within_its_uncertainty(signs: tuple[float, ...]) -> None:
-    found = pulls(signs, 300)
-    assert ("consistency" in found) == (len(signs) == 2)
-    for name, values in found.items():
+    by_name = pulls(signs, 300)
+    assert ("consistency" in by_name) == (len(signs) == 2)
+    for name, values in by_name.items():
         assert abs(values.mean()) < 0.25, name
         assert 0.88 < values.std(ddof=1) < 1.12, name
 
@@ -125,9 +125,9 @@ def test_the_diagnosis_names_one_of_a_pair_at_two_radii_whose_errors_are_unknown
     for k in range(20):
         points = spins()
         out, error, _ = spun(points, true, np.random.default_rng([7, k]))
-        found = diagnose_spins(points, out, error)
-        named.append(found.classes[0].effects if found.classes else ())
-        value, u = found.extended.of(hidden) if named[-1] == (hidden,) else (np.nan, np.nan)
+        diagnosis = diagnose_spins(points, out, error)
+        named.append(diagnosis.classes[0].effects if diagnosis.classes else ())
+        value, u = diagnosis.extended.of(hidden) if named[-1] == (hidden,) else (np.nan, np.nan)
         size = {"mass_offset": 1.0004 / 0.5, "arm_stretch": 1.0004 * G / 0.5}.get(hidden, 1.0) * HIDDEN[hidden]
         assert np.isnan(value) or abs(value - size) < 5.0 * u
     assert sum(one == (hidden,) for one in named) >= 19

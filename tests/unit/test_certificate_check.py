@@ -208,8 +208,8 @@ def changed_digit(xml: bytes) -> bytes:
 def test_a_changed_digit_is_found_by_the_signature_and_by_the_archive(issued: Issued) -> None:
     path = issued.folder / "A1_1.xml"
     path.write_bytes(changed_digit(path.read_bytes()))
-    found = wrong(checked(path, "--trust", issued.trust, status=1))
-    assert found == {"signature": "A1_1.xml.sig signs another document than this file"}
+    messages = wrong(checked(path, "--trust", issued.trust, status=1))
+    assert messages == {"signature": "A1_1.xml.sig signs another document than this file"}
     path.with_name("A1_1.xml.sig").unlink()
     assert "the file says" in wrong(checked(path, "--archive", issued.run.archive.root, status=1))["archive"]
 
@@ -326,8 +326,8 @@ def test_other_bytes_are_wrong_and_never_a_traceback(issued: Issued) -> None:
 
 def test_an_attachment_that_is_not_the_xml_beside_it_is_found(issued: Issued) -> None:
     shutil.copy(issued.folder / "A2_1.xml", issued.folder / "A1_1.xml")
-    found = wrong(checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=1))
-    assert found == {"attachment": "the attached XML differs from A1_1.xml"}
+    messages = wrong(checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=1))
+    assert messages == {"attachment": "the attached XML differs from A1_1.xml"}
 
 
 def test_an_xml_that_the_schema_does_not_allow_is_found_as_by_the_second_program(issued: Issued) -> None:

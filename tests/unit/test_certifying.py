@@ -156,10 +156,10 @@ def test_the_same_certificate_at_the_same_moment_is_written_once(run: Run, monke
 
 @pytest.fixture
 def keys(tmp_path: Path) -> dict[str, Path]:
-    found = {name: tmp_path / f"{name}.key" for name in ("own", "foreign")}
-    for place in found.values():
+    paths = {name: tmp_path / f"{name}.key" for name in ("own", "foreign")}
+    for place in paths.values():
         make_key(place)
-    return found
+    return paths
 
 
 def sign(run: Run, key: Path | None) -> None:

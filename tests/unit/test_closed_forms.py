@@ -23,11 +23,11 @@ def directions(rng: np.random.Generator, *shape: int) -> np.ndarray:
 def test_six_positions_return_bias_scale_and_response() -> None:
     g = 1.0017
     out = FACES * g @ K.T + BIAS
-    found = six_position(out[:3], out[3:], g)
-    np.testing.assert_allclose(found.bias, BIAS, atol=1e-12)
-    np.testing.assert_allclose(found.response, K, atol=1e-12)
-    np.testing.assert_allclose(found.scale_error(100.0), [0.01, -0.01, 0.025], atol=1e-12)
-    np.testing.assert_allclose(found.apply(out), FACES * g, atol=1e-12)
+    calibration = six_position(out[:3], out[3:], g)
+    np.testing.assert_allclose(calibration.bias, BIAS, atol=1e-12)
+    np.testing.assert_allclose(calibration.response, K, atol=1e-12)
+    np.testing.assert_allclose(calibration.scale_error(100.0), [0.01, -0.01, 0.025], atol=1e-12)
+    np.testing.assert_allclose(calibration.apply(out), FACES * g, atol=1e-12)
 
 
 def test_six_positions_are_found_for_a_batch() -> None:
@@ -134,13 +134,13 @@ def test_static_intervals_are_those_that_were_made(rng: np.random.Generator) -> 
         parts += [np.tile(directions(rng), (400, 1)), 0.5 * rng.normal(size=(150, 3))]
     record = np.concatenate(parts) + 2e-3 * rng.normal(size=(8 * 550, 3))
     for scale in (1.0, 4e3):
-        found = find(record * scale, rate)
-        assert len(found) == 8
-        for (start, length), a, b in zip(still, found.start, found.stop, strict=True):
+        intervals = find(record * scale, rate)
+        assert len(intervals) == 8
+        for (start, length), a, b in zip(still, intervals.start, intervals.stop, strict=True):
             assert start <= a < start + 60
             assert start + length - 60 < b <= start + length
 
 
 def test_a_record_that_never_moves_is_one_interval(rng: np.random.Generator) -> None:
-    found = find(rng.normal(size=(5000, 3)), 100.0)
-    assert (found.start.tolist(), found.stop.tolist()) == ([0], [5000])
+    intervals = find(rng.normal(size=(5000, 3)), 100.0)
+    assert (intervals.start.tolist(), intervals.stop.tolist()) == ([0], [5000])

@@ -52,6 +52,6 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
         confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
     )
     monkeypatch.setattr(confirmation, "left_out", lambda _: missed(1e-4, 1.0))
-    found = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
-    assert found["confirmed"] is confirmed
-    assert ("the error on the fresh run rises from 200 to 1.45e+05 µg" in text_of(ROW, found)) is (confirmed is None)
+    evidence = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
+    assert evidence["confirmed"] is confirmed
+    assert ("the error on the fresh run rises from 200 to 1.45e+05 µg" in text_of(ROW, evidence)) is (confirmed is None)

@@ -18,11 +18,11 @@ def coefficients(cubic: float) -> np.ndarray:
 def test_a_force_in_range_is_solved_and_the_further_step_is_rounding(rng: np.random.Generator) -> None:
     force = rng.uniform(-1.0, 1.0, (50, 3))
     output = 0.01 + force + 1e-3 * force**3
-    found = correct(EFFECTS, State(force, np.zeros(len(force))), output, coefficients(1e-3), {})
-    np.testing.assert_allclose(found, force, atol=1e-9)
+    solved = correct(EFFECTS, State(force, np.zeros(len(force))), output, coefficients(1e-3), {})
+    np.testing.assert_allclose(solved, force, atol=1e-9)
     assert (
         np.max(
-            np.abs(remaining_step(EFFECTS, State(force, np.zeros(len(force))), output, coefficients(1e-3), {}, found))
+            np.abs(remaining_step(EFFECTS, State(force, np.zeros(len(force))), output, coefficients(1e-3), {}, solved))
         )
         < 1e-9
     )
@@ -31,8 +31,8 @@ def test_a_force_in_range_is_solved_and_the_further_step_is_rounding(rng: np.ran
 def test_an_output_far_outside_leaves_a_step_that_is_no_rounding() -> None:
     output = np.array([[0.5, 0.5, 0.5], [900.0, 0.0, 0.0]])
     with np.errstate(all="ignore"):
-        found = correct(EFFECTS, State(np.zeros((2, 3)), np.zeros(2)), output, coefficients(1e-3), {})
-        step = np.abs(remaining_step(EFFECTS, State(found, np.zeros(2)), output, coefficients(1e-3), {}, found)).max(
+        solved = correct(EFFECTS, State(np.zeros((2, 3)), np.zeros(2)), output, coefficients(1e-3), {})
+        step = np.abs(remaining_step(EFFECTS, State(solved, np.zeros(2)), output, coefficients(1e-3), {}, solved)).max(
             axis=1
         )
     assert step[0] < 1e-9

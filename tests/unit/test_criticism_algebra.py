@@ -40,8 +40,8 @@ def test_what_a_candidate_takes_off_draws_is_what_least_squares_takes_off(rng: n
     columns = rng.standard_normal((BLOCKS, N, 4, p))
     columns[2, :, 1, 0] = 3.0 * local[2, :, 1]  # the model has it already
     draws = space.project(rng.standard_normal((BLOCKS, N, 7)))
-    found = _drops(Candidate(columns, shared=False), space, draws)
-    for g, (drop, rank) in enumerate(found):
+    drops = _drops(Candidate(columns, shared=False), space, draws)
+    for g, (drop, rank) in enumerate(drops):
         expected, seen = np.zeros(7), 0
         white = space.whiten(columns[:, :, g])
         left = space.project(white) / np.linalg.norm(white, axis=1)[:, None]

@@ -83,12 +83,12 @@ def test_a_fault_blocks_its_unit_and_no_other(name, units, rng):
     table = lots.lot(rng, units=units)
     rows = table.index[table["unit"] == "U000"].to_numpy()
     FAULTS[name](table, rows, rng)
-    found = diagnose(table)
-    assert [(b["fault"], b["units"]) for b in found["blocked_by"]] == [(name.strip(), ["U000"])]
-    assert found["recommended"] == []
+    diagnosis = diagnose(table)
+    assert [(b["fault"], b["units"]) for b in diagnosis["blocked_by"]] == [(name.strip(), ["U000"])]
+    assert diagnosis["recommended"] == []
     if units == 1:
-        assert not found["adequate"]
-        assert found["error"]["rms_ug"] is None
+        assert not diagnosis["adequate"]
+        assert diagnosis["error"]["rms_ug"] is None
 
 
 def test_swapped_units_are_known_by_their_fingerprints(rng):
@@ -97,8 +97,8 @@ def test_swapped_units_are_known_by_their_fingerprints(rng):
     kept = table.loc[one, OUT].to_numpy()
     table.loc[one, OUT] = table.loc[other, OUT].to_numpy()
     table.loc[other, OUT] = kept
-    found = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
-    assert found == {("units_swapped", "U001"), ("units_swapped", "U003")}
+    faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
+    assert faults == {("units_swapped", "U001"), ("units_swapped", "U003")}
 
 
 def test_missing_dwells_at_the_end_are_a_truncated_file(rng):
@@ -111,9 +111,9 @@ def test_missing_dwells_at_the_end_are_a_truncated_file(rng):
 def test_the_other_units_are_diagnosed(rng):
     table = lots.lot(rng, hidden=lambda f, t, s, r: r.normal(0.0, 60e-6, 3) * f**3)
     flip(table, table.index[table["unit"] == "U000"].to_numpy(), rng)
-    found = diagnose(table)
-    assert found["blocked_by"][0]["units"] == ["U000"]
-    assert found["recommended"] == ["third_order"]
+    diagnosis = diagnose(table)
+    assert diagnosis["blocked_by"][0]["units"] == ["U000"]
+    assert diagnosis["recommended"] == ["third_order"]
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -223,26 +223,26 @@ def test_every_deployment_of_a_lot_is_in_the_queue_of_its_station() -> None:
 
 def lines() -> list[str]:
     """Every command of the pages, of the units and of the containers."""
-    found = [line[2:] for page in PAGES.values() for line in page.splitlines() if line.startswith("$ ")]
+    commands = [line[2:] for page in PAGES.values() for line in page.splitlines() if line.startswith("$ ")]
     for path in (*(DEPLOY / "systemd").glob("*.service"), DEPLOY / "plant" / "server.conf"):
         joined = path.read_text(encoding="utf-8").replace("\\\n", " ")
-        found += [line.partition("=")[2].lstrip("-") for line in joined.splitlines() if re.match(r"Exec\w+=.", line)]
+        commands += [line.partition("=")[2].lstrip("-") for line in joined.splitlines() if re.match(r"Exec\w+=.", line)]
     for service in SERVICES.values():
-        found.append(" ".join([*service.get("entrypoint", ["tumbleline"]), *service["command"]]))
-    return found
+        commands.append(" ".join([*service.get("entrypoint", ["tumbleline"]), *service["command"]]))
+    return commands
 
 
 def test_every_start_of_a_server_or_worker_is_one_that_is_there() -> None:
-    found = [re.search(r"-m pipelines\.flows\.(server|worker) ([^&]*)", text) for text in lines()]
-    given = [(match[1], match[2].split()) for match in found if match]
+    matches = [re.search(r"-m pipelines\.flows\.(server|worker) ([^&]*)", text) for text in lines()]
+    given = [(match[1], match[2].split()) for match in matches if match]
     assert [module for module, _ in given].count("worker") >= 4
     for module, arguments in given:
         {"server": server, "worker": worker}[module]._parser().parse_args(arguments)
 
 
 def test_every_command_of_the_product_is_one_that_is_there() -> None:
-    found = [re.search(r"(?:^|/)tumbleline ([a-z].*)", text) for text in lines()]
-    given = [shlex.split(match[1]) for match in found if match]
+    matches = [re.search(r"(?:^|/)tumbleline ([a-z].*)", text) for text in lines()]
+    given = [shlex.split(match[1]) for match in matches if match]
     assert {"monitor", "workbench", "archive", "doctor", "run"} >= {words[0] for words in given}
     for name, *words in given:
         command = get_command(app).get_command(None, name)._load()

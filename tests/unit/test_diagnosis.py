@@ -14,39 +14,39 @@ def cubic(force, temperature, time, rng):
 
 
 def test_a_good_model_is_adequate_and_nothing_is_named(rng):
-    found = diagnose(lots.lot(rng))
-    assert found["adequate"]
-    assert found["recommended"] == []
-    assert found["blocked_by"] == []
-    assert found["error"]["floor_ug"] == pytest.approx(10.0, rel=0.1)
+    diagnosis = diagnose(lots.lot(rng))
+    assert diagnosis["adequate"]
+    assert diagnosis["recommended"] == []
+    assert diagnosis["blocked_by"] == []
+    assert diagnosis["error"]["floor_ug"] == pytest.approx(10.0, rel=0.1)
 
 
 def test_a_cubic_transfer_curve_is_named_and_the_error_falls_to_the_floor(rng):
     table = lots.lot(rng, hidden=cubic)
-    found = diagnose(table)
-    assert not found["adequate"]
-    assert found["recommended"] == ["third_order"]
-    assert found["where"][0]["driver"] == "pose"
+    diagnosis = diagnose(table)
+    assert not diagnosis["adequate"]
+    assert diagnosis["recommended"] == ["third_order"]
+    assert diagnosis["where"][0]["driver"] == "pose"
     before = compare(table, default_model(table))
     after = compare(table, [*default_model(table), "third_order"])
-    assert after["rms_ug"] < 1.1 * found["error"]["floor_ug"] < before["rms_ug"]
+    assert after["rms_ug"] < 1.1 * diagnosis["error"]["floor_ug"] < before["rms_ug"]
 
 
 def test_rivals_that_faces_cannot_part_are_one_class_with_poses_that_would_part_them(rng):
     def square(force, temperature, time, rng):
         return rng.normal(0.0, 80e-6, 3) * force**2
 
-    found = diagnose(lots.lot(rng, plan="six", temperatures=(0, 25, 50, 25, 0), hidden=square))
-    assert {"second_order", "scale_asymmetry"} <= set(found["classes"][0]["effects"])
-    assert found["recommended"] == ["second_order"]
-    assert found["next_measurements"]
-    assert "cross_coupling" in found["unseen"]
+    diagnosis = diagnose(lots.lot(rng, plan="six", temperatures=(0, 25, 50, 25, 0), hidden=square))
+    assert {"second_order", "scale_asymmetry"} <= set(diagnosis["classes"][0]["effects"])
+    assert diagnosis["recommended"] == ["second_order"]
+    assert diagnosis["next_measurements"]
+    assert "cross_coupling" in diagnosis["unseen"]
 
 
 def test_a_table_out_of_level_is_the_stations_not_the_sensors(rng):
-    found = diagnose(lots.lot(rng, up=(60e-6, -40e-6, 1.0)))
-    assert found["classes"][0]["scope"] == "station"
-    assert found["recommended"] == ["level_error"]
+    diagnosis = diagnose(lots.lot(rng, up=(60e-6, -40e-6, 1.0)))
+    assert diagnosis["classes"][0]["scope"] == "station"
+    assert diagnosis["recommended"] == ["level_error"]
 
 
 def test_an_unknown_dependence_names_its_driver_and_is_offered_as_a_formula(rng):
@@ -54,9 +54,9 @@ def test_an_unknown_dependence_names_its_driver_and_is_offered_as_a_formula(rng)
     table["humidity_pct"] = rng.uniform(20, 70, len(table))
     for axis in "xyz":
         table[f"out_{axis}"] += 1e-6 * (table["humidity_pct"] - 45.0)
-    found = diagnose(table)
-    assert found["unexplained"]["driver"] == "humidity_pct"
-    assert found["recommended"] == ["covariate:humidity_pct"]
+    diagnosis = diagnose(table)
+    assert diagnosis["unexplained"]["driver"] == "humidity_pct"
+    assert diagnosis["recommended"] == ["covariate:humidity_pct"]
 
 
 def test_an_effect_that_is_not_there_does_not_look_like_progress_on_a_fresh_run():
@@ -90,6 +90,6 @@ def test_works_from_forces_without_angles_and_without_scatter(rng):
     force = lots.force(np.radians(table[["outer_deg", "inner_deg"]].to_numpy()))
     bare = table.drop(columns=["outer_deg", "inner_deg", "sd_x", "sd_y", "sd_z", "n", "since_move_s"])
     bare[["force_x", "force_y", "force_z"]] = force
-    found = diagnose(bare)
-    assert found["recommended"] == ["third_order"]
-    assert "encoder_harmonic" in found["unseen"]
+    diagnosis = diagnose(bare)
+    assert diagnosis["recommended"] == ["third_order"]
+    assert "encoder_harmonic" in diagnosis["unseen"]

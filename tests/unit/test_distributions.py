@@ -37,9 +37,9 @@ def test_without_degrees_of_freedom_there_is_no_probability(dof: float) -> None:
 def test_the_spectrum_is_that_of_scipy_signal(count: int, segment: int) -> None:
     x = np.random.default_rng(61).normal(3.0, 2.0, (2, count))
     frequency, density = signal.welch(x, fs=50.0, nperseg=segment, detrend="constant")
-    found = one_sided(x, 50.0, segment=segment)
-    np.testing.assert_allclose(found.frequency, frequency, rtol=1e-12)
-    np.testing.assert_allclose(found.density, density, rtol=1e-9, atol=1e-14)
+    spectrum = one_sided(x, 50.0, segment=segment)
+    np.testing.assert_allclose(spectrum.frequency, frequency, rtol=1e-12)
+    np.testing.assert_allclose(spectrum.density, density, rtol=1e-9, atol=1e-14)
 
 
 LOADED = """

@@ -50,9 +50,9 @@ def own_places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def archive_in(folder: Path) -> Archive:
-    found = Archive(folder)
-    found.prepare()
-    return found
+    archive = Archive(folder)
+    archive.prepare()
+    return archive
 
 
 def states(checks: list[Check]) -> dict[str, str]:
@@ -187,8 +187,8 @@ def test_an_object_store_is_written_to_timed_and_left_as_it_was(monkeypatch: pyt
     with s3_bucket() as query:
         address = f"s3://factory/archive?{query}"
         archive_in(address)
-        found = states(archive_checks(address, 1.0))
-        assert found == dict.fromkeys(("reachable", "format", "writable", "clock"), "good")
+        by_check = states(archive_checks(address, 1.0))
+        assert by_check == dict.fromkeys(("reachable", "format", "writable", "clock"), "good")
         assert [p.name for p in Archive(address).root.iterdir()] == ["archive.json"]
     assert only_fault(archive_checks(address, 1.0)).check == "reachable"  # the server is down now
 
@@ -256,8 +256,8 @@ def of_server(monkeypatch: pytest.MonkeyPatch, key: str = KEY, **changes: object
 
 
 def test_a_healthy_server_is_good(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = states(of_server(monkeypatch))
-    assert found == dict.fromkeys(("reachable", "database", "authenticated", "version", "clock"), "good")
+    by_check = states(of_server(monkeypatch))
+    assert by_check == dict.fromkeys(("reachable", "database", "authenticated", "version", "clock"), "good")
 
 
 def test_a_wrong_key_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -309,8 +309,8 @@ def test_a_station_that_answers_is_good_and_nothing_moved(tmp_path: Path) -> Non
     with served_plant() as (port, plant):
         config = modbus_station(port)
         path = station_file(tmp_path, config)
-        found = states(station_checks(path))
-        assert found == {"file": "good", "devices": "good", "lease": "good"}
+        by_check = states(station_checks(path))
+        assert by_check == {"file": "good", "devices": "good", "lease": "good"}
         lease = Leases(tmp_path / "state", new_holder(config.name, "run-7"), addresses(config), 10.0)
         lease.take()
         try:
@@ -367,11 +367,11 @@ def test_a_difference_of_clocks_is_the_least_that_is_sure() -> None:
 
 
 def test_this_environment_meets_the_requirements() -> None:
-    found = {check.check: check for check in software.software_checks()}
-    assert found["libraries"].state == "good"
-    assert {found[name].state for name in ("Python", "lock")} <= {"good", "warning"}
+    checks = {check.check: check for check in software.software_checks()}
+    assert checks["libraries"].state == "good"
+    assert {checks[name].state for name in ("Python", "lock")} <= {"good", "warning"}
     formats = set(metadata.metadata("tumbleline").get_all("Provides-Extra")) - software.DEVELOPMENT - {"recordings"}
-    assert all(extra in found["optional formats"].found for extra in formats)
+    assert all(extra in checks["optional formats"].found for extra in formats)
 
 
 @pytest.mark.parametrize(

@@ -36,9 +36,9 @@ def test_differences_of_dwells_scatter_as_the_covariance_says(name):
     covariance = 1e12 * dwell_covariance(starts + 5.0, 10.0, noise_of(preset))
     pairs = [(i, j) for i in range(7) for j in range(i)]
     said = np.sqrt([covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j] for i, j in pairs])
-    found = np.array([np.std(means[i] - means[j]) for i, j in pairs])
-    assert found == pytest.approx(said, rel=0.12)
-    assert np.mean(found / said) == pytest.approx(1.0, abs=0.05)
+    scatter = np.array([np.std(means[i] - means[j]) for i, j in pairs])
+    assert scatter == pytest.approx(said, rel=0.12)
+    assert np.mean(scatter / said) == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_error_of_a_dwell_is_the_allan_deviation_at_its_length():

@@ -28,10 +28,10 @@ def test_a_sweep_returns_natural_frequency_damping_and_sensitivity(
 ) -> None:
     f = np.geomspace(5.0, 1.5 * natural, 80)
     gain = 0.3 * np.abs(transfer(f, natural, damping)) * (1.0 + 1e-3 * rng.normal(size=80))
-    found = fit_second_order(f, gain)
-    assert found.natural_hz == pytest.approx(natural, rel=2e-3)
-    assert found.damping == pytest.approx(damping, rel=0.03)
-    assert found.sensitivity == pytest.approx(0.3, rel=2e-3)
+    fit = fit_second_order(f, gain)
+    assert fit.natural_hz == pytest.approx(natural, rel=2e-3)
+    assert fit.damping == pytest.approx(damping, rel=0.03)
+    assert fit.sensitivity == pytest.approx(0.3, rel=2e-3)
 
 
 def test_the_width_of_the_peak_gives_a_small_damping() -> None:

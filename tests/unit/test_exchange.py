@@ -26,8 +26,8 @@ def line(levels, n, weight=None, travel=None, seconds=1000.0):
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_a_straight_line_is_measured_at_both_ends(criterion):
     levels = np.linspace(-1.0, 1.0, 9)
-    found = exchanged(line(levels, 8), np.arange(8, dtype=np.intp), criterion)
-    assert sorted(levels[found]) == [-1.0] * 4 + [1.0] * 4
+    choice = exchanged(line(levels, 8), np.arange(8, dtype=np.intp), criterion)
+    assert sorted(levels[choice]) == [-1.0] * 4 + [1.0] * 4
 
 
 @pytest.mark.parametrize("criterion", CRITERIA)
@@ -46,24 +46,24 @@ def test_slow_wander_makes_the_poses_alternate():
     wander = np.linalg.inv(0.01 * np.eye(12) + np.exp(-gap / 50.0))
     blocks = np.repeat([0, 1], 6).astype(np.intp)
     slots = line([-1.0, 1.0], 12, wander)
-    found = exchanged(slots, blocks, "worst")
-    assert np.sum(np.diff(found) != 0) > 6
-    assert ratios(slots.matrix(found))[0, 1] < 0.5 * ratios(slots.matrix(blocks))[0, 1]
+    choice = exchanged(slots, blocks, "worst")
+    assert np.sum(np.diff(choice) != 0) > 6
+    assert ratios(slots.matrix(choice))[0, 1] < 0.5 * ratios(slots.matrix(blocks))[0, 1]
 
 
 def test_long_ways_are_spared_where_they_bring_nothing():
     travel = 300.0 * np.abs(np.subtract.outer(np.arange(2.0), np.arange(2.0)))
     slots = line([-1.0, 1.0], 10, travel=travel, seconds=600.0)
-    found = exchanged(slots, np.array([0, 1] * 5, dtype=np.intp), "worst")
-    assert sorted(found) == [0] * 5 + [1] * 5
-    assert np.sum(np.diff(found) != 0) <= 2
+    choice = exchanged(slots, np.array([0, 1] * 5, dtype=np.intp), "worst")
+    assert sorted(choice) == [0] * 5 + [1] * 5
+    assert np.sum(np.diff(choice) != 0) <= 2
 
 
 def test_fixed_slots_stay_as_they_are():
     slots = line(np.linspace(-1.0, 1.0, 5), 6)
     slots.fixed[[0, 5]] = True
-    found = exchanged(slots, np.full(6, 2, dtype=np.intp) + np.array([0, 1, 0, -1, 0, 0]), "D")
-    assert (found[0], found[5]) == (2, 2)
+    choice = exchanged(slots, np.full(6, 2, dtype=np.intp) + np.array([0, 1, 0, -1, 0, 0]), "D")
+    assert (choice[0], choice[5]) == (2, 2)
 
 
 def test_variances_of_an_exchange_are_those_of_the_whole_plan(rng):

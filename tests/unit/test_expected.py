@@ -44,9 +44,9 @@ def test_errors_of_a_lots_fits_are_those_that_the_plan_let_expect(name):
     )
     output = drawn(preset, state)
     error = np.full(output.shape, noise.white(DWELL_S))
-    found = fit_lot_with_wander(THERMAL, state, output, error).fit
-    truth = np.array([1.0 if effect == "scale" else 0.0 for effect, _ in found.names[0]])
-    really = np.sqrt(np.mean((found.coefficients - truth) ** 2, axis=0))
+    fit = fit_lot_with_wander(THERMAL, state, output, error).fit
+    truth = np.array([1.0 if effect == "scale" else 0.0 for effect, _ in fit.names[0]])
+    really = np.sqrt(np.mean((fit.coefficients - truth) ** 2, axis=0))
     expected = expected_errors(THERMAL, state, dwell_covariance(state.time, DWELL_S, noise)).errors
     ratio = really / expected
     assert ratio[:, 1:].mean() == pytest.approx(1.0, abs=0.07)

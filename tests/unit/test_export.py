@@ -42,8 +42,8 @@ def test_the_polynomials_correct_as_the_model_does(run: Run) -> None:
     for u, exported in enumerate(unit_calibrations(run, (), failed=True)):
         assert lot.state.temperature is not None
         temperatures = lot.state.temperature[u]
-        found = [exported.correct(out[None], t)[0] for out, t in zip(lot.output[u], temperatures, strict=True)]
-        np.testing.assert_allclose(found, wanted[u], atol=1e-11)
+        corrected = [exported.correct(out[None], t)[0] for out, t in zip(lot.output[u], temperatures, strict=True)]
+        np.testing.assert_allclose(corrected, wanted[u], atol=1e-11)
 
 
 def test_the_c_header_computes_the_same(run: Run, tmp_path: Path) -> None:

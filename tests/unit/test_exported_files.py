@@ -44,22 +44,22 @@ def unit(*, across: float = 3e-3, scale_t: float = 1e-4, low: float = -10.0, hig
 def readings(c: UnitCalibration, n: int = 200) -> list[tuple[Array, float, Array]]:
     """Forces of 1 g in any direction, temperatures in the measured range, and the outputs that the unit has there."""
     rng = np.random.default_rng(11)
-    found = []
+    points = []
     for t in rng.uniform(*c.temperatures, n):
         force = rng.normal(size=3)
         force /= np.linalg.norm(force)
         theta = t - 25.0
         b = sum(c.bias[k] * theta**k for k in range(ORDER))
         m = sum(c.response[k] * theta**k for k in range(ORDER))
-        found.append((force, float(t), b + m @ force))
-    return found
+        points.append((force, float(t), b + m @ force))
+    return points
 
 
 def stated_ug(text: str) -> float:
     """The largest error that a file states."""
-    found = re.search(r"at 1 g: ([\d.e+-]+) [µu]g", text)
-    assert found is not None
-    return float(found[1])
+    match = re.search(r"at 1 g: ([\d.e+-]+) [µu]g", text)
+    assert match is not None
+    return float(match[1])
 
 
 def px4(parameters: dict[str, float], raw: Array, t: float, device: int, n: int = 0) -> Array:
@@ -78,16 +78,16 @@ def px4(parameters: dict[str, float], raw: Array, t: float, device: int, n: int 
 
 def qgroundcontrol(text: str) -> dict[str, float]:
     """QGroundControl's ParameterManager::readParametersFromStream: lines of five columns parted by tabs; # is a comment."""
-    found: dict[str, float] = {}
+    parameters: dict[str, float] = {}
     for line in text.splitlines():
         if line.startswith("#"):
             continue
         vehicle, component, name, value, kind = line.split("\t")
         assert (vehicle, component) == ("1", "1")
         assert len(name) <= 16  # MAVLink's length of a name
-        found[name] = int(value) if kind == "6" else float(np.float32(value))
+        parameters[name] = int(value) if kind == "6" else float(np.float32(value))
         assert kind in {"6", "9"}
-    return found
+    return parameters
 
 
 def ardupilot(p: dict[str, float], raw: Array, t: float, n: int = 1) -> Array:
@@ -169,9 +169,9 @@ def test_ardupilot_gets_no_temperature_terms_over_less_than_10_k_and_says_what_t
 def test_betaflight_subtracts_whole_counts() -> None:
     c = unit()
     text = export_text("betaflight", [c], "run-1", replace(IDS, counts_per_g=2048))
-    found = re.search(r"^set acc_calibration = (-?\d+),(-?\d+),(-?\d+),1$", text, re.MULTILINE)
-    assert found is not None
-    trim = np.array([int(v) for v in found.groups()])
+    match = re.search(r"^set acc_calibration = (-?\d+),(-?\d+),(-?\d+),1$", text, re.MULTILINE)
+    assert match is not None
+    trim = np.array([int(v) for v in match.groups()])
     assert np.max(np.abs(trim / 2048 - c.bias[0] / NOMINAL)) <= 0.5 / 2048
     errors = [(y / NOMINAL * 2048 - trim) / 2048 - f for f, _, y in readings(c, 2000)]
     assert 0.7 * stated_ug(text) < 1e6 * np.max(np.abs(errors)) < 1.05 * stated_ug(text)
@@ -235,11 +235,11 @@ def test_compiled_c_computes_the_calibration(arithmetic: str, call: str, within:
     c = unit()
     header = export_text("c", [c], "run-1", ExportSettings(arithmetic=arithmetic))
     rows = [(*np.rint(y), np.round(t, 3)) for _, t, y in readings(c, 500)]
-    found = compiled(header, call, np.array(rows), tmp_path)
+    computed = compiled(header, call, np.array(rows), tmp_path)
     wanted = np.array([c.correct(np.array([row[:3]]), row[3])[0] for row in rows])
-    assert np.max(np.abs(found - wanted)) < within
+    assert np.max(np.abs(computed - wanted)) < within
     if arithmetic == "q24":
-        assert np.max(np.abs(found - wanted)) < 1.5e-6 * stated_ug(header) + 2e-7
+        assert np.max(np.abs(computed - wanted)) < 1.5e-6 * stated_ug(header) + 2e-7
 
 
 def test_a_header_has_the_crc_of_zlib() -> None:

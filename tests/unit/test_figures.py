@@ -36,9 +36,9 @@ def test_the_coefficient_nearest_its_limit_with_its_uncertainty_is_judged(
     guard: float, value: float, error: float
 ) -> None:
     lot = LotCoefficients(calibration(np.array([9e-3, -8e-3, 1e-3]), np.array([1e-4, 1e-3, 1e-3])), 0.0)
-    found = lot.of(0).nearest("bias", 1e3, guard)
-    assert abs(found.value) == pytest.approx(value)
-    assert found.uncertainty == pytest.approx(error)
+    nearest = lot.of(0).nearest("bias", 1e3, guard)
+    assert abs(nearest.value) == pytest.approx(value)
+    assert nearest.uncertainty == pytest.approx(error)
 
 
 def noise_rows(*, silent: bool) -> pd.DataFrame:

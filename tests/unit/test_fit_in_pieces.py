@@ -29,7 +29,7 @@ def lot(rng: np.random.Generator) -> tuple[State, np.ndarray, np.ndarray]:
 def test_units_in_pieces_are_the_units_alone(rng: np.random.Generator, weights: str) -> None:
     state, out, error = lot(rng)
     weighted = weights == "by dwell"
-    found = fit_lot(EFFECTS, state, out, error if weighted else None)
+    fit = fit_lot(EFFECTS, state, out, error if weighted else None)
     for unit in (0, linear._PIECE - 1, linear._PIECE, UNITS - 1):
         heat = np.asarray(state.temperature)[unit]
         alone = fit_lot(
@@ -39,7 +39,7 @@ def test_units_in_pieces_are_the_units_alone(rng: np.random.Generator, weights: 
             error[unit] if weighted else None,
         )
         for name in ("coefficients", "covariance", "residuals", "chi2", "dof"):
-            one, other = getattr(found, name)[unit], getattr(alone, name)
+            one, other = getattr(fit, name)[unit], getattr(alone, name)
             np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
         theta, f = heat - 25.0, state.force
         for axis in range(3):
@@ -47,7 +47,7 @@ def test_units_in_pieces_are_the_units_alone(rng: np.random.Generator, weights: 
             columns = [np.ones(72), f[:, axis], f[:, j], f[:, k], theta, theta**2, theta * f[:, axis]]
             weight = 1.0 / error[unit, :, axis] if weighted else np.ones(72)
             plain = np.linalg.lstsq(np.array(columns).T * weight[:, None], out[unit, :, axis] * weight, rcond=None)[0]
-            np.testing.assert_allclose(found.coefficients[unit, axis], plain, rtol=1e-8, atol=1e-12)
+            np.testing.assert_allclose(fit.coefficients[unit, axis], plain, rtol=1e-8, atol=1e-12)
 
 
 def test_a_plan_that_confuses_coefficients_is_refused_with_their_names_in_any_piece(rng: np.random.Generator) -> None:

@@ -83,8 +83,8 @@ def test_finds_the_time_constant_of_a_lag_with_its_error(rng: np.random.Generato
 
 def test_verification_with_a_lag_uses_what_came_before_each_dwell(rng: np.random.Generator) -> None:
     dwells, history = lot(rng)
-    found = fit(dwells, history, LAG)
-    tables = [found[name] for name in ("coefficients", "covariance", "predictions")]
+    fitted = fit(dwells, history, LAG)
+    tables = [fitted[name] for name in ("coefficients", "covariance", "predictions")]
     rows = verify(dwells, history, *tables)["verification"]
     ratio = rows["error_ug"] / rows["uncertainty_ug"]
     assert 0.8 < np.std(ratio) < 1.25
@@ -93,8 +93,8 @@ def test_verification_with_a_lag_uses_what_came_before_each_dwell(rng: np.random
 
 def test_calibration_with_a_time_constant_for_each_axis_is_read_as_it_was_written(rng: np.random.Generator) -> None:
     dwells, history = lot(rng)
-    found = fit(dwells, history, LAG)
-    table = found["coefficients"]
+    fitted = fit(dwells, history, LAG)
+    table = fitted["coefficients"]
     one = table[table["name"] == "tau"]
     split = pd.concat(
         [
@@ -103,7 +103,7 @@ def test_calibration_with_a_time_constant_for_each_axis_is_read_as_it_was_writte
         ]
     )
     ordered = split.sort_values(["unit"], kind="stable")
-    assert read_calibration(ordered, found["covariance"]).nonlinear["thermal_lag"]["tau"] == (1.0, 2.0, 3.0)
+    assert read_calibration(ordered, fitted["covariance"]).nonlinear["thermal_lag"]["tau"] == (1.0, 2.0, 3.0)
 
 
 def test_the_tables_keep_their_contract(rng: np.random.Generator) -> None:
@@ -124,12 +124,12 @@ def test_a_model_without_scale_has_residuals_by_the_unit_of_its_output(
         noise = WHITE * rng.normal(size=len(dwells))
         dwells[f"out_{a}"] = per_g * (float(a == "z") + tempco[i] * (dwells["unit_C"] - 25.0) + noise)
         dwells[f"sd_{a}"] *= per_g
-    found = fit(dwells.assign(out_unit=unit), NO_HISTORY, ["bias", "bias_temperature"])
-    for name, table in found.items():
+    fitted = fit(dwells.assign(out_unit=unit), NO_HISTORY, ["bias", "bias_temperature"])
+    for name, table in fitted.items():
         check(name, table)
-    residuals = found["residuals"]["residual_ug"]
+    residuals = fitted["residuals"]["residual_ug"]
     assert 0.8 * WHITE < 1e-6 * float(np.std(residuals)) < 1.2 * WHITE
-    assert np.isfinite(found["wander"]["white_ug"]).all()
+    assert np.isfinite(fitted["wander"]["white_ug"]).all()
 
 
 def test_a_model_without_scale_of_counts_is_refused_with_what_it_needs(rng: np.random.Generator) -> None:
@@ -147,17 +147,17 @@ def test_wander_between_dwells_is_found_and_told(rng: np.random.Generator) -> No
 
 def test_coefficients_lie_within_their_errors_for_a_device_that_wanders(rng: np.random.Generator) -> None:
     dwells, _ = lot(rng, units=24, wander=1e-4, lagging=0.0)
-    found = fit(dwells, NO_HISTORY, [*LINEAR, "third_order"])["coefficients"]
-    rows = found[found["effect"] == "third_order"]  # which no unit has
+    coefficients = fit(dwells, NO_HISTORY, [*LINEAR, "third_order"])["coefficients"]
+    rows = coefficients[coefficients["effect"] == "third_order"]  # which no unit has
     assert 0.85 < np.std(rows["value"] / rows["standard_error"]) < 1.15
 
 
 def test_says_so_where_there_are_too_few_dwells_for_the_noise(rng: np.random.Generator) -> None:
     dwells, _ = lot(rng, units=1)
     few = dwells[dwells["dwell"] < 5]
-    found = fit(few, NO_HISTORY, ["bias", "scale", "misalignment"])
-    assert set(found["wander"]["method"]) == {"birge"}
-    assert np.isfinite(found["coefficients"]["standard_error"]).all()
+    fitted = fit(few, NO_HISTORY, ["bias", "scale", "misalignment"])
+    assert set(fitted["wander"]["method"]) == {"birge"}
+    assert np.isfinite(fitted["coefficients"]["standard_error"]).all()
 
 
 @pytest.mark.parametrize("levels", [0, 3], ids=["any value", "three levels"])

@@ -19,7 +19,7 @@ def test_means_differ_as_an_integral_over_the_spectrum_says():
     """Mean squared difference of two means over T that are d apart: ∫ B²/(πf)·4·sin²(πfd)·sinc²(fT) df, slow parts cancel."""
     duration, slowest = 10.0, 1e5
     for apart in (20.0, 200.0, 2000.0):
-        found = 2.0 * (
+        difference = 2.0 * (
             flicker_of_means(np.array(0.0), duration, slowest) - flicker_of_means(np.array(apart), duration, slowest)
         )
 
@@ -28,7 +28,7 @@ def test_means_differ_as_an_integral_over_the_spectrum_says():
             return 4.0 / np.pi * np.sin(np.pi * f * d) ** 2 * np.sinc(f * duration) ** 2
 
         expected = quad(density, np.log(1e-7), np.log(1.0), limit=20000)[0]
-        assert found == pytest.approx(expected, rel=0.02)
+        assert difference == pytest.approx(expected, rel=0.02)
 
 
 def test_the_correlation_is_one_at_no_gap_and_that_of_the_same_processes():
@@ -64,8 +64,8 @@ def test_fit_and_diagnosis_find_the_same_noise(wander: float) -> None:
         dwells = lot(seed, wander)
         residuals = fit(dwells, dwells.iloc[:0], MODEL)["residuals"]
         fitted, left = (float(np.sqrt(np.mean(residuals[name] ** 2))) for name in ("expected_ug", "residual_ug"))
-        found = diagnose(dwells, None, MODEL)
-        assert found["adequate"]
-        assert found["error"]["floor_ug"] == pytest.approx(fitted, rel=0.1)
+        diagnosis = diagnose(dwells, None, MODEL)
+        assert diagnosis["adequate"]
+        assert diagnosis["error"]["floor_ug"] == pytest.approx(fitted, rel=0.1)
         assert left == pytest.approx(fitted, rel=0.1)
-        assert (found["error"]["wander_share"] > 0.3) == (wander > 0.0)
+        assert (diagnosis["error"]["wander_share"] > 0.3) == (wander > 0.0)

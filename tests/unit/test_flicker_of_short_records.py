@@ -91,12 +91,12 @@ def test_a_warm_up_in_noise_is_neither_late_nor_more_certain_than_it_is(rng: np.
         pulls, held, refused = [], [], 0
         for own in flicker(rng, runs, 1200):
             try:
-                found = entered(time, clean + size * own, band=1000.0, window_s=10.0)
+                entry = entered(time, clean + size * own, band=1000.0, window_s=10.0)
             except NotIdentified:
                 refused += 1
                 continue
-            pulls.append((found.value - true) / found.error)
-            held.append(found.low <= true <= found.high)
+            pulls.append((entry.value - true) / entry.error)
+            held.append(entry.low <= true <= entry.high)
         assert refused <= (0.02 * runs if size > 50.0 else 0.0)  # an entry that noise leaves open
         assert size > 50.0 or (abs(np.mean(pulls)) < 2.6 / np.sqrt(runs) and spread_of_one(pulls))
         assert share_of_95(held)
@@ -111,9 +111,9 @@ def test_the_uncertainty_of_the_linearity_holds_the_covariance(rng: np.random.Ge
     force = np.concatenate([steps, -steps])
     error = np.full(force.size, 1e-4)
     curve = force + 2e-6 * force**2 + 1e-7 * force**3
-    found = [fit_polynomial(force, curve + error * rng.normal(size=force.size), error, TERMS) for _ in range(120)]
-    spread = np.std([linearity_percent(one, 30.0) for one in found], ddof=1)
-    assert np.mean([linearity_error(one, 30.0) for one in found]) == pytest.approx(spread, rel=0.2)
-    one = found[0]
+    fits = [fit_polynomial(force, curve + error * rng.normal(size=force.size), error, TERMS) for _ in range(120)]
+    spread = np.std([linearity_percent(one, 30.0) for one in fits], ddof=1)
+    assert np.mean([linearity_error(one, 30.0) for one in fits]) == pytest.approx(spread, rel=0.2)
+    one = fits[0]
     apart = Polynomial(one.names, one.value, np.diag(np.diag(one.covariance)), one.residuals, 0.0, 0)
     assert linearity_error(apart, 30.0) > 2.0 * spread

@@ -19,8 +19,8 @@ def test_one_frozen_dwell_of_known_pose_is_a_stuck_output(seed: int) -> None:
     # 1000 equal samples: their mean differs from them, and from the last mean, in the last digits only
     table.loc[row, f"out_{axis}"] = float(np.mean(np.full(1000, table.loc[row - 1, f"out_{axis}"]) + 1e-17))
     table.loc[row, f"sd_{axis}"] = 1e-16
-    found = diagnose(table)
-    assert [(b["fault"], b["dwells"]) for b in found["blocked_by"]] == [
+    diagnosis = diagnose(table)
+    assert [(b["fault"], b["dwells"]) for b in diagnosis["blocked_by"]] == [
         ("stuck_output", [int(table.loc[row, "dwell"])])
     ]
 

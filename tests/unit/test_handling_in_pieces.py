@@ -20,8 +20,8 @@ def gains() -> dict[str, np.ndarray]:
     run = ExaminedRun(lot_of(measured(condense(dwells), None), square=False), MODEL)
     base = run.model()
     fields = Candidates(base.problem, candidates_of(base, MODEL), alternatives())
-    found = fields.gains(base.space, set(), handling=True)
-    return {one.id: found[one.id].drop for one in fields.handling}
+    by_id = fields.gains(base.space, set(), handling=True)
+    return {one.id: by_id[one.id].drop for one in fields.handling}
 
 
 def test_alternatives_in_pieces_explain_what_they_explain_together(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,28 +33,30 @@ def written(path: Path, *, low_pass_hz: float = 0.0, top: float = 5000.0, seed: 
 
 
 def test_a_right_model_is_adequate_and_kept(tmp_path: Path) -> None:
-    found = import_transfer(written(tmp_path / "a.csv"), "S1", archive=str(tmp_path / "archive"))
-    assert found["adequate"] is True
-    assert found["parameters"]["natural_hz"]["value"] == pytest.approx(2500.0, rel=0.01)
-    run = Archive(str(tmp_path / "archive")).run(found["run"])
+    diagnosis = import_transfer(written(tmp_path / "a.csv"), "S1", archive=str(tmp_path / "archive"))
+    assert diagnosis["adequate"] is True
+    assert diagnosis["parameters"]["natural_hz"]["value"] == pytest.approx(2500.0, rel=0.01)
+    run = Archive(str(tmp_path / "archive")).run(diagnosis["run"])
     assert len(run.table("procedure_points")) == 45
     assert run.about["source"]["sha256"]
 
 
 def test_the_missing_pole_is_named_and_the_error_falls(tmp_path: Path) -> None:
-    found = import_transfer(written(tmp_path / "b.csv", low_pass_hz=6000.0), "S1", archive=str(tmp_path / "archive"))
-    assert found["adequate"] is False
-    assert "one_pole" in found["classes"][0]["effects"]
-    assert found["extended_percent"] < 0.2 * found["error_percent"]
-    assert found["left_out"][1] == pytest.approx(1.0, abs=0.25)
+    diagnosis = import_transfer(
+        written(tmp_path / "b.csv", low_pass_hz=6000.0), "S1", archive=str(tmp_path / "archive")
+    )
+    assert diagnosis["adequate"] is False
+    assert "one_pole" in diagnosis["classes"][0]["effects"]
+    assert diagnosis["extended_percent"] < 0.2 * diagnosis["error_percent"]
+    assert diagnosis["left_out"][1] == pytest.approx(1.0, abs=0.25)
 
 
 def test_a_sweep_that_ends_too_soon_gives_an_interval(tmp_path: Path) -> None:
-    found = import_transfer(written(tmp_path / "c.csv", top=500.0), "S1", archive=str(tmp_path / "archive"))
-    natural = found["parameters"]["natural_hz"]
+    diagnosis = import_transfer(written(tmp_path / "c.csv", top=500.0), "S1", archive=str(tmp_path / "archive"))
+    natural = diagnosis["parameters"]["natural_hz"]
     assert not natural["identified"]
     assert natural["low"] < 2500.0 < natural["high"]
-    assert found["next_hz"] == [] or min(found["next_hz"]) > 100.0
+    assert diagnosis["next_hz"] == [] or min(diagnosis["next_hz"]) > 100.0
 
 
 @pytest.mark.parametrize(

@@ -42,8 +42,8 @@ def test_an_audit_finds_every_run_that_was_added_and_reads_none_again(archive: A
     first, *others = names(archive)
     assert add_runs(archive, [first]) == 1
     assert add_runs(archive, others) == len(others)
-    found = up_to_date(archive)
-    assert (found.made, found.kept) == (0, 6)
+    index = up_to_date(archive)
+    assert (index.made, index.kept) == (0, 6)
     added = {name: rows(archive, name) for name in ("runs", "coefficients")}
     shutil.rmtree(index_of(archive))
     assert up_to_date(archive).made == 6
@@ -67,8 +67,8 @@ def test_small_parts_become_one_when_there_are_many(archive: Archive, monkeypatc
 def test_a_run_that_was_added_and_changed_is_read_again(archive: Archive) -> None:
     add_runs(archive, names(archive))
     os.utime(index_of(archive).parent / "runs" / names(archive)[2] / "run.json", (1.0, 1.0))
-    found = up_to_date(archive)
-    assert (found.made, found.kept) == (6, 0), "its part is made anew"
+    index = up_to_date(archive)
+    assert (index.made, index.kept) == (6, 0), "its part is made anew"
     assert {row["run"] for row in rows(archive, "runs")} == set(names(archive))
 
 

@@ -15,12 +15,12 @@ from schemas.errors import ArchiveUnusable
 
 @pytest.fixture
 def ledger(tmp_path: Path) -> Ledger:
-    found = Ledger(tmp_path)
+    filled = Ledger(tmp_path)
     evidence = (("coefficients", "1" * 64), ("grades", "2" * 64))
     for number in range(200):
         one = event(serial=f"A{number:03d}", sequence=1, evidence=evidence, when="2026-01-01T00:00:00+00:00")
-        found.write_bulk([one, replace(one, sequence=2, action="supersede", run="r-2", start="2026-06-01", ends=(1,))])
-    return found
+        filled.write_bulk([one, replace(one, sequence=2, action="supersede", run="r-2", start="2026-06-01", ends=(1,))])
+    return filled
 
 
 def told(root: Path) -> list[str]:
@@ -42,9 +42,9 @@ def test_only_events_that_are_new_or_changed_are_read(ledger: Ledger, tmp_path: 
     ledger.revoke("A007", "dropped", day="2026-07-01")
     place = next((tmp_path / "calibrations").glob("*/*/000002.json"))
     place.write_text(place.read_text(encoding="utf-8").replace('"bench"', '"bench-2"'), encoding="utf-8")
-    found = histories_of(tmp_path)
-    assert found.read == 2
-    assert sum(len(own) for own in found.units) == 401
+    histories = histories_of(tmp_path)
+    assert histories.read == 2
+    assert sum(len(own) for own in histories.units) == 401
     assert sum("bench-2" in one for one in told(tmp_path)) == 1
 
 

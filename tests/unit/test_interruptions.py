@@ -45,12 +45,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def test_an_opened_door_pauses_and_repeated_dwells_are_in_the_result(run: Run) -> None:
-    found = summary(run)["interruptions"]
-    assert (found["door_opened"], found["pauses"], found["paused_s"]) == (2, 3, 90.0 + 120.0)
-    [dwell] = found["repeated_dwells"]
+    interrupted = summary(run)["interruptions"]
+    assert (interrupted["door_opened"], interrupted["pauses"], interrupted["paused_s"]) == (2, 3, 90.0 + 120.0)
+    [dwell] = interrupted["repeated_dwells"]
     assert (dwell["record"], dwell["times"], dwell["reasons"]) == (1, 2, [DOOR, DOOR])
     assert dwell["pose"] == run.table("readings").set_index("record")["pose"].loc[1].iloc[0]
-    assert [event["kind"] for event in found["events"]] == ["spoilt", "resumed", "spoilt", "resumed", "suspended"]
+    assert [event["kind"] for event in interrupted["events"]] == ["spoilt", "resumed", "spoilt", "resumed", "suspended"]
 
 
 def test_they_are_on_the_report_and_on_the_terminal(run: Run) -> None:

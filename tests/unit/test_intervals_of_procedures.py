@@ -19,12 +19,12 @@ def hours(rng: np.random.Generator, white: float, flicker: float) -> tuple[np.nd
     long = 16 * SECONDS
     f = np.arange(1, long // 2 + 1) / long
     density = flicker**2 / f
-    found = np.empty((RUNS, SECONDS))
+    records = np.empty((RUNS, SECONDS))
     for k in range(RUNS):
         z = rng.normal(size=(2, f.size))
         spectrum = np.concatenate([[0.0], (z[0] + 1j * z[1]) * np.sqrt(density * long / 4.0)])
-        found[k] = np.fft.irfft(spectrum, long)[:SECONDS] + white * rng.normal(size=SECONDS)
-    return found, density
+        records[k] = np.fft.irfft(spectrum, long)[:SECONDS] + white * rng.normal(size=SECONDS)
+    return records, density
 
 
 def expected(white: float, density: np.ndarray) -> tuple[float, float]:
@@ -41,9 +41,9 @@ def expected(white: float, density: np.ndarray) -> tuple[float, float]:
 def test_the_intervals_of_an_hour_hold_the_process(white: float, flicker: float, rng: np.random.Generator) -> None:
     records, density = hours(rng, white, flicker)
     sd, allan = expected(white, density)
-    found = [stability(one, 1.0) for one in records]
+    stabilities = [stability(one, 1.0) for one in records]
     for name, true in (("sd_100s", sd), ("allan_100s", allan), ("drift_h", 0.0)):
-        ends = np.array([getattr(one, f"{name}_interval") for one in found])
+        ends = np.array([getattr(one, f"{name}_interval") for one in stabilities])
         held = int(np.sum((ends[:, 0] <= true) & (true <= ends[:, 1])))
         assert held >= binom.ppf(0.005, RUNS, 0.95), (name, held)
         if (
@@ -51,10 +51,10 @@ def test_the_intervals_of_an_hour_hold_the_process(white: float, flicker: float,
         ):  # 36 means do not exclude 1/f noise of the size of the white: wider than needed
             assert held <= binom.ppf(0.995, RUNS, 0.95), (name, held)
     # an interval of a deviation is longer above; that of independent means has 35 degrees of freedom
-    one = found[0]
+    one = stabilities[0]
     assert one.sd_100s_interval[1] - one.sd_100s > one.sd_100s - one.sd_100s_interval[0]
     if flicker == 0.0:
-        dof = np.median([0.5 * (one.sd_100s / one.sd_100s_error) ** 2 for one in found])
+        dof = np.median([0.5 * (one.sd_100s / one.sd_100s_error) ** 2 for one in stabilities])
         assert dof == pytest.approx(35.0, rel=0.1)
 
 
@@ -65,8 +65,8 @@ def test_the_interval_of_a_deviation_is_that_of_chi_square() -> None:
 
 def test_a_magnitude_is_without_that_of_its_noise(rng: np.random.Generator) -> None:
     for true in (3.0, 5.0, 12.0):
-        found = [magnitude(true + e, 1.0) for e in rng.normal(size=4000)]
-        assert np.mean(found) == pytest.approx(true, abs=3.0 / np.sqrt(4000.0) + 0.03)
+        magnitudes = [magnitude(true + e, 1.0) for e in rng.normal(size=4000)]
+        assert np.mean(magnitudes) == pytest.approx(true, abs=3.0 / np.sqrt(4000.0) + 0.03)
     assert magnitude(0.5, 1.0) == 0.0
     assert magnitude(-20.0, 1.0) == 20.0
     assert magnitude(-3.0, 0.0) == 3.0
@@ -110,10 +110,10 @@ def test_the_departure_by_tilt_is_that_of_the_curve(k2: float, k3: float, rng: n
     rows = np.column_stack([np.ones_like(angle), force, np.cos(angle)])
     curve = k2 * force**2 + k3 * force**3
     true = float(np.max(np.abs(curve - rows @ np.linalg.lstsq(rows, curve, rcond=None)[0])))
-    found = [turn(rng, k2, k3, 1e-4, 0.0)[0].departure for _ in range(300)]
-    held = sum(max(0.0, value - 1.96 * error) <= true <= value + 1.96 * error for value, error in found)
+    departures = [turn(rng, k2, k3, 1e-4, 0.0)[0].departure for _ in range(300)]
+    held = sum(max(0.0, value - 1.96 * error) <= true <= value + 1.96 * error for value, error in departures)
     assert held >= binom.ppf(0.005, 300, 0.95)
-    pulls = [(value - true) / error for value, error in found]
+    pulls = [(value - true) / error for value, error in departures]
     if k2:  # both terms stand out of the noise: the pulls are normal
         low, high = np.sqrt(chi2.ppf([0.005, 0.995], 299) / 299)
         assert low < np.std(pulls, ddof=1) < high

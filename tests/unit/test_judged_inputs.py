@@ -64,26 +64,26 @@ def test_a_page_says_what_its_command_says(settings: WorkbenchSettings) -> None:
     page = requests.settled(
         settings, MissingPage(source=source, without=("A2:5",), formula=("late = hours",), added=("late",))
     )
-    state, found = done_in_process("diagnose", requests.diagnosis(settings, page)[1], lambda *_: None)
+    state, outcome = done_in_process("diagnose", requests.diagnosis(settings, page)[1], lambda *_: None)
     assert state == "done"
     words = page.arguments()
     with effects.additions_forgotten():
         told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
-    assert told["error"] == pytest.approx(found.document["error"])
-    assert told["effects"] == found.document["effects"] == [*page.effects, "late"]
-    assert told["classes"] == found.document["classes"]
-    assert found.document["blocked_by"] == []
-    assert found.table.residual.shape == (2, 3, 24)
-    assert np.isnan(found.table.residual[1, :, 5]).all()  # the dwell that was left out
-    assert found.before.shape == found.table.residual.shape
+    assert told["error"] == pytest.approx(outcome.document["error"])
+    assert told["effects"] == outcome.document["effects"] == [*page.effects, "late"]
+    assert told["classes"] == outcome.document["classes"]
+    assert outcome.document["blocked_by"] == []
+    assert outcome.table.residual.shape == (2, 3, 24)
+    assert np.isnan(outcome.table.residual[1, :, 5]).all()  # the dwell that was left out
+    assert outcome.before.shape == outcome.table.residual.shape
 
 
 def test_a_plan_on_its_page_is_that_of_its_command(settings: WorkbenchSettings) -> None:
     page = PlanPage()
-    state, found = done_in_process("plan", requests.plan(settings, page)[1], lambda *_: None)
+    state, outcome = done_in_process("plan", requests.plan(settings, page)[1], lambda *_: None)
     assert state == "done"
     told = json.loads(CliRunner().invoke(app, [*page.arguments(), "--json"]).stdout)
-    assert told["minutes"] == pytest.approx(found["document"]["minutes"])
+    assert told["minutes"] == pytest.approx(outcome["document"]["minutes"])
     assert [(row["effect"], row["seen"]) for row in told["effects"]] == [
-        (row["effect"], row["seen"]) for row in found["document"]["effects"]
+        (row["effect"], row["seen"]) for row in outcome["document"]["effects"]
     ]

@@ -129,8 +129,8 @@ def test_a_least_value_says_its_side_its_margin_and_its_risk() -> None:
 
 
 def test_a_limit_has_one_side() -> None:
-    for text, found in (("max = 1.0, min = 2.0, ", "both given"), ("", "neither given")):
-        with pytest.raises(RecipeInvalid, match=found):
+    for text, message in (("max = 1.0, min = 2.0, ", "both given"), ("", "neither given")):
+        with pytest.raises(RecipeInvalid, match=message):
             parse_limits(f'name = "x"\n[figures]\nsweep_bandwidth_hz = {{ {text}unit = "Hz" }}\n', "test", UNITS)
 
 

@@ -26,15 +26,15 @@ def station_of(role: str, profile: str, faults: list[FaultOrder] | None = None, 
 
 def drives(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The amplitudes in V of all bursts of the simulated generator."""
-    found: list[float] = []
+    amplitudes: list[float] = []
     begin = Generator._begin
 
     def noted(self: Generator) -> None:
-        found.append(self._set["SOUR1:VOLT"])
+        amplitudes.append(self._set["SOUR1:VOLT"])
         begin(self)
 
     monkeypatch.setattr(Generator, "_begin", noted)
-    return found
+    return amplitudes
 
 
 def test_a_loose_reference_cable_does_not_raise_the_drive(monkeypatch: pytest.MonkeyPatch) -> None:

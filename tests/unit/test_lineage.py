@@ -63,8 +63,8 @@ def of_unit(run: Run) -> Lineage:
     return lineage(run.archive, "A1")
 
 
-def labels(found: Lineage, kind: str) -> set[str]:
-    return {node.label for node in found.graph.nodes.values() if node.kind == kind}
+def labels(traced: Lineage, kind: str) -> set[str]:
+    return {node.label for node in traced.graph.nodes.values() if node.kind == kind}
 
 
 def test_a_units_lineage_goes_from_its_certificate_to_every_record(of_unit: Lineage, run: Run) -> None:
@@ -96,17 +96,17 @@ def test_the_hashes_are_those_of_the_files(of_unit: Lineage, run: Run) -> None:
 
 
 def test_a_record_leads_to_the_certificates_that_it_went_into(run: Run) -> None:
-    found = lineage(run.archive, str(run.records.path / "00003" / "samples.parquet"))
-    assert found.kind == "file"
-    assert labels(found, "certificate") == {"A1/1", "A2/1", "A3/1"}
-    assert labels(found, "revocation") == {"revocation A2/2"}
-    assert labels(found, "samples") == {"record 3 samples.parquet"}
+    traced = lineage(run.archive, str(run.records.path / "00003" / "samples.parquet"))
+    assert traced.kind == "file"
+    assert labels(traced, "certificate") == {"A1/1", "A2/1", "A3/1"}
+    assert labels(traced, "revocation") == {"revocation A2/2"}
+    assert labels(traced, "samples") == {"record 3 samples.parquet"}
 
 
 def test_a_file_that_was_copied_out_is_known_by_its_content(run: Run, tmp_path: Path) -> None:
     copy = shutil.copy(run.path / "grades.parquet", tmp_path / "sent-by-mail.parquet")
-    found = lineage(run.archive, str(copy))
-    assert found.focus == (f"runs/{run.id}/grades.parquet",)
+    traced = lineage(run.archive, str(copy))
+    assert traced.focus == (f"runs/{run.id}/grades.parquet",)
     (tmp_path / "strange.parquet").write_bytes(b"strange")
     with pytest.raises(ArchiveUnusable, match="is no table and no source"):
         lineage(run.archive, str(tmp_path / "strange.parquet"))
@@ -124,8 +124,8 @@ def test_a_run_is_followed_back_to_what_it_runs_again_and_forth(run: Run, tmp_pa
 def test_a_unit_without_certificate_is_followed_from_its_grades(run: Run, tmp_path: Path) -> None:
     shutil.copytree(run.archive.root, tmp_path / "archive")
     shutil.rmtree(tmp_path / "archive" / "calibrations")
-    found = lineage(Archive(tmp_path / "archive"), "A3")
-    assert (found.kind, found.focus) == ("unit", (f"runs/{run.id}/grades.parquet",))
+    traced = lineage(Archive(tmp_path / "archive"), "A3")
+    assert (traced.kind, traced.focus) == ("unit", (f"runs/{run.id}/grades.parquet",))
 
 
 def test_what_is_neither_unit_nor_run_nor_file_is_told(run: Run) -> None:
@@ -133,11 +133,11 @@ def test_what_is_neither_unit_nor_run_nor_file_is_told(run: Run) -> None:
         lineage(run.archive, "small-x")
 
 
-def read_back(found: Lineage) -> Rdf:
+def read_back(traced: Lineage) -> Rdf:
     """The PROV document as another library reads it."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "ConjunctiveGraph is deprecated")  # rdflib's own parser uses it
-        return Rdf().parse(data=json.dumps(prov_of(found)), format="json-ld")
+        return Rdf().parse(data=json.dumps(prov_of(traced)), format="json-ld")
 
 
 def test_prov_is_read_by_another_library_and_leads_from_certificate_to_samples(of_unit: Lineage, run: Run) -> None:
@@ -169,8 +169,8 @@ def test_prov_has_an_activity_with_time_and_agent_for_every_thing_made(of_unit: 
 
 
 def test_a_revoked_certificate_is_invalidated_in_prov(run: Run) -> None:
-    found = lineage(run.archive, "A2")
-    graph = read_back(found)
+    traced = lineage(run.archive, "A2")
+    graph = read_back(traced)
     assert len(set(graph.subjects(predicate=PROV.wasInvalidatedBy))) == 1
 
 

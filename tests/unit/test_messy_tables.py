@@ -88,8 +88,8 @@ def test_rows_without_their_last_fields_do_not_hide_the_header(tmp_path: Path) -
 
 
 def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
-    found = stamps(pd.Series(["59:59,50", "59:59,75", "00:00,00", "00:00,25"], name="t"), "a.csv")
-    np.testing.assert_allclose(found, [0.0, 0.25, 0.5, 0.75])
+    times = stamps(pd.Series(["59:59,50", "59:59,75", "00:00,00", "00:00,25"], name="t"), "a.csv")
+    np.testing.assert_allclose(times, [0.0, 0.25, 0.5, 0.75])
 
 
 def frame(rng: np.random.Generator, **more: object) -> tuple[recordings.Recording, pd.DataFrame]:
@@ -102,9 +102,9 @@ def test_a_row_of_a_summary_is_left_out_where_gaps_may_be(rng: np.random.Generat
     _, table = frame(rng)
     last = pd.DataFrame({"t": ["mean"], "ax": [0.0], "ay": [0.0], "az": [0.0]})
     table = pd.concat([table.astype(object), last], ignore_index=True)
-    found = imported(table, build(PLAIN | {"gaps": "split"}, "t"), "a.csv")
-    assert found.samples is not None
-    assert len(found.samples) == len(table) - 1
+    recording = imported(table, build(PLAIN | {"gaps": "split"}, "t"), "a.csv")
+    assert recording.samples is not None
+    assert len(recording.samples) == len(table) - 1
 
 
 def test_rows_that_stand_there_twice_are_remarked_upon(rng: np.random.Generator) -> None:
@@ -138,17 +138,17 @@ def test_a_converter_with_its_zero_in_the_middle_lost_no_sign(
 def test_a_sheet_of_positions_is_proposed_as_dwells(tmp_path: Path) -> None:
     """The proposed command asked for the rate of samples."""
     (tmp_path / "a.csv").write_text("Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
-    found = inspect([tmp_path / "a.csv"]).document
-    assert found["open"] == []
-    assert "dwell=Position" in found["command"]
-    assert found["command"].endswith("--rows dwells")
+    document = inspect([tmp_path / "a.csv"]).document
+    assert document["open"] == []
+    assert "dwell=Position" in document["command"]
+    assert document["command"].endswith("--rows dwells")
 
 
 def test_axes_that_were_not_recognised_stand_in_capitals(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,ax\n" + "".join(f"{0.01 * k:.2f},0.{k}\n" for k in range(20)))
-    found = inspect([tmp_path / "a.csv"]).document
-    assert "x=COLUMN,y=COLUMN,z=COLUMN" in found["command"]
-    assert any("needs three axes" in one for one in found["open"])
+    document = inspect([tmp_path / "a.csv"]).document
+    assert "x=COLUMN,y=COLUMN,z=COLUMN" in document["command"]
+    assert any("needs three axes" in one for one in document["open"])
 
 
 def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Generator) -> None:
@@ -160,10 +160,10 @@ def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Gene
         table.loc[start : stop - 1, "part"] = f"face {number}"
         table.loc[start : stop - 1, "t"] -= one.time[start]
     content = PLAIN | {"columns": {**PLAIN["columns"], "dwell": "part"}}  # type: ignore[dict-item]
-    found = imported(table[table["part"] != ""].reset_index(drop=True), build(content, "t"), "a.csv")
-    assert found.dwells is not None
-    assert bool(np.all(np.diff(found.dwells["time_s"]) > 0.0))
-    assert "the clock restarts 5 times" in "; ".join(found.remarks)
+    recording = imported(table[table["part"] != ""].reset_index(drop=True), build(content, "t"), "a.csv")
+    assert recording.dwells is not None
+    assert bool(np.all(np.diff(recording.dwells["time_s"]) > 0.0))
+    assert "the clock restarts 5 times" in "; ".join(recording.remarks)
 
 
 def test_counts_far_from_zero_are_fitted(rng: np.random.Generator) -> None:

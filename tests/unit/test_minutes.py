@@ -139,11 +139,11 @@ def test_follow_ups_and_plans_take_the_same_time_and_the_same_temperatures(tmp_p
         )
     # the last two are read on the way: against the first-order lag, integrated in small steps from the soak at 55 °C on
     air, device, now = 55.0, float(ran.device[3]), float(ran.time[3]) + 0.5 * pace.dwell_s
-    found = {}
+    temperatures = {}
     while now < ran.end:
         air += float(np.clip(-5.0 - air, -pace.ramp * 0.01, pace.ramp * 0.01))
         device += (air - device) * 0.01 / pace.lag
         now += 0.01
-        found |= {k: (air, device) for k in (4, 5) if k not in found and now >= ran.time[k]}
+        temperatures |= {k: (air, device) for k in (4, 5) if k not in temperatures and now >= ran.time[k]}
     for k in (4, 5):
-        assert (ran.air[k], ran.device[k]) == pytest.approx(found[k], abs=0.02)
+        assert (ran.air[k], ran.device[k]) == pytest.approx(temperatures[k], abs=0.02)

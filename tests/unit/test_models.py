@@ -81,12 +81,12 @@ def test_walks_through_the_versions(tmp_path):
     text = new_model(tmp_path / "My Model.toml", ["bias", "scale"], "A. Tester", NOW)
     for name in ("misalignment", "third_order"):
         text, model = extended(text, step(name), "model")
-    found = versions(model)
+    history = versions(model)
     assert model.model.name == "my-model"
-    assert [v.effects for v in found] == [
+    assert [v.effects for v in history] == [
         ("bias", "scale"), ("bias", "scale", "misalignment"), ("bias", "scale", "misalignment", "third_order"),
     ]  # fmt: skip
-    assert [v.added for v in found] == [(), ("misalignment",), ("third_order",)]
+    assert [v.added for v in history] == [(), ("misalignment",), ("third_order",)]
 
 
 def test_a_removed_effect_is_told_as_removed():
@@ -96,9 +96,9 @@ def test_a_removed_effect_is_told_as_removed():
     from schemas.model import parse_model
 
     gone = gone.replace('scale", ]', 'scale"]')
-    found = versions(parse_model(gone, "model"))
-    assert [v.removed for v in found][-1] == ("third_order",)
-    assert "third_order" in found[-2].effects
+    history = versions(parse_model(gone, "model"))
+    assert [v.removed for v in history][-1] == ("third_order",)
+    assert "third_order" in history[-2].effects
     assert model.model.version == 2
 
 

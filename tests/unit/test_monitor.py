@@ -60,28 +60,28 @@ def test_the_numbers_are_in_the_format_of_prometheus() -> None:
     data = text(full())
     for line in data.decode().splitlines():
         assert line.startswith(("# HELP tumbleline_", "# TYPE tumbleline_")) or SAMPLE.fullmatch(line), line
-    found = families(data)
-    passed = [one for one in found["tumbleline_units"] if one.labels["outcome"] == "passed"]
+    metrics = families(data)
+    passed = [one for one in metrics["tumbleline_units"] if one.labels["outcome"] == "passed"]
     assert [(one.labels["station"], one.labels["recipe"], one.value) for one in passed] == [
         ('st "1"\\x', "line\nsix", 20.0)
     ]
-    assert found["tumbleline_yield_ratio"][0].value == pytest.approx(20 / 24)
-    assert {one.labels["within_days"]: one.value for one in found["tumbleline_units_due"]} == {"0": 2.0, "30": 5.0}
-    assert found["tumbleline_healthy"][0].value == 1.0
+    assert metrics["tumbleline_yield_ratio"][0].value == pytest.approx(20 / 24)
+    assert {one.labels["within_days"]: one.value for one in metrics["tumbleline_units_due"]} == {"0": 2.0, "30": 5.0}
+    assert metrics["tumbleline_healthy"][0].value == 1.0
 
 
 def test_every_metric_of_dashboard_and_rules_exists_with_the_labels_that_they_name() -> None:
     dashboard = json.loads((DEPLOY / "dashboard.json").read_text(encoding="utf-8"))
     rules = yaml.safe_load((DEPLOY / "rules.yaml").read_text(encoding="utf-8"))
-    found = families(text(full()))
+    metrics = families(text(full()))
     targets = [(p["title"], t["expr"], t["legendFormat"]) for p in dashboard["panels"] for t in p["targets"]]
     targets += [(r["alert"], r["expr"], r["annotations"]["summary"]) for g in rules["groups"] for r in g["rules"]]
     assert len(targets) >= 20
     for title, expression, shown in targets:
         names = re.findall(r"tumbleline_[a-z_]+", expression)
         assert names, title
-        assert [name for name in names if name not in found] == [], title
-        labels = set(found[names[0]][0].labels) | {"instance"}
+        assert [name for name in names if name not in metrics] == [], title
+        labels = set(metrics[names[0]][0].labels) | {"instance"}
         used = re.findall(r"\{\{\s*(?:\$labels\.)?([a-z_]+)", shown)
         used += [label for group in re.findall(r"by \(([^)]*)\)", expression) for label in group.split(", ")]
         used += re.findall(r'([a-z_]+)="', expression)
@@ -90,7 +90,7 @@ def test_every_metric_of_dashboard_and_rules_exists_with_the_labels_that_they_na
     left = {"tumbleline_info", "tumbleline_window_days", "tumbleline_source_up", "tumbleline_queue_paused"}
     left |= {"tumbleline_archive_lag_seconds", "tumbleline_station_driven", "tumbleline_station_events"}
     left |= {"tumbleline_last_run_timestamp_seconds"}
-    assert set(found) - shown == left, "a metric that nothing shows"
+    assert set(metrics) - shown == left, "a metric that nothing shows"
 
 
 def test_panels_of_the_dashboard_do_not_overlap_and_have_units() -> None:
@@ -139,10 +139,10 @@ def test_a_station_that_was_not_left_safe_is_told_and_a_driven_one_is_not(tmp_pa
     write_holder(lease_file(tmp_path, "tcp:1"), here)
     dead = type(here)(**{**here.__dict__, "station": "line-2", "pid": 2**22 + 1, "run": "run-2"})
     write_holder(lease_file(tmp_path, "tcp:2"), dead)
-    found = read_stations(tmp_path)
-    assert found.driven == {"line-1"}
-    assert list(found.unsafe) == ["line-2"]
-    assert "run-2" in found.unsafe["line-2"]
+    stations = read_stations(tmp_path)
+    assert stations.driven == {"line-1"}
+    assert list(stations.unsafe) == ["line-2"]
+    assert "run-2" in stations.unsafe["line-2"]
 
 
 @pytest.mark.parametrize(
@@ -261,10 +261,10 @@ def test_every_kind_of_trouble_is_an_alert(tmp_path: Path) -> None:
 def test_each_alert_is_delivered_once_although_the_receiver_fails_and_the_service_restarts(tmp_path: Path) -> None:
     taken = troubled(tmp_path)
     now = Snapshot(datetime.now(UTC), 30, None, None, None)
-    found = alerts_of(now, tmp_path)
-    assert [alert["subject"] for alert in found] == ["A1", "A2"]
-    assert all(alert["kind"] == "audit" and "test engineer" in alert["text"] for alert in found)
-    alerts = [*alerts_of(taken), *found]
+    of_audit = alerts_of(now, tmp_path)
+    assert [alert["subject"] for alert in of_audit] == ["A1", "A2"]
+    assert all(alert["kind"] == "audit" and "test engineer" in alert["text"] for alert in of_audit)
+    alerts = [*alerts_of(taken), *of_audit]
     with receiver([200, 500, 200, 503]) as (address, accepted):
         count, fault = Poster(address, tmp_path).post(alerts)
         assert (count, "500" in fault) == (1, True)

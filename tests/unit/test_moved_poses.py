@@ -74,8 +74,8 @@ def test_a_drag_turns_the_table_the_nearer_way(settings: WorkbenchSettings, page
     for outer, inner in ((45.0, 100.0), (-45.0, 100.0)):
         near = recipes.turned_to(settings, page, "p3", outer + 4.0, inner + 4.0)
         x, y = project(force(outer, inner)[None])
-        found = recipes.dragged_to(settings, near, "p3", float(x[0]), float(y[0]))
-        assert found.pose == (f"p3={outer:g},{inner:g}",)
+        dragged = recipes.dragged_to(settings, near, "p3", float(x[0]), float(y[0]))
+        assert dragged.pose == (f"p3={outer:g},{inner:g}",)
     with pytest.raises(WrongUse, match="outside"):
         recipes.dragged_to(settings, page, "p3", 3.0, 0.0)
 

@@ -84,5 +84,5 @@ def test_a_repeated_procedure_that_is_no_number_decides(place: int) -> None:
     row = {"unit": "A", "figure": "bias_error_ug", "axis": "x", "unit_text": "µg", "identified": True, "note": ""}
     rows = [row | {"value": 1.0, "uncertainty": 0.1}, row | {"value": 2.0, "uncertainty": 0.1}]
     rows[place]["value"] = np.nan
-    [found] = _of_procedures(pd.DataFrame(rows), "A", limits)
-    assert decide(limits, found.name, found.value, found.uncertainty).outcome != "pass"
+    [figure] = _of_procedures(pd.DataFrame(rows), "A", limits)
+    assert decide(limits, figure.name, figure.value, figure.uncertainty).outcome != "pass"

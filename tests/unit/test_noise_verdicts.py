@@ -56,10 +56,10 @@ def test_the_bias_of_six_faces_is_stated_for_the_record_and_for_the_day_after() 
     held = {"record": 0, "day": 0, "day by the record's": 0}
     for _ in range(12):
         world = lots.world(rng, units=4, flicker=300.0)
-        found = fit(world.dwells, lots.NO_HISTORY, FACES)
-        rows = found["coefficients"]
+        fitted = fit(world.dwells, lots.NO_HISTORY, FACES)
+        rows = fitted["coefficients"]
         value = 1e6 * rows[rows["effect"] == "bias"].sort_values(["unit", "axis"])["value"].to_numpy().reshape(-1, 3)
-        own = found["wander"].sort_values(["unit", "axis"])
+        own = fitted["wander"].sort_values(["unit", "axis"])
         record, day = (2.0 * own[name].to_numpy().reshape(-1, 3) for name in ("bias_record_u_ug", "bias_long_u_ug"))
         assert own["bias_switch_on_u_ug"].isna().all()
         held["record"] += int(np.sum(np.abs(value - world.record) <= record))
@@ -77,8 +77,8 @@ def test_the_rms_error_of_a_verification_varies_between_runs_as_its_covariance_s
         dwells = lots.world(
             rng, units=4, plan="fibonacci", temperatures=(-10.0, 25.0, 60.0), flicker=300.0, move_s=20, day_s=0
         ).dwells
-        found = fit(dwells, lots.NO_HISTORY, [*FACES, "bias_temperature"])
-        tables = (found[name] for name in ("coefficients", "covariance", "predictions"))
+        fitted = fit(dwells, lots.NO_HISTORY, [*FACES, "bias_temperature"])
+        tables = (fitted[name] for name in ("coefficients", "covariance", "predictions"))
         rows = verify(dwells, lots.NO_HISTORY, *tables)["verification"]
         for _, own in rows.groupby("unit"):
             shown += [float(np.sqrt(np.mean(own[f"error_{axis}_ug"] ** 2))) for axis in "xyz"]
@@ -100,12 +100,12 @@ def test_a_sphere_fit_holds_the_bias_under_flicker() -> None:
         world = lots.world(rng, units=1, plan="fibonacci", checks=(), temperatures=(25.0,) * 3, flicker=30.0, day_s=0)
         rows = world.dwells
         output, time = rows[["out_x", "out_y", "out_z"]].to_numpy(), rows["time_s"].to_numpy()
-        for found in (
+        for sphere in (
             fit_ellipsoid(output, time=time, error=(rows["sd_x"] / np.sqrt(rows["n"])).to_numpy()),
             fit_ellipsoid(output),
         ):
-            inside = np.abs(1e6 * found.bias - world.record[0]) <= 2e6 * np.sqrt(np.diagonal(found.covariance)[:3])
-            held, plain = (held + int(inside.sum()), plain) if found.wander else (held, plain + int(inside.sum()))
+            inside = np.abs(1e6 * sphere.bias - world.record[0]) <= 2e6 * np.sqrt(np.diagonal(sphere.covariance)[:3])
+            held, plain = (held + int(inside.sum()), plain) if sphere.wander else (held, plain + int(inside.sum()))
     assert held >= 26  # of 30
     assert held >= plain
 

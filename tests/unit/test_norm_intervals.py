@@ -14,13 +14,13 @@ PLAIN = ("bias", "scale", "misalignment")
 
 
 def test_plausible_shares_are_those_that_the_likelihood_leaves_with_weights_that_add_up() -> None:
-    found = plausible_shares(
+    plausible = plausible_shares(
         lambda s: 40.0 * (np.log10(s.flicker + 1e-2) - 1.0) ** 2 + 1e3 * (s.walk > 0.02), Shares(10.0)
     )
-    assert sum(weight for _, weight in found) == pytest.approx(1.0)
-    assert max(found, key=lambda one: one[1])[0].flicker == pytest.approx(10.0)
-    assert {round(np.log10(s.flicker), 1) for s, _ in found} == {0.5, 1.0, 1.5}
-    assert all(s.walk <= 0.1 for s, _ in found)
+    assert sum(weight for _, weight in plausible) == pytest.approx(1.0)
+    assert max(plausible, key=lambda one: one[1])[0].flicker == pytest.approx(10.0)
+    assert {round(np.log10(s.flicker), 1) for s, _ in plausible} == {0.5, 1.0, 1.5}
+    assert all(s.walk <= 0.1 for s, _ in plausible)
 
 
 def test_the_average_over_one_noise_is_the_covariance_of_generalised_least_squares(rng: np.random.Generator) -> None:
@@ -61,8 +61,10 @@ def test_the_error_of_the_bias_of_a_record_is_that_of_a_simulation(rng: np.rando
 def test_intervals_hold_the_truth_for_unequal_dwells() -> None:
     """300 recordings on other seeds: 94.7 to 97.9 % (benchmarks/recording_intervals.py); 90 % at the best noise alone."""
     names = ("white 280, B 30", "white 25, B 30", "white 100, axes 1:2:3")
-    found = [pulls(Recording((24, 30, 40)[k % 3], names[k % 3], long_first=k % 2 == 0), 300 + k) for k in range(6)]
-    own = np.concatenate([np.concatenate(one) for one in found])
+    per_recording = [
+        pulls(Recording((24, 30, 40)[k % 3], names[k % 3], long_first=k % 2 == 0), 300 + k) for k in range(6)
+    ]
+    own = np.concatenate([np.concatenate(one) for one in per_recording])
     assert np.mean(np.abs(own) <= 2.0) > 0.9
     assert own.std() > 0.5
 

@@ -67,9 +67,9 @@ def test_the_shortest_that_reaches_an_aim_is_that_of_judging_every_sequence(
     drawn: list[tuple[float, float, Kind]], below: float
 ) -> None:
     search = Told([m for m, _, _ in drawn], [share for _, share, _ in drawn], [kind for _, _, kind in drawn])
-    found = Offers(search, [], NOW).shortest(0.6, below)
+    offer = Offers(search, [], NOW).shortest(0.6, below)
     reach = [minutes for minutes, share, _ in drawn if share >= 0.6 and minutes < below and minutes <= BUDGET]
-    assert (None if found is None else found.minutes) == (min(reach) if reach else None)
+    assert (None if offer is None else offer.minutes) == (min(reach) if reach else None)
 
 
 def test_long_sequences_are_not_judged_where_a_short_one_brings_more_than_they_can() -> None:

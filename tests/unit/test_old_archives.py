@@ -70,8 +70,8 @@ def test_nothing_new_is_certified_on_noise_only_and_what_was_certified_then_is_t
         certify(Ledger(run.archive), run, start=measured_on(run))
     monkeypatch.setattr(certifying, "refuse_unstated", lambda run: None)  # as versions before did
     certify(Ledger(run.archive), run, start=measured_on(run))
-    found = lineage(run.archive, "A1")
-    kinds = {node.kind for node in found.graph.nodes.values()}
+    traced = lineage(run.archive, "A1")
+    kinds = {node.kind for node in traced.graph.nodes.values()}
     assert {"certificate", "samples", "table", "station", "recipe"} <= kinds
 
 
@@ -84,6 +84,10 @@ def test_it_is_fitted_anew_without_measuring_again(run: Run) -> None:
     assert stages["capture"]
     assert not stages["fit"]
     assert set(runner.run.table("grades")["unit"]) == {"A1", "A2"}
+    with pytest.raises(
+        WrongUse, match="noise only"
+    ):  # run again by a version that knows the budget, but without a statement
+        certify(Ledger(run.archive), runner.run, start=measured_on(runner.run))
 
 
 def test_a_table_is_brought_up_version_by_version(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

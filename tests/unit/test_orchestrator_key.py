@@ -70,9 +70,9 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path, monkeypatch: pytest
 
 
 def test_client_and_server_of_a_command_have_the_same_key_and_no_foreign_origin(tmp_path: Path) -> None:
-    found = settings(tmp_path, 4321, "a:key")
-    assert found[SERVER_KEY] == found[CLIENT_KEY] == "a:key"
-    assert found["PREFECT_SERVER_CORS_ALLOWED_ORIGINS"] == "http://127.0.0.1:4321,http://localhost:4321"
+    environment = settings(tmp_path, 4321, "a:key")
+    assert environment[SERVER_KEY] == environment[CLIENT_KEY] == "a:key"
+    assert environment["PREFECT_SERVER_CORS_ALLOWED_ORIGINS"] == "http://127.0.0.1:4321,http://localhost:4321"
 
 
 def test_what_an_older_version_left_open_is_closed(tmp_path: Path) -> None:

@@ -39,11 +39,11 @@ def left_by_the_wrong_one(rows, true, wrong, size=3e-5):
 
 def test_separations_are_what_a_fit_of_the_wrong_rival_leaves():
     rows = columns(poses.plan("fibonacci24"))
-    found = discrimination().separations(normal(rows))
-    assert found[0] == pytest.approx(sum(left_by_the_wrong_one(rows, CUBIC, ODD)), rel=1e-5)
-    assert found[1] == pytest.approx(sum(left_by_the_wrong_one(rows, ODD, CUBIC)), rel=1e-5)
+    separations = discrimination().separations(normal(rows))
+    assert separations[0] == pytest.approx(sum(left_by_the_wrong_one(rows, CUBIC, ODD)), rel=1e-5)
+    assert separations[1] == pytest.approx(sum(left_by_the_wrong_one(rows, ODD, CUBIC)), rel=1e-5)
     lot = replace(discrimination(), units=8).separations(normal(rows))
-    assert lot == pytest.approx(8.0 * found)
+    assert lot == pytest.approx(8.0 * separations)
 
 
 def test_six_faces_do_not_part_a_cubic_from_an_odd_quadratic():

@@ -68,8 +68,10 @@ def test_a_cluster_at_an_address_gives_the_same_results(tmp_path) -> None:
     with LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
     ) as there:
-        found = map_partitions(square, list(range(5)), on_dask(there.scheduler_address, home=tmp_path / "orchestrator"))
-    assert found == [0, 1, 4, 9, 16]
+        squares = map_partitions(
+            square, list(range(5)), on_dask(there.scheduler_address, home=tmp_path / "orchestrator")
+        )
+    assert squares == [0, 1, 4, 9, 16]
 
 
 @pytest.mark.slow

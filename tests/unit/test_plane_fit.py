@@ -47,15 +47,15 @@ def test_stated_intervals_hold_the_truth(rng: np.random.Generator, *, known: boo
         force, output = turned(rng)
         time, error = 30.0 * np.arange(24), np.full((24, 3), NOISE)
         if known:
-            found = fit_plane(output, force, 1, time, error)
+            fit = fit_plane(output, force, 1, time, error)
             truth = RESPONSE[:, [0, 2]]
         else:
-            found = fit_plane_norm(output, 1, 1.0, time, error)
-            truth = np.array([flat[0], found.response[1], flat[1]])
-        inside = np.abs(np.column_stack([found.bias - BIAS, found.response - truth]))
-        stated = 2.0 * np.column_stack([found.bias_error, found.response_error])
+            fit = fit_plane_norm(output, 1, 1.0, time, error)
+            truth = np.array([flat[0], fit.response[1], flat[1]])
+        inside = np.abs(np.column_stack([fit.bias - BIAS, fit.response - truth]))
+        stated = 2.0 * np.column_stack([fit.bias_error, fit.response_error])
         hits, total = hits + int(np.sum(inside <= stated + 1e-15)), total + inside.size
-        errors.append(found.response_error[0, 0])
+        errors.append(fit.response_error[0, 0])
     assert hits / total > 0.93
     assert np.median(errors) == pytest.approx(NOISE * np.sqrt(2.0 / 24.0), rel=0.35) or not known
 
@@ -80,19 +80,19 @@ def test_a_dead_axis_is_never_a_turn(rng: np.random.Generator, count: int) -> No
         if quiet_axis(output) != 1:
             continue
         try:
-            found = fit_plane_norm(output, 1, 1.0, 30.0 * np.arange(count), np.full((count, 3), NOISE))
+            fit = fit_plane_norm(output, 1, 1.0, 30.0 * np.arange(count), np.full((count, 3), NOISE))
         except NotIdentified:
             continue
-        assert found.misfit > GROSS
+        assert fit.misfit > GROSS
 
 
 def test_an_arc_is_a_turn_and_gives_its_coefficients(rng: np.random.Generator) -> None:
     angle = np.radians(np.arange(-60.0, 61.0, 10.0))
     force = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
     output = BIAS + force @ RESPONSE.T + NOISE * rng.standard_normal(force.shape)
-    found = fit_plane_norm(output, 1, 1.0, 30.0 * np.arange(13), np.full((13, 3), NOISE))
-    assert found.misfit < 4.0 * NOISE
-    assert found.bias[[0, 2]] == pytest.approx(BIAS[[0, 2]], abs=2e-3)
+    fit = fit_plane_norm(output, 1, 1.0, 30.0 * np.arange(13), np.full((13, 3), NOISE))
+    assert fit.misfit < 4.0 * NOISE
+    assert fit.bias[[0, 2]] == pytest.approx(BIAS[[0, 2]], abs=2e-3)
 
 
 def test_too_few_poses_are_refused() -> None:
@@ -114,8 +114,8 @@ def test_the_norm_alone_gives_no_scale_to_an_axis_that_was_not_turned(rng: np.ra
 def test_a_probability_that_is_no_number_stays_none(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, unknown: int
 ) -> None:
-    found = [np.nan if k == unknown else 0.8 for k in range(3)]
-    monkeypatch.setattr(plane, "_harmonics", lambda *_: found.pop(0))
+    p_values = [np.nan if k == unknown else 0.8 for k in range(3)]
+    monkeypatch.setattr(plane, "_harmonics", lambda *_: p_values.pop(0))
     force, output = turned(rng)
     fit = fit_plane(output, force, 1, 30.0 * np.arange(24), np.full((24, 3), NOISE))
     assert np.isnan(fit.p_value)

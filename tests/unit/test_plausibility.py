@@ -69,9 +69,9 @@ def test_the_first_sample_that_cannot_be_the_unit_s_is_told_with_the_median():
     output = np.random.default_rng(4).standard_normal((200, 3))
     assert first_outlier(output, 1.0, 1000.0) is None
     output[[70, 120], 1] = 40.0
-    found = first_outlier(output, 1.0, 1000.0)
-    assert (found.row, found.axis, found.value) == (70, 1, 40.0)
-    assert abs(found.median) < 0.5
+    outlier = first_outlier(output, 1.0, 1000.0)
+    assert (outlier.row, outlier.axis, outlier.value) == (70, 1, 40.0)
+    assert abs(outlier.median) < 0.5
     assert first_outlier(output[:19], 1.0, 1000.0) is None  # too few to say
     output[3, 2] = np.nan
     assert first_outlier(output, 1.0, 1000.0) is not None  # nothing can be said to lie inside

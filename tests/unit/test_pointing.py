@@ -32,9 +32,9 @@ def test_a_zero_lost_half_way_is_seen_by_all(rng: np.random.Generator, name: str
     believed = force_from_angles(angles[:, 0], angles[:, 1])
     true = angles.copy()
     true[len(true) // 2 :, 0] += np.radians(1.0)
-    found = pointing_error(believed, lot(rng, force_from_angles(true[:, 0], true[:, 1])))
-    assert found > 2.0 * POINTING_DEG
-    assert "check zero and gears" in contradicts(found)
+    error = pointing_error(believed, lot(rng, force_from_angles(true[:, 0], true[:, 1])))
+    assert error > 2.0 * POINTING_DEG
+    assert "check zero and gears" in contradicts(error)
 
 
 def test_the_angle_is_that_of_the_table(rng: np.random.Generator) -> None:
@@ -61,6 +61,6 @@ def test_a_soak_is_judged_by_its_own_dwells(rng: np.random.Generator) -> None:
         output = lot(np.random.default_rng(soak), force)
         for dwell, pose in enumerate(angles):
             means = {f"U{unit}": output[dwell, unit] for unit in range(4 if dwell < 6 else 3)}
-            found = watched.add(soak, (float(pose[0]), float(pose[1])), means)
+            error = watched.add(soak, (float(pose[0]), float(pose[1])), means)
     assert len(watched.means) == len(angles)
-    assert found < POINTING_DEG
+    assert error < POINTING_DEG

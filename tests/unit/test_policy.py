@@ -50,7 +50,7 @@ def test_a_policy_with_an_unknown_key_or_value_is_refused(content: object, told:
 
 def test_the_deployments_of_the_product_state_a_policy() -> None:
     content = yaml.safe_load((DEPLOY / "prefect.yaml").read_text(encoding="utf-8"))
-    found = {one["name"]: policy_of(one["name"], one["policy"]) for one in content["deployments"]}
-    assert found["production-line"] == Policy(crashed="continue")
-    assert found["on-demand"] == Policy()
-    assert found["weekly-audit"].missed == "latest"
+    policies = {one["name"]: policy_of(one["name"], one["policy"]) for one in content["deployments"]}
+    assert policies["production-line"] == Policy(crashed="continue")
+    assert policies["on-demand"] == Policy()
+    assert policies["weekly-audit"].missed == "latest"

@@ -48,9 +48,9 @@ def test_a_device_that_was_off_for_long_is_cold_and_one_that_was_off_for_a_momen
     run = run_of()
     for off, expected in ((1e6, 1.0), (1e-3, math.exp(-(900.0 + 40 * 20.0) / 500.0))):
         state = switched_off(run, off)
-        found = coldness(state, 500.0)
-        assert found[0, :40] == pytest.approx(1.0)
-        assert found[0, 40:] == pytest.approx(expected, abs=0.02)
+        cold = coldness(state, 500.0)
+        assert cold[0, :40] == pytest.approx(1.0)
+        assert cold[0, 40:] == pytest.approx(expected, abs=0.02)
 
 
 def test_coldness_through_two_cycles_is_that_of_a_body_that_warms_and_cools():
@@ -65,9 +65,9 @@ def test_coldness_through_two_cycles_is_that_of_a_body_that_warms_and_cools():
                 warmth += (goal - warmth) * seconds / tau
             now = until
         cold[k] = 1.0 - warmth
-    found = coldness(state, tau)[0]
+    computed = coldness(state, tau)[0]
     assert len(cycles) == 2
-    assert [found[k] for k in cycles] == pytest.approx([cold[k] for k in cycles], abs=2e-3)
+    assert [computed[k] for k in cycles] == pytest.approx([cold[k] for k in cycles], abs=2e-3)
 
 
 def test_warm_up_begins_again_and_ageing_goes_on():
@@ -113,8 +113,8 @@ def lot_with(state: State, bias: np.ndarray, rng: np.random.Generator) -> Lot:
 def test_a_jump_of_the_bias_at_a_power_on_is_nothing_that_is_missing(rng):
     state = switched_off(run_of(), 600.0)
     jumps = 200e-6 * rng.standard_normal((3, 1)) * (np.arange(state.time.shape[-1]) >= 40)
-    found = diagnose(lot_with(state, jumps, rng), ["bias", "scale", "misalignment"], np.random.default_rng(1))
-    assert found.adequate
+    diagnosis = diagnose(lot_with(state, jumps, rng), ["bias", "scale", "misalignment"], np.random.default_rng(1))
+    assert diagnosis.adequate
     same = replace(state, power_off=None, memory={})
     assert not diagnose(
         lot_with(same, jumps, rng), ["bias", "scale", "misalignment"], np.random.default_rng(1)
@@ -140,10 +140,10 @@ def test_what_happens_after_a_power_on_parts_warm_up_from_ageing(truth, rng):
         passed = (time - time[0, 0] + 300.0)[..., None]
         warming = 60e-6 * np.log(times[1] / times[0]) * np.sum(1.0 - np.exp(-passed / times), axis=-1)
     turn_on = 100e-6 * rng.standard_normal((3, 1)) * (np.arange(time.shape[-1]) >= 40)
-    found = diagnose(
+    diagnosis = diagnose(
         lot_with(state, warming + turn_on, rng), ["bias", "scale", "misalignment"], np.random.default_rng(1)
     )
-    assert [n.effects.ids for n in found.named] == [(truth,)]
+    assert [n.effects.ids for n in diagnosis.named] == [(truth,)]
 
 
 def test_power_is_switched_only_where_the_station_can_and_the_devices_say_since_when_they_have_it():
@@ -183,9 +183,9 @@ def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did
     )  # fmt: skip
     assert measured(rows).state.power_off is None
     rows["power_off_s"] = np.where(rows["dwell"] == 12, 300.0, np.where(rows["dwell"] < 12, np.nan, 0.0))
-    found = measured(rows).state
-    assert switched(found) == [12]
-    assert not found.covariates
+    measured_state = measured(rows).state
+    assert switched(measured_state) == [12]
+    assert not measured_state.covariates
 
 
 def test_warm_up_after_a_power_off_is_the_same_for_a_fit_as_for_a_diagnosis():
@@ -200,10 +200,10 @@ def test_warm_up_after_a_power_off_is_the_same_for_a_fit_as_for_a_diagnosis():
     )  # fmt: skip
     fitted, judged = lot_arrays(table).state, measured(table).state
     warm_up = catalogue.get("warm_up")
-    found, other = (warm_up.columns(state, 0, tau=tau)[0, :, 0] for state in (fitted, judged))
-    np.testing.assert_array_equal(found, other)
+    by_fit, other = (warm_up.columns(state, 0, tau=tau)[0, :, 0] for state in (fitted, judged))
+    np.testing.assert_array_equal(by_fit, other)
     # on since 1680 s when it goes off: e^(-1680/900) is lacking then, and all but the rest of its warmth is gone after 600 s
     on = float(run.time[0, 40] - run.since_power[0, 40] - off - (run.time[0, 0] - run.since_power[0, 0]))
     lacking = 1.0 - (1.0 - math.exp(-on / tau)) * math.exp(-off / tau)
-    assert found[40] / math.exp(-run.since_power[0, 40] / tau) == pytest.approx(lacking, rel=1e-9)
+    assert by_fit[40] / math.exp(-run.since_power[0, 40] / tau) == pytest.approx(lacking, rel=1e-9)
     assert 0.4 < lacking < 0.6

@@ -65,7 +65,7 @@ def test_a_run_that_switches_nothing_says_nothing_of_it():
 def test_warm_up_begins_where_the_device_has_cooled_to():
     size, tau = 4e-3, 500.0
     sink, _ = run(hidden=[WarmUp(size=size, tau=tau)])
-    found = biases(sink)[:, 0]
+    bias = biases(sink)[:, 0]
     middle = sink.all(1).drop_duplicates("record")["since_power_s"].to_numpy()
     # warmth by a differential equation, stepped, not the closed form
     warmth, at, seconds = 0.0, [], 0.01
@@ -75,15 +75,15 @@ def test_warm_up_begins_where_the_device_has_cooled_to():
             warmth += (target - warmth) * seconds / tau
         at.append(warmth)
     expected = -size * (at[2] - (1.0 - math.exp(-middle[0] / tau)))
-    assert found[1] - found[0] == pytest.approx(expected, abs=3e-5)
+    assert bias[1] - bias[0] == pytest.approx(expected, abs=3e-5)
 
 
 def test_stress_goes_on_letting_go_without_power():
     truth = StressRelaxation(size=2e-3, shortest=100.0)
     sink, _ = run(hidden=[truth])
     first, second = sink.all(1).drop_duplicates("record")["start_s"].to_numpy()[:2] + 1.0
-    found = biases(sink)
-    assert (found[1] - found[0])[0] == pytest.approx(
+    bias = biases(sink)
+    assert (bias[1] - bias[0])[0] == pytest.approx(
         2e-3 * (math.log1p(second / 100.0) - math.log1p(first / 100.0)), rel=0.2
     )
 
@@ -92,8 +92,8 @@ def test_the_bias_after_a_power_on_differs_by_what_the_preset_says():
     repeats = 24
     overrides = {**QUIET, "bias_stability_ug": 2000.0}
     sink, _ = run(recipe=recipe_with_power_off((0.0, *[5.0] * repeats)), preset_overrides=overrides)
-    found = biases(sink)
-    jumps = found[1:] - found[0]
+    bias = biases(sink)
+    jumps = bias[1:] - bias[0]
     assert np.std(jumps) == pytest.approx(2e-3, rel=0.25)
     plain, _ = run()
     assert np.ptp(biases(plain), axis=0) == pytest.approx(0.0, abs=4e-5)

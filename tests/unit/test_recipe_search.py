@@ -35,14 +35,14 @@ def timed():
 
 def test_no_soak_has_a_dwell_too_many(timed: TimedDesign) -> None:
     made, allowed = PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 1.4)
-    found = fewest_dwells(timed, made, allowed)
-    assert found is not None
-    assert np.all(timed.ratio_and_seconds(found)[0] <= allowed)
-    assert len(set(found.counts)) > 1
-    for soak, count in enumerate(found.counts):
-        fewer = list(found.counts)
+    design = fewest_dwells(timed, made, allowed)
+    assert design is not None
+    assert np.all(timed.ratio_and_seconds(design)[0] <= allowed)
+    assert len(set(design.counts)) > 1
+    for soak, count in enumerate(design.counts):
+        fewer = list(design.counts)
         fewer[soak] -= 1
-        assert count == FEWEST or np.any(timed.ratio_and_seconds(replace(found, counts=tuple(fewer)))[0] > allowed)
+        assert count == FEWEST or np.any(timed.ratio_and_seconds(replace(design, counts=tuple(fewer)))[0] > allowed)
 
 
 def test_no_number_of_dwells_is_given_where_none_is_enough(timed: TimedDesign) -> None:
@@ -62,25 +62,25 @@ def test_a_plan_that_reaches_too_little_is_widened_by_few_poses():
     flat = np.flatnonzero(np.abs(force[:, 2]) < 0.4)[:8].astype(np.intp)
     fixed = np.zeros(8, dtype=bool)
     fixed[[0, 7]] = True
-    found = spanned(force, flat, fixed, 1.4)
-    assert np.ptp(force[flat], axis=0).min() < 1.4 <= np.ptp(force[found], axis=0).min()
-    assert np.array_equal(found[fixed], flat[fixed])
+    choice = spanned(force, flat, fixed, 1.4)
+    assert np.ptp(force[flat], axis=0).min() < 1.4 <= np.ptp(force[choice], axis=0).min()
+    assert np.array_equal(choice[fixed], flat[fixed])
 
 
 def test_what_the_textbook_plan_cannot_identify_is_wanted_as_the_recipe_knows_it():
     recipe = load_recipe(str(ANALOGUE))
     noise = DwellNoise(280e-6)
     against = plan_context(textbook(recipe, recipe.temperatures_C), STATION, noise)
-    found = reference_errors(against, recipe)
+    errors = reference_errors(against, recipe)
     own = identified(plan_context(recipe, STATION, noise)).errors
-    assert found[:, -1] == pytest.approx(own[:, -1])
-    assert np.all(found[:, :-1] < own[:, :-1])
+    assert errors[:, -1] == pytest.approx(own[:, -1])
+    assert np.all(errors[:, :-1] < own[:, :-1])
 
 
 def test_orders_without_coming_back_may_be_one_soak_and_those_upside_down_are_known():
-    found = orders((), STATION, 900.0, optional=temperature_choices((-10.0, 60.0)), back=False)
-    assert found[0] == (25.0,)
-    assert (-10.0, 60.0) in found
+    sequences = orders((), STATION, 900.0, optional=temperature_choices((-10.0, 60.0)), back=False)
+    assert sequences[0] == (25.0,)
+    assert (-10.0, 60.0) in sequences
     assert mirrored((25.0, -10.0, 60.0)) == (25.0, 60.0, -10.0)
 
 

@@ -45,8 +45,8 @@ def test_torn_words_are_found_although_every_dwell_has_them(count: int) -> None:
         wrong = rng.random(len(one.output)) < rng.uniform(0.06, 0.11)
         broken = one.output.copy()
         broken[wrong, axis] += power * rng.choice([-1.0, 1.0], size=int(wrong.sum()))
-        found = torn(broken)
-        hits += [t.axis for t in found] == [axis] and found[0].offsets[0] == int(power)
+        faults = torn(broken)
+        hits += [t.axis for t in faults] == [axis] and faults[0].offsets[0] == int(power)
     assert hits >= 0.99 * count
 
 

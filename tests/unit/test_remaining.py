@@ -21,9 +21,9 @@ def told_and_true(recipe, config, lot=None):
     with open_station(config, lot) as station:
 
         def progress(_done, _total, note):
-            found = LEFT.search(note)
-            if found:
-                hours, minutes, seconds = (int(part or 0) for part in found.groups())
+            match = LEFT.search(note)
+            if match:
+                hours, minutes, seconds = (int(part or 0) for part in match.groups())
                 told.append((station.clock.now(), 3600.0 * hours + 60.0 * minutes + seconds, note))
 
         capture(station, recipe, lot, MemorySink(), progress=progress)

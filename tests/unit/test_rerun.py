@@ -215,10 +215,10 @@ def test_one_run_that_cannot_be_run_again_does_not_stop_the_others(run: Run) -> 
 
 
 def test_the_same_code_gives_the_same_bytes(run: Run) -> None:
-    found = check(run.archive, run.id)
-    assert found.same
-    assert set(found.tables.values()) == {SAME}
-    assert set(found.tables) == set(run.tables())
+    comparison = check(run.archive, run.id)
+    assert comparison.same
+    assert set(comparison.tables.values()) == {SAME}
+    assert set(comparison.tables) == set(run.tables())
 
 
 def test_a_check_names_the_table_and_the_size_of_what_differs(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,10 +233,12 @@ def test_a_check_names_the_table_and_the_size_of_what_differs(run: Run, monkeypa
         stage if stage.name != "verify" else type(stage)(**{**vars(stage), "call": moved}) for stage in steps.STAGES
     ]
     monkeypatch.setattr(steps, "STAGES", tuple(changed))
-    found = check(run.archive, run.id)
-    assert not found.same
-    assert found.differences == [d for d in found.differences if d.startswith("verification: error_ug in 1 of ")]
-    assert "by at most 0.5" in found.differences[0]
+    comparison = check(run.archive, run.id)
+    assert not comparison.same
+    assert comparison.differences == [
+        d for d in comparison.differences if d.startswith("verification: error_ug in 1 of ")
+    ]
+    assert "by at most 0.5" in comparison.differences[0]
 
 
 def test_a_check_writes_nothing(run: Run) -> None:
@@ -247,9 +249,9 @@ def test_a_check_writes_nothing(run: Run) -> None:
 
 def test_a_check_says_what_it_could_not_check(run: Run) -> None:
     shutil.rmtree(run.archive.root / "captures")
-    found = check(run.archive, run.id)
-    assert found.tables["dwells"] == LEFT_OUT
-    assert found.tables["coefficients"] == SAME
+    comparison = check(run.archive, run.id)
+    assert comparison.tables["dwells"] == LEFT_OUT
+    assert comparison.tables["coefficients"] == SAME
 
 
 def test_chooses_runs_by_what_they_are(run: Run) -> None:
@@ -280,7 +282,7 @@ def test_says_why_a_selection_names_nothing(run: Run, words: list[str], message:
 @pytest.fixture
 def imported(tmp_path: Path) -> Run:
     """Six faces of one unit as another's recording, kept as an import."""
-    from pipelines.cli.import_ import _import_one
+    from pipelines.cli.import_document import import_document
 
     rng = np.random.default_rng(3)
     faces = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
@@ -298,7 +300,7 @@ def imported(tmp_path: Path) -> Run:
         "local_gravity_m_s2": 9.80665,
     }
     archive = tmp_path / "imports"
-    return Archive(archive).run(_import_one([tmp_path / "six.csv"], how, "test", "", str(archive), None)["run"])
+    return Archive(archive).run(import_document([tmp_path / "six.csv"], how, "test", "", str(archive), None)["run"])
 
 
 def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:

@@ -25,10 +25,10 @@ def station_of(faults: list[FaultOrder] | None = None):
 @pytest.mark.parametrize(("frequency", "level"), [(20.0, 0.3), (160.0, 2.0), (900.0, 5.0)])
 def test_the_level_of_an_open_loop_generator_is_reached(frequency: float, level: float) -> None:
     with open_station(station_of(), lot_of(1), roles=["exciter"]) as station:
-        found = station.equipment["exciter"].sine(frequency, level, 2, 0.2, [0])
-        tone = fit_tone(found.reference, found.reference_rate_hz, frequency)
+        recording = station.equipment["exciter"].sine(frequency, level, 2, 0.2, [0])
+        tone = fit_tone(recording.reference, recording.reference_rate_hz, frequency)
         assert abs(tone.value[2]) == pytest.approx(level, rel=0.12)
-        assert found.outputs[0].shape[1] == 3
+        assert recording.outputs[0].shape[1] == 3
 
 
 def test_a_level_beyond_the_exciter_and_a_missed_trigger_give_no_recording() -> None:
@@ -101,9 +101,9 @@ def shock_station(faults: list[FaultOrder] | None = None):
 
 def test_a_shock_machine_by_modbus_is_armed_released_and_read() -> None:
     with open_station(shock_station(), lot_of(2), roles=["shock_machine"]) as station:
-        found = station.equipment["shock_machine"].shock(30.0, 0.011, 2, -1, [0, 1])
-        assert float(found.reference[:, 2].min()) == pytest.approx(-30.0, rel=0.15)
-        assert set(found.outputs) == {0, 1}
+        recording = station.equipment["shock_machine"].shock(30.0, 0.011, 2, -1, [0, 1])
+        assert float(recording.reference[:, 2].min()) == pytest.approx(-30.0, rel=0.15)
+        assert set(recording.outputs) == {0, 1}
         assert "shock machine stopped" in station.make_safe().done
 
 

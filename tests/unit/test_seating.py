@@ -60,8 +60,8 @@ def test_refuses_a_slot_map_that_cannot_be_read(tmp_path: Path) -> None:
 
 def test_a_scan_leaves_slots_empty_and_asks_again_for_what_was_there() -> None:
     lines, told = iter(["S1", "", "S1", "S2", ""]), []
-    found = scan(4, lambda _slot: next(lines), told.append)
-    assert found == Seating(("S1", "S2"), (0, 2))
+    seating = scan(4, lambda _slot: next(lines), told.append)
+    assert seating == Seating(("S1", "S2"), (0, 2))
     assert told == ["slot 2: S1 was scanned for slot 0 already; scan the unit in slot 2"]
 
 

@@ -37,8 +37,8 @@ def test_units_that_are_independent_count_in_full(rng):
 @pytest.mark.parametrize("missing", [False, True])
 def test_what_is_alike_in_all_units_counts_less_the_more_they_share(rng, missing):
     for together in (0.3, 0.5, 0.9):
-        found = shared_factor(model_of(rng, together, np.full(UNITS, 2e-5), missing=missing), DRIFT)
-        assert found == pytest.approx(1.0 + (UNITS - 1) * together, rel=0.12)
+        factor = shared_factor(model_of(rng, together, np.full(UNITS, 2e-5), missing=missing), DRIFT)
+        assert factor == pytest.approx(1.0 + (UNITS - 1) * together, rel=0.12)
 
 
 def test_what_differs_in_sign_from_unit_to_unit_counts_in_full(rng):
@@ -55,8 +55,8 @@ def test_the_factor_is_by_how_much_a_sum_over_units_scatters_more(rng):
         own, common = rng.standard_normal((3000, UNITS, DWELLS)), rng.standard_normal((3000, 1, DWELLS))
         return float(np.var(((np.sqrt(1.0 - together) * own + np.sqrt(together) * common) @ slope).mean(axis=1)))
 
-    found = shared_factor(model_of(rng, 0.5, np.full(UNITS, 2e-5)), DRIFT)
-    assert found == pytest.approx(variance(0.5) / variance(0.0), rel=0.15)
+    factor = shared_factor(model_of(rng, 0.5, np.full(UNITS, 2e-5)), DRIFT)
+    assert factor == pytest.approx(variance(0.5) / variance(0.0), rel=0.15)
 
 
 def test_one_unit_shares_with_nobody(rng):

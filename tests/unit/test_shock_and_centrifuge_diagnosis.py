@@ -63,13 +63,13 @@ HIDDEN = {
 
 @pytest.mark.parametrize("hidden", HIDDEN)
 def test_a_hidden_effect_of_a_shock_is_named_and_a_fresh_shock_is_predicted_better(hidden: str, rng) -> None:
-    found = diagnose_shock(shock_of(hidden, HIDDEN[hidden], rng))
-    assert found.adequate is False
-    assert hidden in found.classes[0].effects
-    assert found.left_out[1] == pytest.approx(1.0, abs=0.2)
-    assert found.left_out[0] > 1.04
+    diagnosis = diagnose_shock(shock_of(hidden, HIDDEN[hidden], rng))
+    assert diagnosis.adequate is False
+    assert hidden in diagnosis.classes[0].effects
+    assert diagnosis.left_out[1] == pytest.approx(1.0, abs=0.2)
+    assert diagnosis.left_out[0] > 1.04
     fresh = shock_of(hidden, HIDDEN[hidden], rng)
-    assert predicted(fresh, found.extended) < predicted(fresh, found.fit)
+    assert predicted(fresh, diagnosis.extended) < predicted(fresh, diagnosis.fit)
 
 
 def test_shocks_in_one_direction_do_not_tell_an_ac_coupled_reference_from_a_zero_shift(rng) -> None:
@@ -83,9 +83,9 @@ def test_shocks_in_one_direction_do_not_tell_an_ac_coupled_reference_from_a_zero
 
 
 def test_nothing_is_named_in_shocks_without_a_hidden_effect(rng) -> None:
-    found = [diagnose_shock(shock_of("none", 0.0, rng)) for _ in range(20)]
-    assert all(one.adequate for one in found)
-    sensitivity = [(one.fit.sensitivity - 1.0) / one.fit.sensitivity_error for one in found]
+    diagnoses = [diagnose_shock(shock_of("none", 0.0, rng)) for _ in range(20)]
+    assert all(one.adequate for one in diagnoses)
+    sensitivity = [(one.fit.sensitivity - 1.0) / one.fit.sensitivity_error for one in diagnoses]
     assert np.std(sensitivity) < 1.6
 
 
@@ -131,16 +131,16 @@ def test_a_hidden_effect_of_a_centrifuge_is_named_with_its_rival_and_a_second_ra
 ) -> None:
     points, size = spins(), 20.0 * SPUN[hidden]
     error = np.full(len(points.order), 2e-5)
-    found = diagnose_spins(points, spun(points, hidden, size, rng), error)
-    assert found.adequate is False
-    named = set(found.classes[0].effects)
+    diagnosis = diagnose_spins(points, spun(points, hidden, size, rng), error)
+    assert diagnosis.adequate is False
+    named = set(diagnosis.classes[0].effects)
     assert hidden in named
-    assert found.extended_g < 0.6 * found.error_g
-    assert found.left_out[1] == pytest.approx(1.0, abs=0.45)
+    assert diagnosis.extended_g < 0.6 * diagnosis.error_g
+    assert diagnosis.left_out[1] == pytest.approx(1.0, abs=0.45)
     if hidden not in PAIR:
         return
     assert PAIR[hidden] in named
-    assert any("radius" in text for text in found.next_steps)
+    assert any("radius" in text for text in diagnosis.next_steps)
     two = spins(radii=(0.5, 0.3))
     after = diagnose_spins(two, spun(two, hidden, size, rng), np.full(len(two.order), 2e-5))
     assert hidden in after.classes[0].effects
@@ -150,9 +150,9 @@ def test_a_hidden_effect_of_a_centrifuge_is_named_with_its_rival_and_a_second_ra
 def test_no_effect_of_a_centrifuge_is_named_where_there_is_none(rng) -> None:
     points = spins()
     error = np.full(len(points.order), 2e-5)
-    found = [diagnose_spins(points, spun(points, "none", 0.0, rng), error) for _ in range(100)]
-    assert sum(bool(one.classes) for one in found) <= 1
-    assert sum(one.adequate is False for one in found) <= 3
+    diagnoses = [diagnose_spins(points, spun(points, "none", 0.0, rng), error) for _ in range(100)]
+    assert sum(bool(one.classes) for one in diagnoses) <= 1
+    assert sum(one.adequate is False for one in diagnoses) <= 3
 
 
 def test_a_single_mounting_cannot_be_judged_for_what_it_does_not_show() -> None:
@@ -160,9 +160,9 @@ def test_a_single_mounting_cannot_be_judged_for_what_it_does_not_show() -> None:
     one = points.picked(points.acceleration > 0.0)
     assert not SPIN_EFFECTS["asymmetry"].seen(one)
     few = points.picked(np.arange(len(points.order)) < 6)
-    found = diagnose_spins(few, few.acceleration, np.full(6, 1e-5))
-    assert found.adequate is None
-    assert "add speeds" in found.reason
+    diagnosis = diagnose_spins(few, few.acceleration, np.full(6, 1e-5))
+    assert diagnosis.adequate is None
+    assert "add speeds" in diagnosis.reason
 
 
 @pytest.mark.parametrize("known", [SPIN_EFFECTS, SHOCK_EFFECTS])

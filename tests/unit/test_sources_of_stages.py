@@ -30,5 +30,5 @@ def test_a_package_stands_for_everything_below_it():
 
 
 def test_the_order_is_that_of_names_wherever_the_product_lies():
-    found = list(sources(("pipelines.stages.fit",)))
-    assert found == sorted(found)
+    modules = list(sources(("pipelines.stages.fit",)))
+    assert modules == sorted(modules)

@@ -182,9 +182,9 @@ def test_the_samples_of_a_run_are_decoded_once(tmp_path: Path, monkeypatch: pyte
 def test_a_summary_holds_what_a_look_at_the_samples_tells(tmp_path: Path) -> None:
     samples, readings, _ = captured(tmp_path, "")
     frame = pd.concat(samples, ignore_index=True)
-    found = summarised(samples, readings).set_index(["unit", "record"])
+    summaries = summarised(samples, readings).set_index(["unit", "record"])
     for key, own in frame.groupby(["unit", "record"]):
-        values, row = own[["x", "y", "z"]].to_numpy(), found.loc[key]
+        values, row = own[["x", "y", "z"]].to_numpy(), summaries.loc[key]
         assert row["n"] == len(values)
         for name, expected in (
             ("out", np.mean(values, axis=0)),
@@ -193,8 +193,8 @@ def test_a_summary_holds_what_a_look_at_the_samples_tells(tmp_path: Path) -> Non
             ("high", np.max(values, axis=0)),
         ):
             np.testing.assert_allclose(row[[f"{name}_{axis}" for axis in "xyz"]].astype(float), expected, rtol=1e-11)
-    assert len(found) == frame.groupby(["unit", "record"]).ngroups
-    assert not found[["wild_count", "clipped"]].to_numpy().any()
+    assert len(summaries) == frame.groupby(["unit", "record"]).ngroups
+    assert not summaries[["wild_count", "clipped"]].to_numpy().any()
 
 
 def test_a_recorded_covariate_stays_in_the_dwells_unless_it_has_a_gap(tmp_path: Path) -> None:

@@ -45,12 +45,12 @@ def white(rng: np.random.Generator, n: int = N) -> np.ndarray:
 def test_one_silent_channel_is_told_and_the_others_have_their_terms(calibration: dict) -> None:
     values = white(np.random.default_rng(5_150_902))
     values[1, :, 2] = 17.0
-    found = terms(calibration, values)
-    silent = found.loc["U001", "z"]
+    table = terms(calibration, values)
+    silent = table.loc["U001", "z"]
     assert silent["value"].isna().all()
     assert silent["high"].isna().all()
     assert silent["note"].str.contains("never changed").all()
-    others = found.drop(index=[("U001", "z", t) for t in silent.index]).xs("n_d", level="term")
+    others = table.drop(index=[("U001", "z", t) for t in silent.index]).xs("n_d", level="term")
     assert len(others) == 8
     np.testing.assert_allclose(others["value"], WHITE, rtol=0.08)
 
@@ -60,11 +60,11 @@ def test_a_short_record_and_one_that_is_not_finite_refuse_nobody_else(calibratio
     values[0, 5, 1] = np.nan
     samples, readings = lots.static_record(1e-6 * values, RATE)
     samples = samples.drop(samples.index[samples["unit"] == "U002"][100:])
-    found = noise([samples], readings, calibration["coefficients"], calibration["covariance"])["noise"]
-    note = found.set_index(["unit", "axis", "term"])["note"]
+    table = noise([samples], readings, calibration["coefficients"], calibration["covariance"])["noise"]
+    note = table.set_index(["unit", "axis", "term"])["note"]
     assert "not finite" in note["U000", "y", "N"]
     assert "100 samples" in note["U002", "x", "N"]
-    assert found[(found["unit"] == "U001") & (found["term"] == "N")]["identified"].all()
+    assert table[(table["unit"] == "U001") & (table["term"] == "N")]["identified"].all()
 
 
 def test_the_known_tempco_of_a_drifting_room_is_taken_out_of_a_record_and_told(calibration: dict) -> None:
@@ -91,19 +91,19 @@ def test_what_rounding_adds_is_taken_out_of_the_white_noise(calibration: dict, s
     rng = np.random.default_rng(5_150_905)
     lsb = step * WHITE * np.sqrt(RATE / 2.0)
     values = white(rng, 20_000) + rng.uniform(0.0, lsb, (3, 1, 3))
-    found = terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
-    assert found["note"].str.contains("subtracted from N").all()
-    np.testing.assert_allclose(found["value"], WHITE, rtol=0.04)
-    assert (found["low"] < WHITE).mean() > 0.8
-    assert (found["high"] > WHITE).mean() > 0.8
+    rows = terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
+    assert rows["note"].str.contains("subtracted from N").all()
+    np.testing.assert_allclose(rows["value"], WHITE, rtol=0.04)
+    assert (rows["low"] < WHITE).mean() > 0.8
+    assert (rows["high"] > WHITE).mean() > 0.8
 
 
 def test_digits_coarser_than_the_noise_leave_a_limit_that_holds_and_no_value(calibration: dict) -> None:
     rng = np.random.default_rng(5_150_906)
     lsb = 5.0 * WHITE * np.sqrt(RATE / 2.0)
     values = white(rng, 20_000) + rng.uniform(0.0, lsb, (3, 1, 3))
-    found = terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
-    spoken = found[~found["note"].str.contains("never changed")]
+    rows = terms(calibration, lsb * np.round(values / lsb)).xs("n_d", level="term")
+    spoken = rows[~rows["note"].str.contains("never changed")]
     assert len(spoken) > 3
     assert not spoken["identified"].any()
     assert spoken["note"].str.contains("finer resolution").all()

@@ -61,8 +61,8 @@ def test_noise_does_not_depend_on_how_it_is_asked_for():
     preset = load_preset("ADXL355")
     whole, parts = UnitNoise(preset, streams(2)), UnitNoise(preset, streams(2))
     expected = whole.sample(1000, RATE)
-    found = np.concatenate([parts.sample(n, RATE) for n in (1, 499, 7, 493)])
-    assert np.array_equal(expected, found)
+    joined = np.concatenate([parts.sample(n, RATE) for n in (1, 499, 7, 493)])
+    assert np.array_equal(expected, joined)
 
 
 def test_noise_of_a_unit_does_not_depend_on_its_neighbours():

@@ -35,10 +35,10 @@ def recorded(zeta: float, noise: float = 0.0, seed: int = 0, natural: float = FA
 @pytest.mark.parametrize(("band", "which"), [(0.02, 0), (0.01, 1), (0.001, 2)])
 def test_settling_and_overshoot_of_a_record_are_the_published_ones(zeta: float, band: float, which: int) -> None:
     time, out = recorded(zeta)
-    found = step_figures(time, out, np.full(len(time), 1e-6), band=band)
-    assert found.settling_s * 2.0 * np.pi * FAST == pytest.approx(PUBLISHED[zeta][which], abs=0.012)
-    assert 100.0 * found.overshoot == pytest.approx(PUBLISHED[zeta][3], abs=0.06)
-    assert settling.damping_from_overshoot(found.overshoot) == pytest.approx(zeta, abs=0.002)
+    figures = step_figures(time, out, np.full(len(time), 1e-6), band=band)
+    assert figures.settling_s * 2.0 * np.pi * FAST == pytest.approx(PUBLISHED[zeta][which], abs=0.012)
+    assert 100.0 * figures.overshoot == pytest.approx(PUBLISHED[zeta][3], abs=0.06)
+    assert settling.damping_from_overshoot(figures.overshoot) == pytest.approx(zeta, abs=0.002)
 
 
 def test_the_pulls_of_the_figures_have_unit_variance() -> None:
@@ -48,13 +48,13 @@ def test_the_pulls_of_the_figures_have_unit_variance() -> None:
     generator = np.random.default_rng(7)
     for _ in range(200):
         out = clean + noise * generator.normal(size=len(time))
-        found = step_figures(time, out, np.full(len(time), noise), band=0.02)
-        known += found.settling_identified
+        figures = step_figures(time, out, np.full(len(time), noise), band=0.02)
+        known += figures.settling_identified
         pulls.append(
             (
-                (found.overshoot - true.overshoot) / found.overshoot_error,
-                (found.settling_s - true.settling_s) / found.settling_error_s,
-                (found.rise_s - true.rise_s) / found.rise_error_s,
+                (figures.overshoot - true.overshoot) / figures.overshoot_error,
+                (figures.settling_s - true.settling_s) / figures.settling_error_s,
+                (figures.rise_s - true.rise_s) / figures.rise_error_s,
             )
         )
     assert known >= 190
@@ -64,9 +64,9 @@ def test_the_pulls_of_the_figures_have_unit_variance() -> None:
 
 def test_an_extremum_at_the_edge_of_the_band_is_said_and_no_settling_time_is_stated() -> None:
     time, out = recorded(0.78, 5e-4, 3)  # overshoot 1.999 % beside a band of 2 %
-    found = step_figures(time, out, np.full(len(time), 5e-4), band=0.02)
-    assert not found.settling_identified
-    assert found.settling_low_s < 0.7 * found.settling_high_s
+    figures = step_figures(time, out, np.full(len(time), 5e-4), band=0.02)
+    assert not figures.settling_identified
+    assert figures.settling_low_s < 0.7 * figures.settling_high_s
 
 
 def test_records_without_a_step_or_too_noisy_or_too_short_are_refused() -> None:
@@ -133,11 +133,11 @@ def test_pulls_over_the_supply_and_over_the_angle(rng: np.random.Generator) -> N
 
 def test_no_transverse_sensitivity_gives_an_upper_limit_and_no_direction(rng: np.random.Generator) -> None:
     angle = np.radians(np.arange(0.0, 360.0, 45.0))
-    found = [
+    fits = [
         fit_transverse(np.cos(angle), np.sin(angle), 1e-5 * rng.normal(size=8), np.full(8, 1e-5)) for _ in range(300)
     ]
-    assert sum(one.low > 0.0 for one in found) <= 10  # 1.1 % expected
-    assert all((one.direction_error_deg == 180.0) == (one.low == 0.0) for one in found)
+    assert sum(one.low > 0.0 for one in fits) <= 10  # 1.1 % expected
+    assert all((one.direction_error_deg == 180.0) == (one.low == 0.0) for one in fits)
     with pytest.raises(NotIdentified, match="turn over a whole circle"):
         fit_transverse(np.ones(8), np.zeros(8), np.zeros(8), np.full(8, 1e-5))
 
@@ -152,9 +152,9 @@ def test_a_phase_that_differs_between_records_leaves_no_trace_in_the_transverse_
     own = np.array([[1.002, 0.001, -0.003], [0.002, 0.998, 0.004], [0.0025, -0.0015, 1.001]])
     turn = rng.uniform(0.2, 0.3, angle.size) + 1e-3 * rng.normal(size=angle.size)
     answer: Any = np.exp(-1j * turn)[:, None] * (1.0 + 1e-3 * rng.normal(size=angle.size))[:, None] * (drive @ own.T)
-    found = relative_phase(drive, answer)
-    assert np.max(np.abs(np.angle(found * np.exp(-1j * turn)))) < 2e-8
-    ratio = np.real(answer[:, 2] * found - drive[:, 2]) / 2.0
+    factor = relative_phase(drive, answer)
+    assert np.max(np.abs(np.angle(factor * np.exp(-1j * turn)))) < 2e-8
+    ratio = np.real(answer[:, 2] * factor - drive[:, 2]) / 2.0
     fit = fit_transverse(np.cos(angle), np.sin(angle), ratio, np.full(angle.size, 5e-6))
     assert fit.value == pytest.approx(np.hypot(0.0025, 0.0015), abs=2e-5)
     common = np.exp(1j * np.angle(np.sum(np.conj(drive[:, :2]) * answer[:, :2])))
@@ -179,10 +179,10 @@ def test_the_largest_of_departures_within_noise_is_not_chosen_by_the_noise(rng: 
     pulls, largest = [], []
     for _ in range(2000):
         noise = 1e-4 * rng.normal(size=5)
-        found = true + noise - noise[0]
-        value, error = largest_departure(supply, found, own)
+        shifts = true + noise - noise[0]
+        value, error = largest_departure(supply, shifts, own)
         pulls.append((value - 5e-5) / error)
-        largest.append((max(found, key=abs) - 5e-5) / (np.sqrt(2.0) * 1e-4))
+        largest.append((max(shifts, key=abs) - 5e-5) / (np.sqrt(2.0) * 1e-4))
     assert np.std(pulls) == pytest.approx(1.0, abs=0.08)
     assert abs(np.mean(pulls)) < 0.08
     assert np.std(largest) > 1.2

@@ -43,9 +43,9 @@ def test_tables_agree_with_an_integral_of_the_convolution(share, z):
             integrate.quad(lambda x: stats.norm.pdf(x, scale=rest) * stats.t.sf((z - x) / scale, 3), a, b)[0]
             for a, b in pairwise(points)
         )
-    found = tails._beyond(tails._SHARES.index(share), np.array([z]))[0]
+    probability = tails._beyond(tails._SHARES.index(share), np.array([z]))[0]
     # beyond eight standard deviations the normal part is left out, where it adds a few per cent
-    assert found == pytest.approx(expected, rel=0.002 if z < 8.0 else 0.15)
+    assert probability == pytest.approx(expected, rel=0.002 if z < 8.0 else 0.15)
 
 
 @pytest.mark.parametrize(("share", "dwells"), [(0.35, 72), (0.6, 72), (1.0, 144), (0.6, 576)])

@@ -25,8 +25,8 @@ def seconds(time, claimed: str = "", name: str = "t", **units: str):
     units_ = {"output": "g"} | ({"time": claimed} if claimed else {})
     how = build({**CONTENT, "columns": {**CONTENT["columns"], "time": name}, "units": units_}, "t")
     table = record(time, name)
-    found = imported(table, how, "f.csv", Content(table, (), units))
-    return found.samples["time_s"].to_numpy(), found.remarks
+    recording = imported(table, how, "f.csv", Content(table, (), units))
+    return recording.samples["time_s"].to_numpy(), recording.remarks
 
 
 STEPS = np.arange(N)
@@ -49,8 +49,8 @@ STEPS = np.arange(N)
     ],
 )
 def test_the_unit_of_a_counter_is_recognised_and_said(time, name: str, stated: dict, rate: float) -> None:
-    found, remarks = seconds(time, name=name, **stated)
-    np.testing.assert_allclose(found, STEPS / rate, rtol=1e-6, atol=1e-6)
+    times, remarks = seconds(time, name=name, **stated)
+    np.testing.assert_allclose(times, STEPS / rate, rtol=1e-6, atol=1e-6)
     assert any("time in " in remark and f"{rate:.4g} Hz" in remark for remark in remarks)
 
 

@@ -53,29 +53,29 @@ def test_a_hidden_low_pass_is_named_and_the_error_falls(kind: str, rng: np.rando
     else:
         b, a = signal.butter(2 if kind == "two_pole" else 1, 2.0 * np.pi * 5000.0, analog=True)
         h = h * signal.freqs(b, a, 2.0 * np.pi * f)[1]
-    found = diagnose_transfer(points(f, h, 2e-3, 2e-3, rng))
-    assert found.adequate is False
-    assert kind in found.classes[0].effects
-    assert found.extended_percent < 0.5 * found.error_percent
-    assert found.left_out[1] == pytest.approx(1.0, abs=0.3)
-    assert found.where[0].high_hz == pytest.approx(5000.0)
+    diagnosis = diagnose_transfer(points(f, h, 2e-3, 2e-3, rng))
+    assert diagnosis.adequate is False
+    assert kind in diagnosis.classes[0].effects
+    assert diagnosis.extended_percent < 0.5 * diagnosis.error_percent
+    assert diagnosis.left_out[1] == pytest.approx(1.0, abs=0.3)
+    assert diagnosis.where[0].high_hz == pytest.approx(5000.0)
 
 
 def test_nothing_is_named_where_nothing_is_missing(rng: np.random.Generator) -> None:
     f = np.geomspace(5.0, 4000.0, 40)
     for _ in range(5):
-        found = diagnose_transfer(
+        diagnosis = diagnose_transfer(
             points(f, -transfer(f, 2500.0, 0.7) * np.exp(-2j * np.pi * f * 3e-5), 2e-3, 2e-3, rng)
         )
-        assert found.adequate is True
-        assert found.classes == ()
+        assert diagnosis.adequate is True
+        assert diagnosis.classes == ()
 
 
 def test_few_points_cannot_be_judged() -> None:
     f = np.geomspace(5.0, 4000.0, 4)
-    found = diagnose_transfer(points(f, -transfer(f, 2500.0, 0.7), 2e-3, 2e-3))
-    assert found.adequate is None
-    assert "sweep more frequencies" in found.reason
+    diagnosis = diagnose_transfer(points(f, -transfer(f, 2500.0, 0.7), 2e-3, 2e-3))
+    assert diagnosis.adequate is None
+    assert "sweep more frequencies" in diagnosis.reason
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -89,8 +89,8 @@ def test_mass_and_low_pass_are_not_exchanged_and_nothing_else_is_named(seed: int
     error, n = 1e-3, f.size
     value = truth * np.exp(error * (rng.standard_normal(n) + 1j * rng.standard_normal(n)))
     c = Conditions(f, np.full(n, 2.0), np.full(n, 25.0), np.full(n, 0.1))
-    found = diagnose_transfer(Points(c, value, np.full(n, error), np.full(n, error)), ("second_order", "delay"))
-    assert found.recommended == ("two_pole",)
-    natural, spread, *_ = found.extended.of("natural_hz")
+    diagnosis = diagnose_transfer(Points(c, value, np.full(n, error), np.full(n, error)), ("second_order", "delay"))
+    assert diagnosis.recommended == ("two_pole",)
+    natural, spread, *_ = diagnosis.extended.of("natural_hz")
     assert abs(natural - 2215.6) < 5.0 * spread
     assert spread < 10.0

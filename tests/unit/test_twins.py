@@ -64,20 +64,20 @@ def test_a_kink_that_may_move_is_not_promised_as_far_away_as_one_that_may_not(pa
     blind = part.Blind("bias_temperature_quadratic", 4.0, "faces", 1, (0.0, 20.0, 40.0, 60.0), units=3)
     problem = problem_of(part, blind, 8)
     model, group = rivals(problem, "bias_temperature_quadratic", "thermal_kink")
-    found = rivals_in(model, group)
+    pair = rivals_in(model, group)
     steps = [SequenceStep(o, 0.0, t, 2.0) for t in (30.0, 10.0) for o in (0.0, np.pi)]
-    free = separations(found, steps)[0, 1]
-    wide = widened(found, steps, None)
-    noise = wide.covariance.rescaled(found.noise, found.covariance)
-    fixed = residual_squares(Model(wide, [*found.rest, group.members[1].term]), predictions(found, wide), noise)[0]
-    assert free < 0.5 * fixed * found.weight / found.variance
+    free = separations(pair, steps)[0, 1]
+    wide = widened(pair, steps, None)
+    noise = wide.covariance.rescaled(pair.noise, pair.covariance)
+    fixed = residual_squares(Model(wide, [*pair.rest, group.members[1].term]), predictions(pair, wide), noise)[0]
+    assert free < 0.5 * fixed * pair.weight / pair.variance
 
 
 @pytest.mark.slow
 def test_what_is_proposed_parts_the_rivals_when_it_is_measured(part) -> None:
     """One run of the benchmark `python benchmarks/worlds part`, with a generator that the proposal knows nothing of."""
-    found = part.followed(("cubic on 18, faint", 9100))[1]
-    assert found["ended"] == "open"
-    made = found["proposals"][0]
+    outcome = part.followed(("cubic on 18, faint", 9100))[1]
+    assert outcome["ended"] == "open"
+    made = outcome["proposals"][0]
     assert made["parted"]
     assert made["added"] == pytest.approx(1.0, abs=0.3)

@@ -31,14 +31,14 @@ def test_stated_uncertainties_are_the_standard_deviations_between_runs(name: str
         world = lots.world(
             rng, plan="fibonacci", temperatures=(-10.0, 25.0, 60.0), checks=CHECKS, move_s=20, day_s=0, **NOISES[name]
         )
-        found = fit(world.dwells, lots.NO_HISTORY, MODEL)
-        tables = (found[name] for name in ("coefficients", "covariance", "predictions"))
+        fitted = fit(world.dwells, lots.NO_HISTORY, MODEL)
+        tables = (fitted[name] for name in ("coefficients", "covariance", "predictions"))
         for _, own in verify(world.dwells, lots.NO_HISTORY, *tables)["verification"].groupby("unit"):
             rms += [float(np.sqrt(np.mean(own[f"error_{axis}_ug"] ** 2))) for axis in "xyz"]
             u_rms += [float(own[f"rms_uncertainty_{axis}_ug"].iloc[0]) for axis in "xyz"]
-        bias = found["coefficients"].query("effect == 'bias'").sort_values(["unit", "axis"])["value"].to_numpy()
+        bias = fitted["coefficients"].query("effect == 'bias'").sort_values(["unit", "axis"])["value"].to_numpy()
         wrong.append(1e6 * bias.reshape(-1, 3) - world.record)
-        u_record.append(found["wander"].sort_values(["unit", "axis"])["bias_record_u_ug"].to_numpy())
+        u_record.append(fitted["wander"].sort_values(["unit", "axis"])["bias_record_u_ug"].to_numpy())
     # 240 series: the standard deviation of theirs is known within 5 %
     assert np.mean(u_rms) / np.std(rms) == pytest.approx(1.0, abs=0.15)
     assert np.median(u_record) / np.sqrt(np.mean(np.square(wrong))) == pytest.approx(1.0, abs=0.2)

@@ -32,9 +32,9 @@ def hysteresis(soaks: tuple[float, ...]):
 
 
 def test_soaks_that_only_climb_hide_a_hysteresis_narrower_than_half_their_step() -> None:
-    found = hysteresis((0.0, 20.0, 40.0, 60.0))
-    assert found.seen  # a wide one is dragged along only after the first steps
-    narrow = found.unseen_ranges[0]
+    visibility = hysteresis((0.0, 20.0, 40.0, 60.0))
+    assert visibility.seen  # a wide one is dragged along only after the first steps
+    narrow = visibility.unseen_ranges[0]
     assert (narrow.parameter, narrow.unit) == ("half_width", "K")
     # by hand: narrower than half a step, the play is taken up before the second soak whatever its state was at the first
     assert narrow.low == 1.0
@@ -43,11 +43,11 @@ def test_soaks_that_only_climb_hide_a_hysteresis_narrower_than_half_their_step()
 
 
 def test_a_closed_loop_hides_only_what_is_wider_than_itself() -> None:
-    found = hysteresis((0.0, 20.0, 40.0, 60.0, 40.0, 20.0, 0.0))
-    assert found.seen
-    assert all(r.low > 29.0 for r in found.unseen_ranges)
+    visibility = hysteresis((0.0, 20.0, 40.0, 60.0, 40.0, 20.0, 0.0))
+    assert visibility.seen
+    assert all(r.low > 29.0 for r in visibility.unseen_ranges)
 
 
 def test_an_effect_without_parameters_has_no_ranges() -> None:
-    found = visibilities(soaked((0.0, 40.0)), MODEL, 1e-6, ["second_order", "scale_temperature"])
-    assert [v.unseen_ranges for v in found] == [(), ()]
+    per_effect = visibilities(soaked((0.0, 40.0)), MODEL, 1e-6, ["second_order", "scale_temperature"])
+    assert [v.unseen_ranges for v in per_effect] == [(), ()]

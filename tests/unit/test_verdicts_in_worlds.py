@@ -221,10 +221,10 @@ def progress(world: World, effect: str, seed: int, *, fresh: bool = True) -> dic
 
 
 def test_a_cubic_is_confirmed_where_units_come_up_elsewhere():
-    found = progress(World(units=2, turn_on=300.0, hidden=(("third_order", 2.0),)), "third_order", SEED)
-    assert found["confirmed"] is True
-    assert found["part"] == pytest.approx(1.0, abs=4.0 * found["part_u"])
-    assert found["fall_ug"] > 3.0 * found["fall_u_ug"] > 0.0
+    evidence = progress(World(units=2, turn_on=300.0, hidden=(("third_order", 2.0),)), "third_order", SEED)
+    assert evidence["confirmed"] is True
+    assert evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
+    assert evidence["fall_ug"] > 3.0 * evidence["fall_u_ug"] > 0.0
 
 
 @pytest.mark.parametrize("effect", ["bias_temperature_quadratic", "aging_log", "thermal_hysteresis", "step_change"])

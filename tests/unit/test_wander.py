@@ -40,22 +40,22 @@ def test_pulls_are_standard_normal_where_white_errors_are_far_too_small(
 ) -> None:
     out = outputs(rng, plan, flicker, walk)
     error = np.full(out.shape, WHITE)
-    found = fit_lot_with_wander(EFFECTS, plan, out, error)
+    wander_fit = fit_lot_with_wander(EFFECTS, plan, out, error)
     plain = fit_lot(EFFECTS, plan, out, error)
     assert np.std(pulls(plain.coefficients, plain.standard_errors)) > 2.0
-    ours = pulls(found.fit.coefficients, found.fit.standard_errors)
+    ours = pulls(wander_fit.fit.coefficients, wander_fit.fit.standard_errors)
     assert abs(ours.mean()) < 0.15
     assert 0.88 < ours.std() < 1.12
-    assert np.std(found.fit.coefficients[..., 1]) < np.std(plain.coefficients[..., 1])
+    assert np.std(wander_fit.fit.coefficients[..., 1]) < np.std(plain.coefficients[..., 1])
 
 
 def test_without_wander_it_is_the_weighted_fit(plan: State, rng: np.random.Generator) -> None:
     out = outputs(rng, plan, 0.0, 0.0)
     error = np.full(out.shape, WHITE)
-    found, plain = fit_lot_with_wander(EFFECTS, plan, out, error), fit_lot(EFFECTS, plan, out, error)
-    assert (found.flicker, found.walk) == (0.0, 0.0)
-    assert found.white == pytest.approx(1.0, abs=0.03)
-    np.testing.assert_allclose(found.fit.coefficients, plain.coefficients, atol=1e-12)
+    wander_fit, plain = fit_lot_with_wander(EFFECTS, plan, out, error), fit_lot(EFFECTS, plan, out, error)
+    assert (wander_fit.flicker, wander_fit.walk) == (0.0, 0.0)
+    assert wander_fit.white == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(wander_fit.fit.coefficients, plain.coefficients, atol=1e-12)
 
 
 def test_the_output_may_have_any_unit(plan: State, rng: np.random.Generator) -> None:
@@ -84,24 +84,24 @@ def test_parameters_of_the_station_are_found_within_their_errors(plan: State, rn
     lean = force_from_angles(state.outer, state.inner, up=(tilt, 0.0, np.sqrt(1.0 - tilt**2)))
     out = outputs(rng, plan, 1e-4, 0.0) + (lean - plan.force)
     error = np.full(out.shape, WHITE)
-    found = fit_lot_with_wander((*EFFECTS, "level_error"), state, out, error).fit
+    fit = fit_lot_with_wander((*EFFECTS, "level_error"), state, out, error).fit
     plain = fit_lot((*EFFECTS, "level_error"), state, out, error)
-    ours, theirs = np.sqrt(np.diag(found.shared_covariance)), np.sqrt(np.diag(plain.shared_covariance))
-    assert np.all(np.abs(np.abs(found.shared[np.argmax(np.abs(found.shared))]) - tilt) < 5.0 * ours.max())
+    ours, theirs = np.sqrt(np.diag(fit.shared_covariance)), np.sqrt(np.diag(plain.shared_covariance))
+    assert np.all(np.abs(np.abs(fit.shared[np.argmax(np.abs(fit.shared))]) - tilt) < 5.0 * ours.max())
     assert np.all(ours > 1.5 * theirs)
 
 
 def test_dwells_left_out_are_predicted_within_their_errors(plan: State, rng: np.random.Generator) -> None:
     out, used = outputs(rng, plan, 1e-4, 0.0), np.arange(DWELLS) % 4 != 3
     error = np.full(out.shape, WHITE)
-    found = fit_lot_with_wander(EFFECTS, plan, out, error, used=used)
-    spread = np.sqrt(np.diagonal(found.predicted, axis1=-2, axis2=-1))
-    assert 0.9 < np.std(np.swapaxes(found.fit.residuals, -1, -2)[..., ~used] / spread) < 1.1
-    assert 0.9 < np.std((found.fit.residuals / found.expected)[:, used]) < 1.1
-    mean = np.swapaxes(found.fit.residuals, -1, -2)[..., ~used].mean(axis=-1)
-    assert 0.85 < np.std(mean / np.sqrt(found.predicted.mean(axis=(-1, -2)))) < 1.15
+    wander_fit = fit_lot_with_wander(EFFECTS, plan, out, error, used=used)
+    spread = np.sqrt(np.diagonal(wander_fit.predicted, axis1=-2, axis2=-1))
+    assert 0.9 < np.std(np.swapaxes(wander_fit.fit.residuals, -1, -2)[..., ~used] / spread) < 1.1
+    assert 0.9 < np.std((wander_fit.fit.residuals / wander_fit.expected)[:, used]) < 1.1
+    mean = np.swapaxes(wander_fit.fit.residuals, -1, -2)[..., ~used].mean(axis=-1)
+    assert 0.85 < np.std(mean / np.sqrt(wander_fit.predicted.mean(axis=(-1, -2)))) < 1.15
     alone = fit_lot_with_wander(EFFECTS, plan, np.where(used[:, None], out, 7.0), error, used=used).fit
-    np.testing.assert_allclose(alone.coefficients, found.fit.coefficients, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(alone.coefficients, wander_fit.fit.coefficients, rtol=1e-9, atol=1e-12)
 
 
 def test_a_unit_that_the_model_does_not_fit_leaves_the_others_alone(plan: State, rng: np.random.Generator) -> None:

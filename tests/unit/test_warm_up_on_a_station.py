@@ -56,6 +56,6 @@ def test_temperature_switching_and_start_of_the_record_do_not_move_the_warm_up_t
     ]
     points = PROCEDURES["warm_up"].reduce(part, own, nominal_device(readings))
     true = TAU_S * np.log(1e6 * SIZE_G / BAND_UG)
-    found = [_figure(part, str(axis), rows).value - true for (_, axis), rows in points.groupby(["unit", "axis"])]
-    assert len(found) == 12
-    assert np.max(np.abs(found)) < 0.5  # half of the means of 1 s
+    errors = [_figure(part, str(axis), rows).value - true for (_, axis), rows in points.groupby(["unit", "axis"])]
+    assert len(errors) == 12
+    assert np.max(np.abs(errors)) < 0.5  # half of the means of 1 s

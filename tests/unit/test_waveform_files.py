@@ -47,13 +47,13 @@ def test_what_is_written_reads_back_equal(form: str, tmp_path: Path, rng: np.ran
     path = tmp_path / f"one{WRITERS[form].SUFFIX}"
     assert write_waveforms(form, channels, path) == [path]
     group = ("units", "reference") if form == "tdms" else ("", "")
-    found: dict[str, np.ndarray] = {}
+    read_back: dict[str, np.ndarray] = {}
     for name in dict.fromkeys(group):
-        found |= back(path, name)
-    values = list(found.values())
+        read_back |= back(path, name)
+    values = list(read_back.values())
     assert len(values) == 2
     for one in channels:
-        assert any(np.array_equal(one.values, value) for value in values), (form, list(found))
+        assert any(np.array_equal(one.values, value) for value in values), (form, list(read_back))
     content, _ = files.read_content(path, group[0])
     if form not in {"csv", "mat", "hdf5"}:
         assert content.interval_s == pytest.approx(1.0 / RATE, rel=1e-9)
@@ -85,14 +85,14 @@ def test_shocks_of_others_give_figures_and_a_verdict(form: str, tmp_path: Path, 
     units = {"output": "V", "reference": "g"}
     if form in {"mat", "hdf5"}:
         columns["time"], units["time"] = "time", "s"
-    found = import_waveforms(
+    document = import_waveforms(
         paths, "shock", part, "S1", RecordingLayout(columns, units, None, group), str(tmp_path / "archive")
     )
-    figures = {one["figure"]: one for one in found["figures"]}
+    figures = {one["figure"]: one for one in document["figures"]}
     assert figures["shock_sensitivity_percent"]["value"] == pytest.approx(1.0, abs=0.1)
     assert not figures["shock_bias_shift_ug"]["identified"]
-    assert any("sensitivity + delay is adequate" in line for line in found["text"])
-    run = Archive(str(tmp_path / "archive")).run(found["run"])
+    assert any("sensitivity + delay is adequate" in line for line in document["text"])
+    run = Archive(str(tmp_path / "archive")).run(document["run"])
     assert len(run.about["sources"]) == 4
     assert not run.table("procedure_points").empty
 
@@ -148,8 +148,8 @@ def test_dwells_and_steps_of_others_are_imported_by_the_command(tmp_path: Path, 
         "--json",
     ]
     answer = CliRunner().invoke(app, ["import", *map(str, paths), *arguments, "--archive", str(tmp_path / "archive")])
-    found = json.loads(answer.stdout)
-    figures = {one["figure"]: one["value"] for one in found["figures"]}
+    document = json.loads(answer.stdout)
+    figures = {one["figure"]: one["value"] for one in document["figures"]}
     assert figures["sweep_natural_hz"] == pytest.approx(2000.0, rel=0.01)
     assert figures["sweep_damping"] == pytest.approx(0.65, abs=0.01)
 
@@ -165,9 +165,9 @@ def test_the_same_files_at_another_rate_are_another_run(tmp_path: Path, rng: np.
     columns, values = {"z": "dut", "reference": "ref"}, []
     for rate in (RATE, 0.9 * RATE):
         layout = RecordingLayout(columns, {"output": "V", "reference": "g"}, rate)
-        found = import_waveforms(paths, "shock", part, "S1", layout, archive)
-        kept = Archive(archive).run(found["run"]).table("procedure_figures").set_index("figure")["value"]
-        shown = {one["figure"]: one["value"] for one in found["figures"] if one["identified"]}
+        document = import_waveforms(paths, "shock", part, "S1", layout, archive)
+        kept = Archive(archive).run(document["run"]).table("procedure_figures").set_index("figure")["value"]
+        shown = {one["figure"]: one["value"] for one in document["figures"] if one["identified"]}
         assert all(kept[name] == pytest.approx(value) for name, value in shown.items())
-        values.append(found["run"])
+        values.append(document["run"])
     assert values[0] != values[1]

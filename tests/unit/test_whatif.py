@@ -61,8 +61,8 @@ def model_file(folder: Path, effects: tuple[str, ...] = GOOD) -> Path:
 
 def what_if(archive: Archive, change: ModelChange) -> dict:
     runs = [info.id for info in archive.runs() if "rerun_of" not in archive.run(info.id).about]
-    found = judged(Batch(archive.address, tuple(runs), change))
-    return summary(found, fresh(fresh_tasks(found, archive.address, change)))
+    comparisons = judged(Batch(archive.address, tuple(runs), change))
+    return summary(comparisons, fresh(fresh_tasks(comparisons, archive.address, change)))
 
 
 @pytest.fixture(scope="module")
@@ -98,16 +98,16 @@ def test_the_new_side_is_what_a_rerun_makes(archive: Archive, better: tuple[Mode
 
 def test_the_error_on_a_fresh_run_is_that_of_the_corrected_norm(archive: Archive) -> None:
     first, again_ = (archive.run(info.id) for info in archive.runs()[:2])
-    found = read_calibration(first.table("coefficients"), first.table("covariance"))
+    calibration = read_calibration(first.table("coefficients"), first.table("covariance"))
     dwells = again_.table("dwells")
-    sums = applied(found, ["A2"], dwells, again_.table("history"))
+    sums = applied(calibration, ["A2"], dwells, again_.table("history"))
     own = dwells[(dwells["unit"] == "A2") & dwells["kind"].isin(["dwell", "verification"])]
-    u = found.units.index("A2")
-    names = {name: c for c, (name, _) in enumerate(found.names[0])}
+    u = calibration.units.index("A2")
+    names = {name: c for c, (name, _) in enumerate(calibration.names[0])}
     theta = own["unit_C"].to_numpy() - 25.0
-    c = found.coefficients[u]
+    c = calibration.coefficients[u]
     offset = c[:, names["bias"]][None, :] + theta[:, None] * c[:, names["bias_temperature"]][None, :]
-    force = np.linalg.solve(found.response[u], (own[["out_x", "out_y", "out_z"]].to_numpy() - offset).T).T
+    force = np.linalg.solve(calibration.response[u], (own[["out_x", "out_y", "out_z"]].to_numpy() - offset).T).T
     true = np.linalg.norm(own[["force_x", "force_y", "force_z"]].to_numpy(), axis=1)
     expected = 1e6 * (np.linalg.norm(force, axis=1) - true)
     assert sums["A2"][0] == pytest.approx(float(np.sum(expected**2)), rel=1e-6)
@@ -172,8 +172,8 @@ def test_the_line_uses_the_narrowest_release_whose_date_is_reached(tmp_path: Pat
         return release(own, change_from_options("", path), since, reason="test", force=True, **where).number
 
     def valid(month: int, device: str = "ADXL355", station: str = "s1") -> int | None:
-        found = released(own, device, station, datetime(2026, month, 15, tzinfo=UTC))
-        return found.number if found else None
+        current = released(own, device, station, datetime(2026, month, 15, tzinfo=UTC))
+        return current.number if current else None
 
     first, later, own_device, own_station = (
         made(1, 2),

@@ -67,9 +67,9 @@ def test_a_change_needs_its_own_origin_and_the_token(client: AsgiClient) -> None
 
 def test_every_change_is_guarded(client: AsgiClient) -> None:
     modules = [import_module(f"{routes.__name__}.{info.name}") for info in iter_modules(routes.__path__)]
-    found = [route for module in modules for route in module.router.routes if route.methods - {"GET", "HEAD"}]
-    assert len(found) >= 7
-    for route in found:
+    changing = [route for module in modules for route in module.router.routes if route.methods - {"GET", "HEAD"}]
+    assert len(changing) >= 7
+    for route in changing:
         (method,) = route.methods
         address = route.path.replace("{name}", "x")
         foreign = {"origin": "http://evil.example", "authorization": f"Bearer {TOKEN}"}

@@ -113,11 +113,11 @@ def test_a_lot_whose_process_is_gone_is_interrupted(settings: WorkbenchSettings)
         os._exit(0)
     os.waitpid(gone, 0)
     name = lot_of(settings, pid=gone)
-    (found,) = lots.lots(settings)
-    assert found.id == name
-    assert found.phase == "interrupted"
-    assert found.ended
-    assert found.slots == ((0, "A1", ""), (3, "A2", ""))
+    (lot,) = lots.lots(settings)
+    assert lot.id == name
+    assert lot.phase == "interrupted"
+    assert lot.ended
+    assert lot.slots == ((0, "A1", ""), (3, "A2", ""))
 
 
 @pytest.mark.parametrize("units", [["A1", "A1"], ["<script>"], ["A" * 65]])
@@ -290,9 +290,9 @@ def test_a_search_in_memory_gives_what_the_files_of_the_archive_give(tmp_path: P
     questions = [question(page) for page in pages for question in (units_question, yield_question)]
     unit = str(recent.ask(units_question(UnitsPage())).rows[0][0])
     for question in (*questions, newest_question(12), history_question(unit)):
-        found, wanted = recent.ask(question), ask(Archive(str(archive)), question)
-        assert found.columns == wanted.columns
-        assert found.rows == wanted.rows if "ORDER BY" in question else sorted(found.rows) == sorted(wanted.rows)
+        answer, wanted = recent.ask(question), ask(Archive(str(archive)), question)
+        assert answer.columns == wanted.columns
+        assert answer.rows == wanted.rows if "ORDER BY" in question else sorted(answer.rows) == sorted(wanted.rows)
     with pytest.raises(WrongUse):
         recent.ask("DELETE FROM units")
     assert recent.ask("SELECT count(*) FROM units").rows[0][0] > 0

@@ -32,11 +32,11 @@ STILL_LOOKS: tuple[Look, ...] = (truncated, clock, temperature_units, stale, noi
 
 def find_faults(readings: Readings) -> list[Fault]:
     """Data faults of a lot, at most one kind per unit; a unit without one can be diagnosed."""
-    found: dict[int, Fault] = {}
+    faults: dict[int, Fault] = {}
     for look in LOOKS if readings.turned else STILL_LOOKS:
         for fault in look(readings):
-            found.setdefault(fault.unit, fault)
-    return [found[u] for u in sorted(found)]
+            faults.setdefault(fault.unit, fault)
+    return [faults[u] for u in sorted(faults)]
 
 
 __all__ = ["Fault", "find_faults"]

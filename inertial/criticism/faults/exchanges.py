@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.faults.fault import Fault, dwells_of
+from inertial.criticism.faults.fault import Fault, places_of
 from inertial.criticism.readings import Array, Readings, exchanged, find_split
 
 _COMMON = 5.0
@@ -87,7 +87,7 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         if not turned.any():
             continue
         name, text = _which_pose(readings.force[unit], places[turned], felt[turned])
-        yield Fault(name, unit, dwells_of(places[turned]), text)
+        yield Fault(name, unit, places_of(places[turned]), text)
 
 
 def _felt(readings: Readings, unit: int, places: NDArray[np.intp]) -> Array:

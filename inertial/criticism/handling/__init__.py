@@ -10,12 +10,12 @@ from inertial.criticism.handling.base import Handling
 @cache
 def alternatives() -> tuple[Handling, ...]:
     """Every alternative of this package, by its id."""
-    found: dict[str, Handling] = {}
+    by_id: dict[str, Handling] = {}
     for module in iter_modules(__path__):
         for thing in vars(import_module(f"{__name__}.{module.name}")).values():
             if isinstance(thing, type) and issubclass(thing, Handling) and hasattr(thing, "id"):
-                found[thing.id] = thing()
-    return tuple(found[name] for name in sorted(found))
+                by_id[thing.id] = thing()
+    return tuple(by_id[name] for name in sorted(by_id))
 
 
 def named(name: str) -> Handling | None:

@@ -160,11 +160,11 @@ def _soaks(state: State) -> NDArray[np.intp]:
     if state.temperature is None:
         return np.zeros(state.time.shape[-1], dtype=np.intp)
     typical = np.median(state.temperature.reshape(-1, state.temperature.shape[-1]), axis=0)
-    found = np.zeros(typical.size, dtype=np.intp)
+    soak = np.zeros(typical.size, dtype=np.intp)
     for k in range(1, typical.size):
-        inside = typical[:k][found[:k] == found[k - 1]]
-        found[k] = found[k - 1] + int(abs(typical[k] - float(np.median(inside))) > _SOAK_APART)
-    return found
+        inside = typical[:k][soak[:k] == soak[k - 1]]
+        soak[k] = soak[k - 1] + int(abs(typical[k] - float(np.median(inside))) > _SOAK_APART)
+    return soak
 
 
 def without(lot: "Lot", dwells: list[int]) -> "Lot":

@@ -85,8 +85,8 @@ class NotSoaked(Handling):
                 return misfit(replace(own, state=delayed(own.state, np.array([np.exp(log_tau)]))), (unit,))
 
             bounds = (middle - reach, middle + reach)
-            found = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": _EXACT})
-            each[unit] = float(np.exp(found.x))
+            minimum = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": _EXACT})
+            each[unit] = float(np.exp(minimum.x))
         return replace(lot, state=delayed(lot.state, each))
 
 

@@ -31,7 +31,7 @@ class Format(Protocol):
 
 
 def _found() -> dict[str, Format]:
-    modules = (import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__))
+    modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
     return {module.NAME: cast("Format", module) for module in modules}
 
 

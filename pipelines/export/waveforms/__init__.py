@@ -34,9 +34,9 @@ class Writer(Protocol):
 
 def _found() -> dict[str, Writer]:
     modules = [
-        cast("Writer", import_module(f"{__name__}.{found.name}"))
-        for found in iter_modules(__path__)
-        if found.name != "channel"
+        cast("Writer", import_module(f"{__name__}.{info.name}"))
+        for info in iter_modules(__path__)
+        if info.name != "channel"
     ]
     return {module.NAME: module for module in modules}
 

@@ -38,7 +38,7 @@ class FileReader(Protocol):
 
 
 def _found() -> dict[str, FileReader]:
-    modules = [cast("FileReader", import_module(f"{__name__}.{found.name}")) for found in iter_modules(__path__)]
+    modules = [cast("FileReader", import_module(f"{__name__}.{info.name}")) for info in iter_modules(__path__)]
     return {module.NAME: module for module in sorted(modules, key=lambda one: one.ORDER)}
 
 

@@ -49,17 +49,17 @@ def read(name: str, data: bytes, group: str) -> Content:
 
 def _settings(text: str, divider: str | None) -> dict[str, list[str]]:
     """Key → words of the lines of a header."""
-    found: dict[str, list[str]] = {}
+    settings: dict[str, list[str]] = {}
     for line in text.splitlines():
         words = [
             word.strip() for word in (line.replace(",", "\t").split("\t") if divider is None else line.split(divider))
         ]
         if words and words[0]:
             # "Decimal_Separator<TAB>," loses its comma to the guess of the divider
-            found[words[0]] = (
+            settings[words[0]] = (
                 [","] if words[0] == "Decimal_Separator" and divider is None and "," in line else words[1:]
             )
-    return found
+    return settings
 
 
 def _segment(about: dict[str, list[str]], body: str, divider: str, decimal: str, name: str) -> Content:

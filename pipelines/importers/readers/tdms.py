@@ -48,8 +48,8 @@ def read(name: str, data: bytes, group: str) -> Content:
         raise DataRejected(f"{name}: no channel with numbers in this TDMS file, one is needed; check the file")
     label = chosen([(one, len(channels[0])) for one, channels in groups.items()], group, name)
     with foreign(broken, REMEDY):
-        found = _content(groups[label], name)
-    return replace(found, remarks=(*found.remarks, *(f"message of the reader: {text}" for text in messages.texts)))
+        content = _content(groups[label], name)
+    return replace(content, remarks=(*content.remarks, *(f"message of the reader: {text}" for text in messages.texts)))
 
 
 class _LibraryLog(logging.Handler):

@@ -58,8 +58,8 @@ def shade(values: Array, scale: ColourScale) -> list[str]:
     colours = np.array([[int(text[k : k + 2], 16) for k in (1, 3, 5)] for _, text in anchors], dtype=float)
     share = np.clip((values - scale.low) / ((scale.high - scale.low) or 1.0), 0.0, 1.0)
     channels = [np.interp(np.nan_to_num(share), where, colours[:, k]).round().astype(int) for k in range(3)]
-    found = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in zip(*channels, strict=True)]
-    return [colour if np.isfinite(value) else "#999999" for colour, value in zip(found, values, strict=True)]
+    hex_codes = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in zip(*channels, strict=True)]
+    return [colour if np.isfinite(value) else "#999999" for colour, value in zip(hex_codes, values, strict=True)]
 
 
 def _points(trace: Trace, place: Place, scale: ColourScale | None) -> str:

@@ -181,12 +181,12 @@ def _sphere_place(plot: Plot, x: float, y: float, wide: float, tall: float) -> P
 
 def _legend_names(chart: Chart) -> list[tuple[str, str]]:
     """Names of the traces with their mark, each once."""
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for plot in chart.plots:
         for trace in plot.traces:
             if trace.legend and trace.name and trace.style not in {"density", "labels"}:
-                found.setdefault(trace.name, _mark(trace))
-    return list(found.items())
+                by_name.setdefault(trace.name, _mark(trace))
+    return list(by_name.items())
 
 
 def _mark(trace: Trace) -> str:

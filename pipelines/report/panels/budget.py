@@ -81,12 +81,12 @@ def _missing(entries: dict[str, Any], not_needed: Collection[str]) -> dict[str, 
 
 def _shares(budget: pd.DataFrame, unit: str) -> dict[str, dict[str, float]]:
     own = budget[budget["unit"] == unit]
-    found: dict[str, dict[str, float]] = {}
+    shares: dict[str, dict[str, float]] = {}
     for (quantity, axis), title in PICTURED.items():
         rows = own[(own["quantity"] == quantity) & (own["axis"] == axis)]
         if len(rows):
-            found[title] = {LABELS[str(r["contribution"])]: float(r["share"]) for r in rows_of(rows)}
-    return found
+            shares[title] = {LABELS[str(r["contribution"])]: float(r["share"]) for r in rows_of(rows)}
+    return shares
 
 
 def _seen(sums: pd.DataFrame) -> list[dict[str, str]]:

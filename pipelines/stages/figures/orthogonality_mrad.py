@@ -7,8 +7,8 @@ from pipelines.stages.figures.base import FigureKind, UnitTables, Value, effect_
 
 def _value(tables: UnitTables) -> Value | None:
     lot, unit = tables.coefficients
-    found = [lot.angle(unit, first, second) for first, second in ((0, 1), (1, 2), (2, 0))]
-    values = [Value(1e3 * one[0], 1e3 * one[1]) for one in found if one is not None]
+    angles = [lot.angle(unit, first, second) for first, second in ((0, 1), (1, 2), (2, 0))]
+    values = [Value(1e3 * one[0], 1e3 * one[1]) for one in angles if one is not None]
     return max(values, key=lambda value: value.reach(tables.guard)) if values else None
 
 

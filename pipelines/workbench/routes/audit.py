@@ -29,27 +29,28 @@ def audit(request: Request) -> Response:
     """The page."""
     bench = workbench_of(request)
     state, problems = state_of(request, AuditPage)
-    found, job = None, None
+    audited, job = None, None
     try:
         _, content = requests.audit(bench.settings, state)
-        found, job = bench.jobs.result("audit", content), bench.jobs.known("audit", content)
+        audited, job = bench.jobs.result("audit", content), bench.jobs.known("audit", content)
     except TumblelineError as problem:
         problems = [*problems, str(problem)]
     return page(
-        request, "audit.html", state, problems, empty=not bench.archive.run_ids(), found=found, job=job, who=WHO, most_due=DUE,
-        most_findings=FINDINGS, compared=COMPARED, chance=chance, labels={name: kind.label for name, kind in FIGURES.items()},
+        request, "audit.html", state, problems, empty=not bench.archive.run_ids(), audited=audited, job=job, who=WHO,
+        most_due=DUE, most_findings=FINDINGS, compared=COMPARED, chance=chance,
+        labels={name: kind.label for name, kind in FIGURES.items()},
     )  # fmt: skip
 
 
 @router.get("/audit/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
-    found = _found(workbench_of(request), request)
+    audited = _found(workbench_of(request), request)
     if name == "evidence":
         state, _ = state_of(request, AuditPage)
-        chart = found["evidence"].get(state.finding)
+        chart = audited["evidence"].get(state.finding)
     else:
-        chart = found["charts"].get(name)
+        chart = audited["charts"].get(name)
     if chart is None:
         raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
     return figure(chart, ending, f"audit-{name}")
@@ -87,9 +88,9 @@ def differences(request: Request) -> Response:
 @router.get("/audit/findings.csv")
 def findings(request: Request) -> Response:
     """The findings."""
-    found = _found(workbench_of(request), request)
+    audited = _found(workbench_of(request), request)
     keys = ("who", "kind", "subject", "message")
-    return table_csv([{key: row[key] for key in keys} for row in found["document"]["findings"]], "findings")
+    return table_csv([{key: row[key] for key in keys} for row in audited["document"]["findings"]], "findings")
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:
@@ -102,7 +103,7 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
 
 def _found(bench: Workbench, request: Request) -> dict[str, Any]:
     state, _ = state_of(request, AuditPage)
-    found: dict[str, Any] | None = bench.jobs.result("audit", requests.audit(bench.settings, state)[1])
-    if found is None:
+    audited: dict[str, Any] | None = bench.jobs.result("audit", requests.audit(bench.settings, state)[1])
+    if audited is None:
         raise WrongUse("audit: not finished; wait until it is done")
-    return found
+    return audited

@@ -46,23 +46,23 @@ def missing(request: Request) -> Response:
     if part_of(request) == "samples" and state.source and not problems:
         state = requests.settled(bench.settings, state)
         return page_part(request, "missing_samples.html", state, is_file=sources.is_file(bench.settings, state.source))
-    chosen, found, rows, work = sources.sources(bench.settings), None, None, {}
+    chosen, diagnosed, rows, work = sources.sources(bench.settings), None, None, {}
     if state.source:
         try:
             state = requests.settled(bench.settings, state)
             work = {kind: requests.KINDS[kind][1](bench.settings, state) for kind in ("diagnose", "ladder")}
-            found = bench.jobs.result("diagnose", work["diagnose"][1])
+            diagnosed = bench.jobs.result("diagnose", work["diagnose"][1])
             rows = bench.jobs.result("ladder", work["ladder"][1])
         except TumblelineError as problem:
             problems, work = [*problems, str(problem)], {}
     return page(
-        request, "missing.html", state, problems, sources=chosen, found=found, rows=rows, chance=chance,
+        request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows, chance=chance,
         jobs={kind: bench.jobs.known(kind, content) for kind, (_, content) in work.items()},
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),
         ladder_command=state.ladder_command(bench.settings.archive),
-        unit=_unit(found, state), against="" if found is None else missing_charts.chosen_driver(found, state),
-        candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(found),
+        unit=_unit(diagnosed, state), against="" if diagnosed is None else missing_charts.chosen_driver(diagnosed, state),
+        candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(diagnosed),
         is_file=any(one.is_file and one.name == state.source for one in chosen),
     )  # fmt: skip
 
@@ -80,8 +80,8 @@ def candidates(request: Request) -> Response:
     """The candidates of the first step."""
     bench = workbench_of(request)
     state, _ = state_of(request, MissingPage)
-    found = _diagnosed(bench, state)
-    return table_csv([] if found is None else list(found.ladder), "candidates")
+    diagnosed = _diagnosed(bench, state)
+    return table_csv([] if diagnosed is None else list(diagnosed.ladder), "candidates")
 
 
 @router.post("/missing/save")
@@ -89,11 +89,11 @@ def save(request: Request, body: RequestBody) -> JSONResponse:
     """Save the model of a page's address as the next version of a model file."""
     bench = workbench_of(request)
     state = state_at(body, MissingPage)
-    found = _diagnosed(bench, state)
-    if found is None:
+    diagnosed = _diagnosed(bench, state)
+    if diagnosed is None:
         raise WrongUse("model: the diagnosis of this model is not finished; wait until it is done, then save")
     added = list(state.added)
-    start = [name for name in found.document["effects"] if name not in added]
+    start = [name for name in diagnosed.document["effects"] if name not in added]
     name, why = str(body.get("name", "")), str(body.get("why", ""))
     place, version = models.save(bench.settings, name, start, added, state.formula, why, state.source)
     return JSONResponse({"done": f"{place}: version {version} is saved"})
@@ -115,8 +115,8 @@ def formula(body: RequestBody) -> JSONResponse:
 
 def _diagnosed(bench: Workbench, state: MissingPage) -> Diagnosed | None:
     _, content = requests.diagnosis(bench.settings, state)
-    found: Diagnosed | None = bench.jobs.result("diagnose", content)
-    return found
+    diagnosed: Diagnosed | None = bench.jobs.result("diagnose", content)
+    return diagnosed
 
 
 def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
@@ -136,17 +136,17 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
     }
     if name not in draw:
         raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
-    found = _diagnosed(bench, state)
-    return None if found is None else draw[name](found, state)
+    diagnosed = _diagnosed(bench, state)
+    return None if diagnosed is None else draw[name](diagnosed, state)
 
 
-def _unit(found: Diagnosed | None, state: MissingPage) -> str:
-    if found is None or found.table is None:
+def _unit(diagnosed: Diagnosed | None, state: MissingPage) -> str:
+    if diagnosed is None or diagnosed.table is None:
         return state.unit
-    return found.table.units[missing_charts.chosen_unit(found.table, state)]
+    return diagnosed.table.units[missing_charts.chosen_unit(diagnosed.table, state)]
 
 
-def _drivers(found: Diagnosed | None) -> list[tuple[str, str]]:
-    if found is None or found.table is None:
+def _drivers(diagnosed: Diagnosed | None) -> list[tuple[str, str]]:
+    if diagnosed is None or diagnosed.table is None:
         return []
-    return [(name, label) for name, (label, _) in found.table.drivers.items()]
+    return [(name, label) for name, (label, _) in diagnosed.table.drivers.items()]

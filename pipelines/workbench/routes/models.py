@@ -28,18 +28,18 @@ def shown(request: Request) -> Response:
     """The page; the what-if is computed on request."""
     bench = workbench_of(request)
     state, problems = state_of(request, ModelsPage)
-    found, job, steps = None, None, []
+    what_if, job, steps = None, None, []
     if state.model:
         try:
             place = models.place_of(bench.settings, state.model)
             with effects.additions_forgotten():
                 steps = versions(read_model(place))[::-1]
             _, content = requests.what_if(bench.settings, state)
-            found, job = bench.jobs.result("whatif", content), bench.jobs.known("whatif", content)
+            what_if, job = bench.jobs.result("whatif", content), bench.jobs.known("whatif", content)
         except TumblelineError as problem:
             problems = [*problems, str(problem)]
     return page(
-        request, "models.html", state, problems, models=models.models(bench.settings), steps=steps, found=found, job=job,
+        request, "models.html", state, problems, models=models.models(bench.settings), steps=steps, whatif=what_if, job=job,
         releases=_releases(bench), today=datetime.now(UTC).date().isoformat(),
     )  # fmt: skip
 
@@ -49,11 +49,11 @@ def lots(request: Request) -> Response:
     """The what-if by device and station."""
     bench = workbench_of(request)
     state, _ = state_of(request, ModelsPage)
-    found = bench.jobs.result("whatif", requests.what_if(bench.settings, state)[1])
+    what_if = bench.jobs.result("whatif", requests.what_if(bench.settings, state)[1])
     rows = (
         []
-        if found is None
-        else [_flat(row) for row in [*found["groups"], {"station": "all", "device": "all", **found["total"]}]]
+        if what_if is None
+        else [_flat(row) for row in [*what_if["groups"], {"station": "all", "device": "all", **what_if["total"]}]]
     )
     return table_csv(rows, f"what-if-{state.model}")
 

@@ -26,14 +26,14 @@ def operator(request: Request) -> Response:
     """The newest lot as tiles, or the one of the address; seats to scan if no lot is running."""
     bench = workbench_of(request)
     state, problems = state_of(request, OperatorPage)
-    found, known = lots.lots(bench.settings), stations.stations(bench.settings)
-    chosen = next((one for one in found if one.id == state.lot), None)
+    newest, known = lots.lots(bench.settings), stations.stations(bench.settings)
+    chosen = next((one for one in newest if one.id == state.lot), None)
     station = stations.at(known, chosen.station) if chosen else stations.named(known, state.station)
-    here = [one for one in found if one.station == station.address]
+    here = [one for one in newest if one.station == station.address]
     shown = chosen or next((one for one in here if not one.ended), None)
     return page(
         request, "operator.html", state, problems, lot=shown, lots=here, remedies=REMEDIES, station=station,
-        busy={one.name: next((lot.phase for lot in found if lot.station == one.address and not lot.ended), "") for one in known},
+        busy={one.name: next((lot.phase for lot in newest if lot.station == one.address and not lot.ended), "") for one in known},
         stations=known, recipes=requests.recipes(bench.settings), slots=station.slots,
     )  # fmt: skip
 

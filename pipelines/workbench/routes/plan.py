@@ -20,15 +20,15 @@ def plan(request: Request) -> Response:
     """The page."""
     bench = workbench_of(request)
     state, problems = state_of(request, PlanPage)
-    found, job = None, None
+    planned, job = None, None
     try:
         _, content = requests.plan(bench.settings, state)
-        found, job = bench.jobs.result("plan", content), bench.jobs.known("plan", content)
+        planned, job = bench.jobs.result("plan", content), bench.jobs.known("plan", content)
     except TumblelineError as problem:
         problems = [*problems, str(problem)]
-    poses = [] if found is None else found["poses"]
+    poses = [] if planned is None else planned["poses"]
     return page(
-        request, "plan.html", state, problems, found=found, job=job, recipes=requests.recipes(bench.settings),
+        request, "plan.html", state, problems, planned=planned, job=job, recipes=requests.recipes(bench.settings),
         scientific=scientific, chosen=next((one for one in poses if one["name"] == state.edit), next(iter(poses), None)),
     )  # fmt: skip
 
@@ -38,10 +38,10 @@ def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
     bench = workbench_of(request)
     state, _ = state_of(request, PlanPage)
-    found = bench.jobs.result("plan", requests.plan(bench.settings, state)[1])
-    if found is None or name not in found["charts"]:
+    planned = bench.jobs.result("plan", requests.plan(bench.settings, state)[1])
+    if planned is None or name not in planned["charts"]:
         raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
-    return figure(found["charts"][name], ending, f"plan-{name}")
+    return figure(planned["charts"][name], ending, f"plan-{name}")
 
 
 @router.get("/plan/effects.csv")
@@ -49,9 +49,9 @@ def effects(request: Request) -> Response:
     """Visibility of each effect under the plan."""
     bench = workbench_of(request)
     state, _ = state_of(request, PlanPage)
-    found = bench.jobs.result("plan", requests.plan(bench.settings, state)[1])
+    planned = bench.jobs.result("plan", requests.plan(bench.settings, state)[1])
     keys = ("effect", "seen", "left", "floor_ug", "floor_unit", "floor_size_ug", "breaker")
-    rows = [] if found is None else [{key: row.get(key) for key in keys} for row in found["document"]["effects"]]
+    rows = [] if planned is None else [{key: row.get(key) for key in keys} for row in planned["document"]["effects"]]
     return table_csv(rows, "plan-effects")
 
 
@@ -78,12 +78,12 @@ def save(request: Request, body: RequestBody) -> JSONResponse:
 
 
 def _numbers(body: dict[str, object], *names: str) -> list[float]:
-    found: list[float] = []
+    numbers: list[float] = []
     for name in names:
         try:
-            found.append(float(str(body.get(name, ""))))
+            numbers.append(float(str(body.get(name, ""))))
         except ValueError:
             raise WrongUse(
                 f"plan: {name} '{str(body.get(name, ''))[:20]}', a number is needed; write the angle in degrees"
             ) from None
-    return found
+    return numbers

@@ -33,11 +33,11 @@ def run(request: Request) -> Response:
     """Result and figures of every unit of a run."""
     bench = workbench_of(request)
     state, problems = state_of(request, RunPage)
-    found = bench.archive.run(state.run)
-    state = state.model_copy(update={"run": found.id})
-    tables, about = found.tables(), found.about
-    grades = rows_of(run_table(bench, found.id, "grades").sort_values("slot")) if "grades" in tables else []
-    figures = run_table(bench, found.id, "figures") if "figures" in tables else None
+    stored = bench.archive.run(state.run)
+    state = state.model_copy(update={"run": stored.id})
+    tables, about = stored.tables(), stored.about
+    grades = rows_of(run_table(bench, stored.id, "grades").sort_values("slot")) if "grades" in tables else []
+    figures = run_table(bench, stored.id, "figures") if "figures" in tables else None
     cells: dict[str, dict[str, float]] = {}
     if figures is not None:
         chosen = figures[figures["figure"].isin(SHOWN)]
@@ -45,14 +45,14 @@ def run(request: Request) -> Response:
             cells.setdefault(str(row["unit"]), {})[str(row["figure"])] = float(row["value"])
     try:
         certificates = {
-            unit: one.sentence() for unit, one in stated(found, [str(row["unit"]) for row in grades]).items()
+            unit: one.sentence() for unit, one in stated(stored, [str(row["unit"]) for row in grades]).items()
         }
     except TumblelineError as problem:
         certificates, problems = {}, [*problems, str(problem)]
-    events = rows_of(run_table(bench, found.id, "events")) if "events" in tables else []
+    events = rows_of(run_table(bench, stored.id, "events")) if "events" in tables else []
     return page(
-        request, "run.html", state, problems, run=found, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
-        certificates=certificates, events=events, adequate=_adequate(bench, found.id),
+        request, "run.html", state, problems, run=stored, about=about, grades=grades, cells=cells, shown=SHOWN, tables=tables,
+        certificates=certificates, events=events, adequate=_adequate(bench, stored.id),
     )  # fmt: skip
 
 
@@ -62,8 +62,8 @@ def _adequate(bench: Workbench, run: str) -> bool | None:
         _, content = requests.diagnosis(bench.settings, MissingPage(source=run))
     except TumblelineError:
         return None
-    found: Diagnosed | None = bench.jobs.result("diagnose", content)
-    return None if found is None else found.document["adequate"]
+    diagnosed: Diagnosed | None = bench.jobs.result("diagnose", content)
+    return None if diagnosed is None else diagnosed.document["adequate"]
 
 
 @router.get("/run/table/{name}.csv")
@@ -78,7 +78,7 @@ def table(request: Request, name: str) -> Response:
 def report(request: Request) -> Response:
     """The report of a run, as a file."""
     state, _ = state_of(request, RunPage)
-    found = workbench_of(request).archive.run(state.run)
-    if not found.report.is_file():
-        raise WrongUse(f"run {found.id} has no report; make it with 'tumbleline report {found.id}'")
-    return Response(found.report.read_bytes(), media_type="text/html", headers=saved_as(f"{found.id}.html"))
+    stored = workbench_of(request).archive.run(state.run)
+    if not stored.report.is_file():
+        raise WrongUse(f"run {stored.id} has no report; make it with 'tumbleline report {stored.id}'")
+    return Response(stored.report.read_bytes(), media_type="text/html", headers=saved_as(f"{stored.id}.html"))

@@ -96,8 +96,8 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
 
 
 def _table(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
-    found = run_table(bench, state.run, name)
-    return found[found["unit"] == state.unit]
+    table = run_table(bench, state.run, name)
+    return table[table["unit"] == state.unit]
 
 
 def _own(bench: Workbench, state: UnitPage, name: str) -> list[dict[str, Any]]:

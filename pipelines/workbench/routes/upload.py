@@ -23,11 +23,11 @@ def upload(request: Request) -> Response:
     """The page: drop a file, check the interpretation of its columns, correct it, import it."""
     bench = workbench_of(request)
     state, problems = state_of(request, UploadPage)
-    found, job, done = None, None, None
+    reading, job, done = None, None, None
     if state.file:
         try:
-            found = uploads.reading(bench.settings, state)
-            if state.columns and state.output and not found.problem:
+            reading = uploads.reading(bench.settings, state)
+            if state.columns and state.output and not reading.problem:
                 _, content = requests.bring_in(bench.settings, state)
                 job, done = bench.jobs.known("import", content), bench.jobs.result("import", content)
         except TumblelineError as problem:
@@ -35,7 +35,7 @@ def upload(request: Request) -> Response:
     folder = bench.settings.folder / uploads.FOLDER
     there = sorted(folder.iterdir(), key=lambda one: -one.stat().st_mtime)[:12] if folder.is_dir() else []
     return page(
-        request, "upload.html", state, problems, found=found, job=job, done=done, there=[str(one) for one in there],
+        request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(one) for one in there],
         meanings=MEANINGS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
         outputs=list(OUTPUT_UNITS), times=[*TIME_UNITS, "samples"], temperatures=TEMPERATURE_UNITS,
     )  # fmt: skip

@@ -74,17 +74,17 @@ class RecentIndex:
 
     def _renew(self) -> AuditIndex:
         folder, start = self._stamp(), time.monotonic()
-        found = up_to_date(self._archive)
-        self._known, self._when, self._folder = found, start, folder
-        return found
+        index = up_to_date(self._archive)
+        self._known, self._when, self._folder = index, start, folder
+        return index
 
     def _renew_behind(self) -> None:
         try:
             folder, start = self._stamp(), time.monotonic()
-            found = up_to_date(self._archive)
+            index = up_to_date(self._archive)
             with self._lock:
                 if start > self._when:
-                    self._known, self._when, self._folder = found, start, folder
+                    self._known, self._when, self._folder = index, start, folder
         finally:
             self._renewing.clear()
 

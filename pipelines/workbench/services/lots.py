@@ -208,8 +208,8 @@ def lots(settings: WorkbenchSettings) -> list[LotState]:
     top = settings.folder / FOLDER
     if not top.is_dir():
         return []
-    found = [state_of(place) for place in top.iterdir() if (place / "state.json").is_file()]
-    return sorted(found, key=lambda one: -one.since)[:NEWEST]
+    states = [state_of(place) for place in top.iterdir() if (place / "state.json").is_file()]
+    return sorted(states, key=lambda one: -one.since)[:NEWEST]
 
 
 def place_of(settings: WorkbenchSettings, name: str) -> Path:

@@ -124,8 +124,8 @@ def bring_in(settings: WorkbenchSettings, page: UploadPage) -> Request:
 
 def recipes(settings: WorkbenchSettings) -> list[str]:
     """Available recipes: the built-in one, and files of the workbench's folder."""
-    found = [str(place) for place in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
-    return ["production", *(name for name in found if _is_recipe(Path(name)))]
+    names = [str(place) for place in sorted(settings.folder.glob("*.toml"))] if settings.folder.is_dir() else []
+    return ["production", *(name for name in names if _is_recipe(Path(name)))]
 
 
 def _is_recipe(place: Path) -> bool:

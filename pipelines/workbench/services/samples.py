@@ -28,25 +28,25 @@ def samples_of(
     WrongUse
         There is no such dwell, or its samples were not recorded.
     """
-    found = archive.run(run)
+    stored = archive.run(run)
     unit, _, number = dwell.rpartition(":")
     table = read("dwells")
     rows = table[(table["unit"] == unit) & (table["dwell"].astype(str) == number)]
     if rows.empty:
-        raise WrongUse(f"run {found.id} has no dwell '{dwell[:80]}'; click a residual")
+        raise WrongUse(f"run {stored.id} has no dwell '{dwell[:80]}'; click a residual")
     row = rows.iloc[0]
     record = int(row["record"]) if "record" in rows.columns else int(number)
-    if found.records is not None:
-        tables = list(found.records.samples({record}))
-    elif "samples" in found.tables():
+    if stored.records is not None:
+        tables = list(stored.records.samples({record}))
+    elif "samples" in stored.tables():
         samples = read("samples")
         tables = [samples[samples["record"] == record]]
     else:
-        raise WrongUse(f"run {found.id} was imported as dwells: its samples were not recorded")
+        raise WrongUse(f"run {stored.id} was imported as dwells: its samples were not recorded")
     own = [one[one["unit"] == unit] for one in tables]
     kept = [one for one in own if len(one)]
     if not kept:
-        raise WrongUse(f"run {found.id}: no samples of dwell {number} of unit {unit} are stored")
+        raise WrongUse(f"run {stored.id}: no samples of dwell {number} of unit {unit} are stored")
     import pandas as pd
 
     out_unit = str(row["out_unit"]) if "out_unit" in rows.columns else ""

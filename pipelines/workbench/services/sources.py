@@ -74,8 +74,8 @@ def archive_stamp(settings: WorkbenchSettings) -> str:
         return digest({"runs": [[one.id, list(one.stages)] for one in archive.runs()]})[:20]
     if not runs.is_dir():
         return ""
-    with os.scandir(runs) as found:
-        times = [place.stat().st_mtime_ns for place in found]
+    with os.scandir(runs) as entries:
+        times = [place.stat().st_mtime_ns for place in entries]
     return f"{len(times)}.{max(times, default=0)}"
 
 
@@ -92,12 +92,12 @@ def twin(settings: WorkbenchSettings, name: str) -> str:
 def _files(folder: Path) -> list[DataSource]:
     if not folder.is_dir():
         return []
-    found: list[DataSource] = []
+    files: list[DataSource] = []
     for place in sorted([*folder.iterdir(), *(p for sub in folder.iterdir() if _is_open(sub) for p in sub.iterdir())]):
         usable = place.name.endswith(ENDINGS) and place.is_file() and not place.name.startswith(".")
         if usable and "history" not in place.name and not place.is_symlink():
-            found.append(DataSource(str(place), place.name, is_file=True))
-    return found[:MOST_FILES]
+            files.append(DataSource(str(place), place.name, is_file=True))
+    return files[:MOST_FILES]
 
 
 def _is_open(folder: Path) -> bool:

@@ -64,11 +64,11 @@ def named(known: Sequence[Bench], name: str) -> Bench:
     """
     if not name:
         return known[0]
-    found = next((one for one in known if one.name == name), None)
-    if found is None:
+    station = next((one for one in known if one.name == name), None)
+    if station is None:
         names = [one.name for one in known]
         raise WrongUse(f"station: none of this workbench is called '{name[:60]}'; {did_you_mean(name, names)}")
-    return found
+    return station
 
 
 def at(known: Sequence[Bench], address: str) -> Bench:

@@ -176,12 +176,12 @@ def imported(request: Mapped[str, Any]) -> dict[str, Any]:
 
 def _offered(names: tuple[str, ...]) -> dict[str, str]:
     lower = {name.lower().strip(): name for name in reversed(names)}
-    found: dict[str, str] = {}
+    columns: dict[str, str] = {}
     for meaning, words in GUESSES.items():
         column = next((lower[word] for word in words if word in lower), None)
         if column is not None:
-            found[meaning] = column
-    return found
+            columns[meaning] = column
+    return columns
 
 
 def _head(table: pd.DataFrame) -> list[list[str]]:

@@ -26,29 +26,31 @@ def audited(request: Mapping[str, Any], tell: Callable[[int, int, str], None]) -
     from pipelines.audit.period import scope_of
     from pipelines.audit.rules import load_rules
 
-    found = audit(Archive(request["archive"]), load_rules(None), scope_of(*(str(request[name]) for name in NAMES)))
+    archive_audit = audit(
+        Archive(request["archive"]), load_rules(None), scope_of(*(str(request[name]) for name in NAMES))
+    )
     tell(1, 2, "the evidence of its findings")
-    if not len(found.all) and not found.problems:
+    if not len(archive_audit.all) and not archive_audit.problems:
         raise WrongUse(
             f"audit: {request['archive']} has no calibration in this time, one at least is needed; make a run"
         )
     charts: dict[str, Chart] = {}
-    months = [share for share in found.yields if share.of == "month"]
+    months = [share for share in archive_audit.yields if share.of == "month"]
     if months:
         charts["yield"] = yield_chart(months)
-    if found.due.row.size:
-        charts["due"] = due_chart(found)
-    for number, one in enumerate(sorted(found.charts, key=lambda one: one.p_value)[:MOST_CHARTS]):
+    if archive_audit.due.row.size:
+        charts["due"] = due_chart(archive_audit)
+    for number, one in enumerate(sorted(archive_audit.charts, key=lambda one: one.p_value)[:MOST_CHARTS]):
         charts[f"control-{number}"] = control_chart(one)
-    moved = sorted((*found.stations, *found.slots), key=lambda one: -len(one.changes))
+    moved = sorted((*archive_audit.stations, *archive_audit.slots), key=lambda one: -len(one.changes))
     for number, one in enumerate(moved[:MOST_CHARTS]):
         charts[f"station-{number}"] = series_chart(one)
-    for number, one in enumerate(furthest(found, MOST_CHARTS)):
-        charts[f"drift-{number}"] = drift_chart(found, one)
-    listed = findings(found)
+    for number, one in enumerate(furthest(archive_audit, MOST_CHARTS)):
+        charts[f"drift-{number}"] = drift_chart(archive_audit, one)
+    listed = findings(archive_audit)
     return {
-        "document": document(found, listed, request["archive"]),
+        "document": document(archive_audit, listed, request["archive"]),
         "charts": charts,
-        "evidence": evidence(found, listed),
+        "evidence": evidence(archive_audit, listed),
         "addresses": [address_of(one) for one in listed],
     }

@@ -26,8 +26,8 @@ COLOURS: tuple[Role, Role] = ("x", "y")
 
 def evidence(audit: Audit, listed: Sequence[AuditFinding]) -> dict[str, Chart]:
     """Charts by the address of their finding; a finding without one has its numbers only."""
-    found = {address_of(one): chart_of(audit, one) for one in listed[:MOST]}
-    return {name: chart for name, chart in found.items() if chart is not None}
+    charts = {address_of(one): chart_of(audit, one) for one in listed[:MOST]}
+    return {name: chart for name, chart in charts.items() if chart is not None}
 
 
 def address_of(finding: AuditFinding) -> str:

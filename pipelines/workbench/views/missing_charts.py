@@ -46,22 +46,22 @@ def chosen_unit(table: ResidualTable, page: MissingPage) -> int:
     return int(np.nanargmax(np.nanmean(table.residual**2, axis=(1, 2))))
 
 
-def chosen_driver(found: Diagnosed, page: MissingPage) -> str:
+def chosen_driver(diagnosed: Diagnosed, page: MissingPage) -> str:
     """The quantity of the address, else the one that the residual follows most, else force."""
-    known = {} if found.table is None else found.table.drivers
-    drivers = [str(place["driver"]) for place in found.document["where"]]
+    known = {} if diagnosed.table is None else diagnosed.table.drivers
+    drivers = [str(place["driver"]) for place in diagnosed.document["where"]]
     return next((name for name in (page.against, *drivers) if name in known), "force")
 
 
-def sphere_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
+def sphere_chart(diagnosed: Diagnosed, page: MissingPage) -> Chart | None:
     """Mean residual of a unit at every pose on the whole sphere, axis by axis; before and after on one scale."""
-    table = found.table
+    table = diagnosed.table
     if table is None:
         return None
     unit = chosen_unit(table, page)
-    rows = [(table.residual, "" if found.before is None else ", after")]
-    if found.before is not None:
-        rows.insert(0, (found.before, ", before"))
+    rows = [(table.residual, "" if diagnosed.before is None else ", after")]
+    if diagnosed.before is not None:
+        rows.insert(0, (diagnosed.before, ", before"))
     poses, place = np.unique(np.round(table.force[unit], 2) + 0.0, axis=0, return_inverse=True)
     place = place.reshape(-1)
     x, y = project(poses)
@@ -97,17 +97,17 @@ def sphere_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
     )
 
 
-def driver_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
+def driver_chart(diagnosed: Diagnosed, page: MissingPage) -> Chart | None:
     """Residuals against a recorded quantity; the previous model on the left if there is one, on one scale."""
-    table = found.table
+    table = diagnosed.table
     if table is None:
         return None
-    name = chosen_driver(found, page)
+    name = chosen_driver(diagnosed, page)
     label, values = table.drivers[name]
     unit = chosen_unit(table, page)
     sides = [(table.residual, "the model judged")]
-    if found.before is not None:
-        sides = [(found.before, "before"), (table.residual, "after")]
+    if diagnosed.before is not None:
+        sides = [(diagnosed.before, "before"), (table.residual, "after")]
     largest = 1.06 * float(np.nanmax(np.abs(sides[0][0] if len(table.units) <= FEW else sides[0][0][unit])))
     plots = tuple(
         Plot(f"{title}, unit {_short(table.units[unit])}", PlotAxis(label), PlotAxis(RESIDUAL, low=-largest, high=largest),
@@ -199,9 +199,9 @@ def ladder_chart(rows: list[dict[str, Any]]) -> Chart:
     return Chart("Error by version of the model", (plot,), height=320)
 
 
-def slot_chart(found: Diagnosed, page: MissingPage) -> Chart | None:
+def slot_chart(diagnosed: Diagnosed, page: MissingPage) -> Chart | None:
     """Mean residual of every unit by slot, axis by axis: the influence of the place on the fixture."""
-    table = found.table
+    table = diagnosed.table
     if table is None or "slot" not in table.drivers:
         return None
     slot = table.drivers["slot"][1][:, 0]

@@ -60,11 +60,11 @@ class Acutrol(Equipment):
         self.values.write("record", seconds)
         self.clock.sleep(seconds)
         self._require_no_fault()
-        found = self.values.number("rate_read")
-        self._refuse_overspeed(found, rate_deg_s)
-        if not abs(found - rate_deg_s) <= 10.0 * REACHED * max(rate_deg_s, 1.0):
+        rate = self.values.number("rate_read")
+        self._refuse_overspeed(rate, rate_deg_s)
+        if not abs(rate - rate_deg_s) <= 10.0 * REACHED * max(rate_deg_s, 1.0):
             raise RecordingSpoilt(
-                f"{self.name}: {found:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive"
+                f"{self.name}: {rate:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive"
             )
         path = self.values.text("file")
         if path in {before, "NONE"}:
@@ -107,24 +107,24 @@ class Acutrol(Equipment):
 
     def _wait(self, rate_deg_s: float, band: float) -> None:
         end = self.clock.now() + PATIENCE_S
-        start = found = self.values.number("rate_read")
-        while not abs(found - rate_deg_s) <= band:
+        start = rate = self.values.number("rate_read")
+        while not abs(rate - rate_deg_s) <= band:
             self._require_no_fault()
-            self._refuse_overspeed(found, max(start, rate_deg_s))
+            self._refuse_overspeed(rate, max(start, rate_deg_s))
             if self.clock.now() > end:
                 self.make_safe()
                 raise StationTimeout(f"{self.name}: not at {rate_deg_s:g} °/s after {PATIENCE_S:g} s; check the drive")
             self.clock.sleep(POLL_S)
-            found = self.values.number("rate_read")
+            rate = self.values.number("rate_read")
 
-    def _refuse_overspeed(self, found: float, most: float) -> None:
+    def _refuse_overspeed(self, rate: float, most: float) -> None:
         """A drive that runs away: rate 0 and the interlock open, without waiting for its monitor."""
-        if found <= OVERSPEED * most + 1.0:
+        if rate <= OVERSPEED * most + 1.0:
             return
         self.make_safe()
         self.values.write("interlock", "open 1")
         raise OperatorNeeded(
-            f"{self.name}: {found:.5g} °/s, at most {most:.5g} °/s was ordered: the drive runs away; the interlock was opened; "
+            f"{self.name}: {rate:.5g} °/s, at most {most:.5g} °/s was ordered: the drive runs away; the interlock was opened; "
             "have the machine inspected"
         )
 

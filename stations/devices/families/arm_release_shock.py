@@ -94,11 +94,11 @@ class ShockMachine(Equipment):
 
 def _refuse_wrong_pulse(driven: np.ndarray, peak: float, name: str) -> None:
     """Refuse a reference that is clipped, or a peak that was not reached."""
-    found = float(driven.max())
-    flat = int(np.count_nonzero(driven > 0.9999 * found))
-    if flat > max(20, 0.02 * int(np.count_nonzero(driven > 0.1 * found))):
+    reached = float(driven.max())
+    flat = int(np.count_nonzero(driven > 0.9999 * reached))
+    if flat > max(20, 0.02 * int(np.count_nonzero(driven > 0.1 * reached))):
         raise RecordingSpoilt(
-            f"{name}: the reference is clipped at {found:.4g} g; choose a larger range of its conditioner"
+            f"{name}: the reference is clipped at {reached:.4g} g; choose a larger range of its conditioner"
         )
-    if not abs(found / peak - 1.0) <= PEAK_SHARE:
-        raise RecordingSpoilt(f"{name}: peak {found:.4g} g, {peak:g} g ± 20 % was ordered; check height or pressure")
+    if not abs(reached / peak - 1.0) <= PEAK_SHARE:
+        raise RecordingSpoilt(f"{name}: peak {reached:.4g} g, {peak:g} g ± 20 % was ordered; check height or pressure")

@@ -106,9 +106,9 @@ class ScpiGenerator(Equipment):
             volts = wanted
         return volts
 
-    def _refuse_reference(self, found: str) -> None:
+    def _refuse_reference(self, shown: str) -> None:
         raise OperatorNeeded(
-            f"{self.name}: the reference shows {found}; check the cable of the reference sensor, its conditioner and the "
+            f"{self.name}: the reference shows {shown}; check the cable of the reference sensor, its conditioner and the "
             "amplifier before the drive is raised"
         )
 
@@ -171,15 +171,15 @@ class ScpiGenerator(Equipment):
     def _level(self, recording: Recording, axis: int, frequency: float) -> float:
         """Peak level in g of the tone in the reference, 0 where noise hides it; a clipped reference is refused."""
         driven = recording.reference[:, axis] - recording.reference[:, axis].mean()
-        found, noise = tone_level(driven, recording.reference_rate_hz, frequency)
-        if found <= SEEN * noise * np.sqrt(2.0 / driven.size):
+        level, noise = tone_level(driven, recording.reference_rate_hz, frequency)
+        if level <= SEEN * noise * np.sqrt(2.0 / driven.size):
             return 0.0
         top = float(np.max(np.abs(driven)))
         if float(np.mean(np.abs(driven) > 0.999 * top)) > FLAT_SHARE:
             raise RecordingSpoilt(
                 f"{self.name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
             )
-        return found
+        return level
 
     def _refuse_error(self, what: str) -> None:
         code = self.values.number("error")

@@ -105,11 +105,11 @@ class Centrifuge:
     def _watch(self) -> None:
         """Trips by door and overspeed, and the stop after a silence; all follow from the plant's time."""
         conditions = self._world.bench.conditions
-        found = "guard door" if "guard_door" in conditions else "overspeed" if "overspeed" in conditions else ""
-        if found and not self._tripped:
-            self._tripped = found
+        cause = "guard door" if "guard_door" in conditions else "overspeed" if "overspeed" in conditions else ""
+        if cause and not self._tripped:
+            self._tripped = cause
             self._go(0.0)
-        elif not found:
+        elif not cause:
             self._tripped = ""
         if "drive_runaway" in conditions and self._to > 0.0 and self._to == self._asked:
             self._go(1.5 * self._asked)

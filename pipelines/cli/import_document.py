@@ -1,0 +1,96 @@
+"""One import as a document: the recording is read, judged and stored."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.cli.options import error_console
+from schemas.errors import WrongUse
+from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pipelines.importers.content import Content
+    from pipelines.importers.mapping import Mapping
+    from schemas.import_references import ImportReferences
+
+
+def import_document(
+    paths: list[Path],
+    keys: dict[str, Any],
+    where: str,
+    fit: str,
+    archive: str | None,
+    stated: ImportReferences | None,
+) -> dict[str, Any]:
+    """Read, judge and store one recording; the document for JSON."""
+    from pipelines.importers import keep, record, sources
+    from pipelines.importers import mapping as mapped
+    from pipelines.importers.dwell_list import dwell_rows
+    from pipelines.importers.pose_check import CHECK_AXIS
+
+    name = " + ".join(path.name for path in paths)
+    columns, units = keys.get("columns"), keys.get("units")
+    if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
+        mapped.build(keys, where)  # an error of the mapping is reported before a file is read
+    with error_console().status(f"reading {name}"):
+        time = str(columns.get("time", "")) if isinstance(columns, dict) else ""
+        content, source, breaks = sources.read(
+            paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
+        )
+        how = _mapping(keys, content, where, name)
+        data = record.imported(content.table, how, name, content, breaks)
+    judged = None
+    if fit:
+        from pipelines.diagnosis.imported import judge
+
+        with error_console().status("fitting and judging"):
+            judged = judge(fit, data, how)
+    run = keep.keep(data, source, how, judged, archive, stated)
+    turned = fit == "plane" and judged is not None and judged.adequate is not False  # its one axis is meant to be still
+    return {
+        "run": run.id,
+        "source": source.as_dict(),
+        "units": data.units,
+        "out_unit": data.out_unit,
+        "samples": 0 if data.samples is None else len(data.samples),
+        "dwells": 0 if data.dwells is None else len(data.dwells),
+        "remarks": [*(r for r in data.remarks if not (turned and r.startswith(CHECK_AXIS))), *_slips(how)],
+        "faults": list(data.faults),
+        "fit": fit or None,
+        "adequate": None if judged is None else judged.adequate,
+        **({} if judged is None else judged.document),
+        "lines": [] if judged is None else list(judged.lines),
+        "dwell_list": dwell_rows(data, judged, how),
+    }
+
+
+def _slips(how: Mapping) -> list[str]:
+    """A sentence for every covariate whose name is close to a known one."""
+    return [
+        f"'{shown(name)}' is imported as a covariate; if you mean {' or '.join(close)}, import again with that name"
+        for name, close in how.likely_slips.items()
+    ]
+
+
+def _mapping(keys: dict[str, Any], content: Content, where: str, name: str) -> Mapping:
+    """The mapping, with the unit that the file states where none was given; one without columns or unit is refused."""
+    from pipelines.importers import mapping as mapped
+    from pipelines.importers import stated_units
+
+    if "columns" not in keys:
+        raise WrongUse(
+            f"import: no column of {name} is mapped, x, y and z are needed at least (its columns: "
+            f"{', '.join(map(str, content.table.columns))}); add --map time=…,x=…,y=…,z=… and --units output=…, or --mapping "
+            f"FILE.toml; 'tumbleline inspect {name}' proposes a command"
+        )
+    complete = stated_units.completed(keys, content)
+    if "output" not in complete.get("units", {}) and all(axis in keys["columns"] for axis in mapped.NEEDED):
+        raise WrongUse(
+            f"import: the unit of the output is not given and {name} states none, one of {', '.join(mapped.OUTPUT_UNITS)} is "
+            f"needed; add --units output=…; 'tumbleline inspect {name}' shows the size of the numbers"
+        )
+    how = mapped.build(complete, where)
+    stated_units.refuse_contradiction(how, content, name)
+    return how

@@ -1,0 +1,70 @@
+"""Imports in the terminal: what was read, the remarks, the dwells, the verdict on the fit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from inertial.counts import number_of
+from pipelines.cli.next_commands import archive_words, command_line, print_next
+from pipelines.cli.options import console, print_table, short, short_values
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+VERDICTS = {
+    True: ("adequate", "bold green"),
+    False: ("NOT ADEQUATE: this fit does not describe these data", "bold red"),
+    None: ("CANNOT BE JUDGED: see above", "bold yellow"),
+}
+VERDICTS_OF_TRANSFER = {**VERDICTS, False: ("NOT ADEQUATE: the model does not describe these points", "bold red")}
+
+
+def print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
+    """Imported transfer functions for people."""
+    out = console()
+    for one in imports:
+        out.print(f"{one['unit']}: {one['points']} points, kept as run {one['run']}", markup=False)
+        for line in one["text"]:
+            out.print(f"  {line}", markup=False, soft_wrap=True)
+        verdict, style = VERDICTS_OF_TRANSFER[one["adequate"]]
+        out.print(f"  {verdict}", style=style)
+
+
+def print_import(one: dict[str, Any], archive: str | None, *, list_dwells: bool) -> None:
+    """An import for people."""
+    out = console()
+    dwells = number_of(one["dwells"], "dwell")
+    rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
+    out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}", markup=False)
+    for remark in [*one["remarks"], *one["lines"]]:
+        out.print(f"  {remark}", markup=False, soft_wrap=True)
+    if list_dwells:
+        _print_dwells(one["dwell_list"], one["out_unit"])
+    if one["fit"]:
+        verdict, style = VERDICTS[one["adequate"]]
+        out.print(f"  {verdict}", style=style)
+        if one["fit"] == "norm" and one["adequate"] is False:
+            print_next(out, [command_line("diagnose", one["run"], *archive_words(archive))])
+
+
+def _print_dwells(dwells: list[dict[str, Any]], unit: str) -> None:
+    heads = ["dwell", "label", "start, s", "end, s", "samples", f"mean x / y / z, {unit}", f"sd x / y / z, {unit}",
+             "residual, µg", "influence"]  # fmt: skip
+    print_table(
+        heads,
+        [
+            [
+                str(one["dwell"]),
+                one["label"],
+                f"{one['start_s']:.2f}",
+                f"{one['end_s']:.2f}",
+                "" if one["n"] is None else str(one["n"]),
+                " / ".join(f"{value:.6g}" for value in one["mean"]),
+                "" if one["sd"] is None else short_values(one["sd"]),
+                "" if one["residual_ug"] is None else f"{one['residual_ug']:.1f}",
+                short(one["influence"]),
+            ]
+            for one in dwells
+        ],
+        whole=2,
+    )
