@@ -27,7 +27,7 @@ def append(root: Place, kind: str, sealed: Mapping[str, str], about: Mapping[str
 
     Parameters
     ----------
-    kind : ``run`` or ``calibrations``.
+    kind : ``run``, ``calibrations``, ``programming`` or ``release``.
     sealed : hashes of files by their place below the archive's root.
     about : who wrote it, where and when, and about what.
     """

@@ -93,6 +93,7 @@ class StationEvent(TypedDict):
     action: str
     record: NotRequired[Annotated[int, "−1: none"]]
     time_s: NotRequired[Annotated[float, "clock of the station"]]
+    figures: NotRequired[Annotated[dict[str, float], "numerical values of the event, named with their unit"]]
 
 
 class StationLogDocument(TypedDict):
