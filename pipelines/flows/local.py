@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.chain.chain import ORDER
 from pipelines.flows.credentials import without_credentials
+from pipelines.flows.quick_imports import quick_imports
 from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
 from pipelines.flows.server_check import check_server
 from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
@@ -67,8 +68,9 @@ def run_locally(
 
 def _prepare(job: Job) -> None:
     """Import what the run needs, while the server starts on another processor."""
-    for name in (*NEEDED, *(SIMULATED if job.station.simulation is not None else ())):
-        import_module(name)
+    with quick_imports():
+        for name in (*NEEDED, *(SIMULATED if job.station.simulation is not None else ())):
+            import_module(name)
 
 
 @contextmanager

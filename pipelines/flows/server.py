@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipelines.flows.new_database import make_database
+from pipelines.flows.quick_imports import quick_imports
 from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_database, use_key
 from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
@@ -62,12 +63,14 @@ def serve(
     if folder:
         private_folder(Path(folder))
         make_database(Path(folder))
-    import uvicorn
+    with quick_imports():
+        import uvicorn
 
-    from pipelines.flows.application import application  # Prefect reads its settings when it is imported
+        from pipelines.flows.application import application  # Prefect reads its settings when it is imported
 
+        app = application(known, own)
     config = uvicorn.Config(
-        application(known, own),
+        app,
         host=host,
         port=port,
         log_config=None,  # in the format of Prefect's logging
