@@ -102,14 +102,21 @@ def _with_below(module: str) -> list[str]:
 
 @cache
 def _file(module: str) -> Path | None:
-    """The source of a module of the product; None for what is none."""
-    if module.split(".", 1)[0] not in OWN:
+    """The source of a module of the product; None for what is none, such as the name of something inside a module.
+
+    The name is followed through the folders: :func:`importlib.util.find_spec` would import the modules above it.
+    """
+    top, *parts = module.split(".")
+    spec = find_spec(top) if top in OWN else None
+    if spec is None or spec.origin is None:
         return None
-    try:
-        spec = find_spec(module)
-    except ModuleNotFoundError:  # the name of something inside a module
-        return None
-    return None if spec is None or spec.origin is None else Path(spec.origin)
+    folder = Path(spec.origin).parent
+    for part in parts[:-1]:
+        folder /= part
+    if not parts:
+        return folder / "__init__.py"
+    places = folder / parts[-1] / "__init__.py", folder / f"{parts[-1]}.py"
+    return next((place for place in places if place.is_file()), None)
 
 
 @cache

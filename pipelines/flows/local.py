@@ -18,7 +18,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.chain.chain import ORDER
+from pipelines.archive import code_hash
+from pipelines.chain.chain import BY_NAME, ORDER
 from pipelines.flows.credentials import without_credentials
 from pipelines.flows.quick_imports import quick_imports
 from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
@@ -42,10 +43,13 @@ PRIVATE = 0o600
 NEEDED = (
     "pipelines.flows.calibrate",
     "pipelines.flows.dead_runs",
+    "prefect.flow_engine",
     "pipelines.capture.capture",
-    "pipelines.report.plots",
+    "pipelines.jobs.adequacy",
+    "pipelines.report.run_page",
+    "stations.opening",
 )
-SIMULATED = ("stations.plant.plant", "stations.plant.server")
+SIMULATED = ("stations.plant.plant", "stations.plant.server", "stations.plant.line_server")
 """Modules that a run imports, and those of a simulated station: the slow ones."""
 
 _started: list[subprocess.Popen[bytes]] = []  # they end by themselves; kept so that the interpreter does not complain
@@ -67,10 +71,14 @@ def run_locally(
 
 
 def _prepare(job: Job) -> None:
-    """Import what the run needs, while the server starts on another processor."""
+    """Import what the run needs and read the sources of its stages, while the server starts on another processor."""
     with quick_imports():
         for name in (*NEEDED, *(SIMULATED if job.station.simulation is not None else ())):
             import_module(name)
+    from pipelines.report import MODULES
+
+    for modules in (*(stage.modules for stage in BY_NAME.values()), MODULES):
+        code_hash(modules)  # keeps what each source imports
 
 
 @contextmanager

@@ -1,5 +1,10 @@
 """What a stage's key takes in of the code."""
 
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
 from pipelines.archive.keys import sources
 from pipelines.chain.chain import STAGES
 
@@ -32,3 +37,26 @@ def test_a_package_stands_for_everything_below_it():
 def test_the_order_is_that_of_names_wherever_the_product_lies():
     modules = list(sources(("pipelines.stages.fit",)))
     assert modules == sorted(modules)
+
+
+def test_every_source_is_that_of_the_module_of_its_name():
+    files = sources(("inertial", "schemas", "stations", "pipelines"))
+    assert len(files) > 900
+    for name in [*files][::9]:
+        spec = find_spec(name)
+        assert spec is not None and spec.origin is not None, name
+        assert files[name] == Path(spec.origin), name
+
+
+def test_the_name_of_something_inside_a_module_is_no_source():
+    assert not sources(("inertial.counts.number_of", "inertial.no_such_module", "numpy.linalg"))
+
+
+def test_no_module_is_imported_for_its_source():
+    code = (
+        "import sys; from pipelines.archive.keys import code_hash; before = set(sys.modules); "
+        "code_hash(('pipelines.report', 'pipelines.procedures', 'inertial')); print(*(set(sys.modules) - before))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    imported = done.stdout.split()
+    assert not [name for name in imported if name.split(".")[0] in {"matplotlib", "inertial", "pipelines", "scipy"}]
