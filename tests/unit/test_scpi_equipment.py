@@ -1,6 +1,8 @@
 """Equipment by SCPI on its line: the level loop of the exciter, refusals, safe states; adapters that know no plant."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
@@ -11,7 +13,12 @@ from schemas.errors import OperatorNeeded, StationRefused
 from schemas.fault import FaultOrder
 from schemas.station import Device, Equipment, load_station, with_faults
 from stations import open_station
+from stations.devices.families.scpi_supply import ScpiSupply
 from stations.devices.recording import RecordingSpoilt
+
+if TYPE_CHECKING:
+    from stations.clock import Clock
+    from stations.devices.values import Values
 
 FAMILIES = Path(__file__).resolve().parents[2] / "stations" / "devices" / "families"
 
@@ -57,6 +64,41 @@ def test_the_supply_sets_measures_and_returns_to_its_nominal_voltage() -> None:
         supply.set_voltage(3.0)
         assert "power supply stopped" in station.make_safe().done
         assert station.reader.instruments().supply_V[0] == pytest.approx(nominal, rel=1e-3)
+
+
+class Queue:
+    """A supply whose queue has errors that somebody else has caused."""
+
+    name = "power supply"
+
+    def __init__(self, codes: list[int]) -> None:
+        self.codes, self.set, self.profile = codes, 3.3, SimpleNamespace(stated={})
+
+    def number(self, name: str) -> float:
+        if name == "error":
+            return float(self.codes.pop(0)) if self.codes else 0.0
+        return self.set
+
+    def write(self, name: str, value: object) -> None:
+        if name == "voltage":
+            self.set = float(str(value))
+
+
+def test_errors_of_earlier_users_of_a_supply_are_not_those_of_our_orders() -> None:
+    queue = Queue([-113, -222, -410])
+    supply = ScpiSupply(cast("Values", queue), cast("Clock", SimpleNamespace(sleep=lambda seconds: None)))
+    assert supply.set_voltage(3.0) == pytest.approx(3.0 / 3.3)
+    queue.codes.append(-222)
+    with pytest.raises(StationRefused, match=r"error -222 at 2\.8 V"):
+        supply.set_voltage(2.8)
+
+
+def test_a_supply_whose_errors_never_end_is_refused() -> None:
+    supply = ScpiSupply(
+        cast("Values", Queue([-350] * 1000)), cast("Clock", SimpleNamespace(sleep=lambda seconds: None))
+    )
+    with pytest.raises(StationRefused, match="queue is not empty, an end is needed"):
+        supply.set_voltage(3.0)
 
 
 def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ NOMINAL = 1.0  # the memory that holds the nominal setting
 SETTLE_S = 1.0
 FARTHEST = 0.5  # share of the nominal voltage by which an order may differ from it, as procedures may ask
 ABOVE = 0.2  # share above it where the station's file states no absolute maximum
+QUEUE = 50  # errors that are read out of a supply before its first order; the queues of real ones hold 10 to 30
 REACHED = 0.01  # share of the order by which the measured voltage may differ
 
 
@@ -40,6 +41,7 @@ class ScpiSupply(Equipment):
             The measured voltage is not the one that was set.
         """
         if self._nominal_V <= 0.0:
+            self._forget_errors()
             self._recall()
             nominal = self.values.number("voltage")
             if not nominal > 0.0:
@@ -91,6 +93,15 @@ class ScpiSupply(Equipment):
         self.values.write("output", "ON")
         self._refuse_error("the nominal setting")
         self._changed = False
+
+    def _forget_errors(self) -> None:
+        """Read the errors out that earlier users of the supply left: they are not those of our orders."""
+        for _ in range(QUEUE):
+            if self.values.number("error") == 0.0:
+                return
+        raise StationRefused(
+            f"{self.name}: {QUEUE} errors were read and its queue is not empty, an end is needed; restart the supply"
+        )
 
     def _refuse_error(self, what: str) -> None:
         code = self.values.number("error")
