@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -73,3 +74,13 @@ def no_pictures_here(monkeypatch: pytest.MonkeyPatch) -> None:
 def leave_out_pictures(patch: pytest.MonkeyPatch) -> None:
     """Let every report be made without its plots until the patch is undone."""
     patch.setattr("matplotlib.figure.Figure.savefig", lambda _, sink, **__: sink.write("<svg/>"))
+
+
+@pytest.fixture
+def no_next_measurement(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Diagnoses without proposed measurements, for tests of what is said of the measured ones: proposals are most of the time.
+
+    In the slow suites the document is whole, and so is that of every command and every blind run.
+    """
+    if request.node.get_closest_marker("slow") is None:
+        monkeypatch.setattr("pipelines.diagnosis.diagnose.proposed", lambda _: SimpleNamespace(rows=list))

@@ -11,7 +11,7 @@ that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directi
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +50,12 @@ class Shares(NamedTuple):
 
     flicker: float = 0.0
     walk: float = 0.0
+
+
+@lru_cache(maxsize=256)
+def _lattice(shares: Shares) -> tuple[int | None, ...]:
+    """The steps of the lattice at which shares stand; None for none."""
+    return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in shares)
 
 
 @dataclass(frozen=True)
@@ -179,8 +185,10 @@ class Covariance:
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
-        index = [None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) + steps for s in shares]
-        if self._wander is None or index == [None, None]:
+        if self._wander is None:
+            return None
+        index = [None if step is None else step + steps for step in _lattice(shares)]
+        if index == [None, None]:
             return None
         key = (place, index[0], index[1])
         if key not in self._whiteners:
