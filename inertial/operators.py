@@ -8,6 +8,9 @@ Array = NDArray[np.float64]
 _MANY = 64
 """Signals above which a play is faster point by point."""
 
+_FEW = 8
+"""Signals up to which a recursion is faster number by number than by arrays of one point of all signals."""
+
 
 def first_order_lag(time: ArrayLike, signal: ArrayLike, tau: float) -> Array:
     """Output of ẏ = (x − y)/τ for a signal that is straight between its points, (..., m), the signal's unit.
@@ -32,8 +35,17 @@ def recursion(start: ArrayLike, keep: Array, drive: Array) -> Array:
     """y₀ = start, yₖ₊₁ = keepₖ·yₖ + driveₖ along the last axis, (..., m) for ``keep``, ``drive`` (..., m − 1)."""
     out = np.empty((*drive.shape[:-1], drive.shape[-1] + 1))
     out[..., 0] = start
-    for k in range(drive.shape[-1]):
-        out[..., k + 1] = keep[..., k] * out[..., k] + drive[..., k]
+    rows = out.reshape(-1, out.shape[-1])
+    if len(rows) > _FEW:
+        for k in range(drive.shape[-1]):
+            out[..., k + 1] = keep[..., k] * out[..., k] + drive[..., k]
+        return out
+    each = zip(*(np.broadcast_to(a, drive.shape).reshape(len(rows), -1).tolist() for a in (keep, drive)), strict=True)
+    for row, (kept, driven) in zip(rows, each, strict=True):
+        line = [row[0].item()]
+        for k, d in zip(kept, driven, strict=True):
+            line.append(k * line[-1] + d)
+        row[:] = line
     return out
 
 

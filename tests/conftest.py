@@ -1,8 +1,10 @@
 """Markers by folder, and the folder of real measurements."""
 
+import gc
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +25,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         parts = Path(item.path).relative_to(ROOT / "tests").parts
         if parts[0] in FOLDERS:
             item.add_marker(getattr(pytest.mark, parts[0]))
+
+
+def pytest_collection_finish() -> None:
+    """Leaves what the collection has made, which stays until the end, out of every later search for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
@@ -73,3 +81,13 @@ def no_pictures_here(monkeypatch: pytest.MonkeyPatch) -> None:
 def leave_out_pictures(patch: pytest.MonkeyPatch) -> None:
     """Let every report be made without its plots until the patch is undone."""
     patch.setattr("matplotlib.figure.Figure.savefig", lambda _, sink, **__: sink.write("<svg/>"))
+
+
+@pytest.fixture
+def no_next_measurement(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Diagnoses without proposed measurements, for tests of what is said of the measured ones: proposals are most of the time.
+
+    In the slow suites the document is whole, and so is that of every command and every blind run.
+    """
+    if request.node.get_closest_marker("slow") is None:
+        monkeypatch.setattr("pipelines.diagnosis.diagnose.proposed", lambda _: SimpleNamespace(rows=list))

@@ -11,7 +11,7 @@ that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directi
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +50,12 @@ class Shares(NamedTuple):
 
     flicker: float = 0.0
     walk: float = 0.0
+
+
+@lru_cache(maxsize=256)
+def _lattice(shares: Shares) -> tuple[int | None, ...]:
+    """The steps of the lattice at which shares stand; None for none."""
+    return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in shares)
 
 
 @dataclass(frozen=True)
@@ -179,8 +185,10 @@ class Covariance:
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
-        index = [None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) + steps for s in shares]
-        if self._wander is None or index == [None, None]:
+        if self._wander is None:
+            return None
+        index = [None if step is None else step + steps for step in _lattice(shares)]
+        if index == [None, None]:
             return None
         key = (place, index[0], index[1])
         if key not in self._whiteners:
@@ -195,22 +203,23 @@ class Covariance:
 
     def _made(self, place: int, index: list[int | None]) -> tuple[Array, float]:
         kernel = self._kernels[place]
-        there = kernel.there
+        there, whole = kernel.there, bool(kernel.there.all())
         covariance = np.diag(kernel.profile[there] ** 2)
         for i, wander in zip(index, self._wander or (), strict=True):
             if i is not None:
-                covariance += 10.0 ** (i / SHARE_STEP) * wander[place][np.ix_(there, there)]
+                own = wander[place] if whole else wander[place][np.ix_(there, there)]
+                covariance += 10.0 ** (i / SHARE_STEP) * own
         # of the transpose, which is in Fortran order: no copy
         upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
         if failed:
             raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
         logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
         inverse = _invert(upper, lower=0, overwrite_c=1)[0].T
-        if there.all():
+        if whole:
             return inverse, logdet
-        whole = np.zeros((there.size, there.size))
-        whole[np.ix_(there, there)] = inverse
-        return whole, logdet
+        filled = np.zeros((there.size, there.size))
+        filled[np.ix_(there, there)] = inverse
+        return filled, logdet
 
     def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""

@@ -127,7 +127,8 @@ class Problem:
     def _by_axis(self, axes: list[Array]) -> Array:
         """Columns of three axes, each (units or 1, n, p), by block."""
         state = self.lot.state
-        axes = [np.broadcast_to(a, (*state.time.shape, a.shape[-1])) for a in axes]
+        shape = state.time.shape
+        axes = [a if a.shape[:-1] == shape else np.broadcast_to(a, (*shape, a.shape[-1])) for a in axes]
         if self.lot.radial:
             weighted = [a * self._direction[..., i, None] for i, a in enumerate(axes)]
             return np.concatenate(weighted, axis=-1)

@@ -7,6 +7,7 @@ test between the two (Atkinson & Fedorov, Biometrika 62 (1975) 57: T-optimal des
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,11 @@ class Rivals:
     def ids(self) -> tuple[str, ...]:
         """Effect ids, the best first."""
         return tuple(t.effect.id for t in self.terms)
+
+    @cached_property
+    def typical_error(self) -> Array:
+        """Median white standard error of the dwells of each unit and axis, (units, 1, 3), g; NaN where it has none."""
+        return np.nanmedian(np.where(np.isfinite(self.lot.error), self.lot.error, np.nan), axis=1, keepdims=True)
 
 
 def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most: int = FEW) -> Rivals:
@@ -174,8 +180,9 @@ def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | N
     units = lot.state.time.shape[0]
     state = extended(lot.state, steps, pace, response=lot.response)
     scale = 1.0 if pace is None or pace.last_dwell_s <= 0.0 else float(np.sqrt(pace.last_dwell_s / pace.dwell_s))
-    typical = scale * np.nanmedian(np.where(np.isfinite(lot.error), lot.error, np.nan), axis=1, keepdims=True)
-    typical = np.where(np.isfinite(typical), typical, np.nanmedian(typical))
+    typical = scale * rivals.typical_error
+    if not np.isfinite(typical).all():
+        typical = np.where(np.isfinite(typical), typical, np.nanmedian(typical))
     error = np.concatenate([lot.error, np.broadcast_to(typical, (units, len(steps), 3))], axis=1)
     output = np.concatenate([lot.output, np.zeros((units, len(steps), 3))], axis=1)
     return Problem(replace(lot, state=state, output=output, error=error))

@@ -28,6 +28,9 @@ DEFAULT = ("delay",)
 FOLDS = 5
 PARTS = ("before the pulse", "the pulse", "after the pulse")
 
+_KEPT = 200
+"""Largest number of waveforms that a design keeps."""
+
 
 @dataclass(frozen=True)
 class Waves:
@@ -112,9 +115,10 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
         raise NotIdentified(msg)
     whole = np.concatenate(used)
     target = np.concatenate([one.unit / one.error for one in record.shocks])[whole]
+    model = Design(record, effects, parameters)
 
     def design(x: Array) -> Array:
-        return _all(record, effects, parameters, x)[whole]
+        return model.at(x)[whole]
 
     def solved(x: Array) -> tuple[Array, Array]:
         columns = design(x)
@@ -135,7 +139,7 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
         float(errors[0]),
         {name: (float(c[k + 1]), float(errors[k + 1])) for k, name in enumerate(added)},
         {p.name: (float(v), float(u)) for (_, p), v, u in zip(parameters, values, spread, strict=True)},
-        tuple(_residuals(record, _all(record, effects, parameters, x), c)),
+        tuple(_residuals(record, model.at(x), c)),
         float(left @ left),
         count - len(c) - len(x),
     )
@@ -158,21 +162,46 @@ def predicted(record: ShockRecord, fit: ShockFit) -> float:
     parameters = [(name, p) for name in fit.effects for p in EFFECTS[name].parameters(record.duration_s)]
     x = np.array([np.log(fit.parameters[p.name][0]) if p.log else fit.parameters[p.name][0] for _, p in parameters])
     c = np.array([fit.sensitivity, *(value for value, _ in fit.coefficients.values())])
-    left = _residuals(record, _all(record, fit.effects, parameters, x), c)
+    left = _residuals(record, Design(record, fit.effects, parameters).at(x), c)
     return _percent(record, left)
 
 
-def _all(record: ShockRecord, effects: Sequence[str], parameters: Sequence[tuple[str, Parameter]], x: Array) -> Array:
-    """Weighted design of all samples of all shocks."""
-    values, parts = _values(parameters, x), list[Array]()
-    for one in record.shocks:
-        wave = one.reference
-        for name in effects:
-            own = np.array([v for (of, _), v in zip(parameters, values, strict=True) if of == name])
-            wave = EFFECTS[name].changed(wave, record.rate_hz, own)
-        extra = [EFFECTS[name].added(one.reference, record.rate_hz) for name in effects]
-        parts.append(np.column_stack([wave, *(column for column in extra if column is not None)]) / one.error[:, None])
-    return np.vstack(parts)
+class Design:
+    """Weighted design of all samples of all shocks, for values of the nonlinear parameters.
+
+    A waveform passes the effects in their order: a change of one parameter changes it only from the effect of that parameter on,
+    and what is before it is kept.
+    """
+
+    def __init__(
+        self, record: ShockRecord, effects: Sequence[str], parameters: Sequence[tuple[str, Parameter]]
+    ) -> None:
+        self.record, self.effects, self.parameters = record, tuple(effects), tuple(parameters)
+        self._own = [np.array([of == name for of, _ in self.parameters], dtype=bool) for name in self.effects]
+        extra = [[EFFECTS[name].added(one.reference, record.rate_hz) for name in self.effects] for one in record.shocks]
+        self._added = [[column for column in each if column is not None] for each in extra]
+        self._waves: dict[tuple[object, ...], Array] = {}
+
+    def at(self, x: Array) -> Array:
+        """The design (n of all shocks, 1 + added effects)."""
+        values, parts = _values(self.parameters, x), list[Array]()
+        if len(self._waves) > _KEPT:
+            self._waves.clear()
+        for place, (one, added) in enumerate(zip(self.record.shocks, self._added, strict=True)):
+            wave = self._passed(place, one.reference, values)
+            parts.append(np.column_stack([wave, *added]) / one.error[:, None])
+        return np.vstack(parts)
+
+    def _passed(self, place: int, wave: Array, values: Array) -> Array:
+        """The waveform of a shock's reference after all effects."""
+        key: tuple[object, ...] = (place,)
+        for name, own in zip(self.effects, self._own, strict=True):
+            mine = values[own] if len(values) else values
+            key = (*key, name, *mine.tolist())
+            if key not in self._waves:
+                self._waves[key] = EFFECTS[name].changed(wave, self.record.rate_hz, mine)
+            wave = self._waves[key]
+        return wave
 
 
 def _residuals(record: ShockRecord, design: Array, c: Array) -> list[Array]:

@@ -5,6 +5,8 @@ up to v/(f·ln r) between the slowest and the fastest: with bias instability B, 
 diagnosis look at the correlation, for which v is one over the number of processes; a plan starts from B.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,20 +47,27 @@ def summed(gap: Array, constants: Array, duration: float = 0.0) -> Array:
     """
     total = np.zeros(gap.shape)
     if duration <= 0.0:
-        halving = constants.size > 1 and np.array_equal(constants[:-1], 2.0 * constants[1:])
-        fade = np.exp(-gap / constants[0]) if constants.size else total
-        for place, tau in enumerate(constants):
-            if place:  # of half the time constant it is the square
-                fade = fade * fade if halving else np.exp(-gap / tau)
+        for fade in _fading(gap, constants):
             total += fade
         return total
-    apart = gap > 0.5 * duration
-    for tau in constants:
+    # two means of one dwell are the same mean; between dwells, the fade between the end of one and the start of the other
+    late, own = np.maximum(gap - duration, 0.0), 0.0
+    for tau, fade in zip(constants, _fading(late, constants), strict=True):
         share = tau / duration
-        fade = -np.expm1(-1.0 / share)
-        own = 2.0 * share * (1.0 - share * fade)
-        total += np.where(apart, (share * fade) ** 2 * np.exp(-np.maximum(gap - duration, 0.0) / tau), own)
-    return total
+        inside = -np.expm1(-1.0 / share)
+        own += 2.0 * share * (1.0 - share * inside)
+        total += (share * inside) ** 2 * fade
+    return np.where(gap > 0.5 * duration, total, own)
+
+
+def _fading(gap: Array, constants: Array) -> Iterator[Array]:
+    """e^(−gap/τ) (...), for each time constant in turn."""
+    halving = constants.size > 1 and np.array_equal(constants[:-1], 2.0 * constants[1:])
+    fade = np.exp(-gap / constants[0]) if constants.size else gap
+    for place, tau in enumerate(constants):
+        if place:  # of half the time constant it is the square
+            fade = fade * fade if halving else np.exp(-gap / tau)
+        yield fade
 
 
 def flicker_kernel(time: Array, *, slowest: float = SLOWEST_DIAGNOSED) -> Array:

@@ -87,7 +87,7 @@ class MixtureFit:
     def cost(self, strengths: Array) -> float:
         """Chi-square of the curve."""
         expected = self.model @ strengths
-        if not np.all(expected > 0.0):
+        if not expected.min() > 0.0:
             return np.inf
         residual = self.whiten @ (self.target - np.log(expected))
         return float(residual @ residual)
@@ -122,9 +122,10 @@ class MixtureFit:
         rows = self.whiten @ (self.model / expected[:, None])
         right_side = self.whiten @ (self.target - np.log(expected) + 1.0)
         right_side = right_side - rows[:, ~free] @ strengths[~free]
-        size = np.linalg.norm(rows[:, free], axis=0)
+        own = rows[:, free]
+        size = np.sqrt(np.sum(own * own, axis=0))
         trial = strengths.copy()
-        trial[free] = nnls(rows[:, free] / size, right_side)[0] / size
+        trial[free] = nnls(own / size, right_side)[0] / size
         return trial
 
 

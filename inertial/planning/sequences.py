@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ class StationPace:
     rule: SoakRule | None = None
     drive: Drive | None = None
 
-    @property
+    @cached_property
     def temperatures(self) -> Air:
         """Ramp and lag as the parameters of the temperature model."""
         return Air(self.ramp, self.lag)
@@ -139,14 +140,16 @@ class _Follow:
 
     def go_on(self, seconds: float, pace: StationPace) -> None:
         """Advances the time."""
-        end = self.now + max(seconds, 0.0)
-        while self.now < end - 1e-9:
-            moving = abs(self.target - self.air) + abs(self.air - self.device) > _STILL_K
-            grain = min(_GRAIN_S if moving else _LONG_S, end - self.now)
-            self.air, self.device = followed(self.air, self.device, self.target, grain, pace.temperatures)
-            self.now += grain
-            self.times.append(self.now)
-            self.devices.append(self.device)
+        now, air, device, target = self.now, self.air, self.device, self.target
+        end, temperatures = now + max(seconds, 0.0), pace.temperatures
+        while now < end - 1e-9:
+            moving = abs(target - air) + abs(air - device) > _STILL_K
+            grain = min(_GRAIN_S if moving else _LONG_S, end - now)
+            air, device = followed(air, device, target, grain, temperatures)
+            now += grain
+            self.times.append(now)
+            self.devices.append(device)
+        self.now, self.air, self.device = now, air, device
 
     def soak(self, target: float, pace: StationPace) -> None:
         """Goes to a temperature and waits until the devices are settled, at least the shortest soak."""
@@ -277,6 +280,8 @@ def _until(history: History | None, end: float) -> History | None:
 
 
 def _joined(values: Array, more: Array) -> Array:
+    if values.shape[:-1] == more.shape[:-1]:
+        return np.concatenate([values, more], axis=-1)
     lead = np.broadcast_shapes(values.shape[:-1], more.shape[:-1])
     whole = [np.broadcast_to(v, (*lead, v.shape[-1])) for v in (values, more)]
     return np.concatenate(whole, axis=-1)

@@ -79,6 +79,7 @@ class _BoundSearch:
         self.sensor, _ = design.split(recipe.effects)
         self.names = [name for name, _ in design.local_names(self.sensor, 0)]
         heat = np.asarray(sorted({*requirement.levels, *requirement.optional_levels}))
+        self._rated: dict[tuple[tuple[float, ...], tuple[int, ...]], tuple[float, str]] = {}
         self.columns = np.flatnonzero(np.any(self._rows(1000.0 * np.arange(1.0, heat.size + 1.0), heat), axis=(0, 1)))
 
     def reached(self, soak_orders: Sequence[tuple[float, ...]], share: float) -> tuple[tuple[float, ...], str] | None:
@@ -114,7 +115,12 @@ class _BoundSearch:
         return best
 
     def _worst(self, order: tuple[float, ...], counts: tuple[int, ...]) -> tuple[float, str]:
-        """The worst ratio to the required errors, and its effect."""
+        """The worst ratio to the required errors, and its effect; divisions are reached on several ways, and rated once."""
+        if (order, counts) not in self._rated:
+            self._rated[order, counts] = self._rating(order, counts)
+        return self._rated[order, counts]
+
+    def _rating(self, order: tuple[float, ...], counts: tuple[int, ...]) -> tuple[float, str]:
         time: list[Array] = []
         heat, clock = np.repeat(np.asarray(order), counts), 0.0
         for waited, count in zip(self._waits(order), counts, strict=True):

@@ -7,6 +7,8 @@ import pytest
 from inertial.criticism.faults.outputs import lattice_step
 from pipelines.diagnosis.diagnose import diagnose
 
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
 OUT = ["out_x", "out_y", "out_z"]
 
 

@@ -26,6 +26,8 @@ from noise import Noise
 from tables import FAULTS, HIDDEN, NULLS
 from world import World, make
 
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
 BASE = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 SEED = 5_500_000
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -55,5 +56,11 @@ def corner(name: str, duration_s: float) -> Parameter:
 
 def through(wave: Array, rate_hz: float, numerator: list[float], denominator: list[float]) -> Array:
     """A waveform (n,) that begins at zero, filtered by a transfer function in s; exact for linear interpolation."""
+    return np.asarray(lfilter(*_discrete(tuple(numerator), tuple(denominator), rate_hz), wave), dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def _discrete(numerator: tuple[float, ...], denominator: tuple[float, ...], rate_hz: float) -> tuple[Array, Array]:
+    """Coefficients of the digital filter of a transfer function in s: the shocks of a record are filtered in turn."""
     system: Any = cont2discrete((numerator, denominator), 1.0 / rate_hz, method="foh")
-    return np.asarray(lfilter(np.atleast_1d(np.squeeze(system[0])), system[1], wave), dtype=np.float64)
+    return np.atleast_1d(np.squeeze(system[0])), np.asarray(system[1])

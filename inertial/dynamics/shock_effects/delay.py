@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -30,4 +31,11 @@ class Delay(ShockEffect):
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
         """The waveform (n,)."""
         time = np.arange(len(wave)) / rate_hz
-        return np.asarray(CubicSpline(time, wave, bc_type="natural")(np.clip(time - values[0], time[0], time[-1])))
+        return np.asarray(_spline(wave.tobytes(), rate_hz)(np.clip(time - values[0], time[0], time[-1])))
+
+
+@lru_cache(maxsize=16)
+def _spline(wave: bytes, rate_hz: float) -> CubicSpline:
+    """The cubic spline through a waveform, the same for every delay."""
+    values = np.frombuffer(wave)
+    return CubicSpline(np.arange(len(values)) / rate_hz, values, bc_type="natural")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -30,6 +31,14 @@ class FilterOfReference(ShockEffect):
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
         """The waveform (n,)."""
         w = 2.0 * np.pi * float(values[0])
-        time = np.arange(len(wave)) / rate_hz
-        curve = make_interp_spline(time, wave, k=5)
-        return np.asarray(wave + np.sqrt(2.0) / w * curve(time, 1) + curve(time, 2) / w**2)
+        first, second = _derivatives(wave.tobytes(), rate_hz)
+        return np.asarray(wave + np.sqrt(2.0) / w * first + second / w**2)
+
+
+@lru_cache(maxsize=16)
+def _derivatives(wave: bytes, rate_hz: float) -> tuple[Array, Array]:
+    """First and second derivative of a waveform by time, (n,) each: the same for every corner of the filter."""
+    values = np.frombuffer(wave)
+    time = np.arange(len(values)) / rate_hz
+    curve = make_interp_spline(time, values, k=5)
+    return np.asarray(curve(time, 1)), np.asarray(curve(time, 2))
