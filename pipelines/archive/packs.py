@@ -15,7 +15,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from schemas.errors import ArchiveUnusable
 
@@ -28,6 +28,7 @@ NAME = re.compile(r"\d{6}-[0-9a-z-]+")
 FOLDERS_OF = {"runs": 2, "captures": 2, "calibrations": 3}  # parts of the name of a folder that is packed as a whole
 TICK_NS = 2_000_000_000
 LATELY = 256  # folders that are kept
+SEARCHED = 4  # questions to one table before the places of its folders are kept
 BEGINNING = re.compile(rb'\n\{"folder":("(?:[^"\\]|\\.)*")')
 
 
@@ -56,12 +57,22 @@ class Contents:
 
     def __init__(self, place: Path) -> None:
         self.place, self.pack, self.identity = place, place.with_suffix(CONTAINER), identity_of(place)
+        self._asked, self._starts = 0, cast("dict[bytes, int] | None", None)
         with place.open("rb") as file:
             self._lines = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
     def folder(self, name: str) -> PackedFolder | None:
-        """A folder; None where the pack does not have it."""
-        start = self._lines.find(b'\n{"folder":' + _text(name) + b",")
+        """A folder; None where the pack does not have it.
+
+        The first few are searched for, then the table is read once for the places of all: many questions would read it each.
+        """
+        if self._starts is None and self._asked < SEARCHED:
+            self._asked += 1
+            start = self._lines.find(b'\n{"folder":' + _text(name) + b",")
+        else:
+            if self._starts is None:
+                self._starts = {match.group(1): match.start() for match in BEGINNING.finditer(self._lines)}
+            start = self._starts.get(_text(name), -1)
         return None if start < 0 else self._at(start + 1)[1]
 
     def folders(self) -> Iterator[tuple[str, PackedFolder]]:

@@ -180,6 +180,23 @@ def test_damage_is_found(archive: Archive, what: str) -> None:
     assert any(packs.FOLDER in finding.path for finding in report.checked.findings)
 
 
+def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_path: Path) -> None:
+    top = tmp_path / packs.FOLDER
+    top.mkdir()
+    names = [f'runs/line-{k}"é' for k in range(3 * packs.SEARCHED)]
+    for number, own in enumerate((names[::2], names[1::2], names[:2]), 1):
+        lines = [packs.line_of(name, number, {"run.json": (100 * number, 7, number)}) for name in own]
+        (top / f"{number:06d}-2026-01.zip").write_bytes(b"zip")
+        (top / f"{number:06d}-2026-01.toc").write_bytes(b"{}\n{}\n" + b"".join(lines))
+    known = packs.Packs(tmp_path)
+    for name in names * 2:
+        number = 3 if name in names[:2] else 1 + names.index(name) % 2
+        folder = known.folder(name)
+        assert folder is not None
+        assert folder.files["run.json"][1:] == (100 * number, 7, number)
+    assert known.folder("runs/line-1") is None
+
+
 KILLED = """
 import os, signal, sys
 from pathlib import Path
