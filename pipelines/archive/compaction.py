@@ -138,7 +138,10 @@ def _runs_by_month(archive: Archive, root: Path, before: str, done: Compacted) -
     out: dict[str, list[str]] = {}
     captures: set[str] = set()
     there = sorted(place.name for place in (root / "runs").iterdir()) if (root / "runs").is_dir() else []
+    open_captures = any(_has_single(root / name) for name in _below(root, "captures"))
     for name in there:
+        if not open_captures and not _has_single(root / "runs" / name):
+            continue  # packed but for its page: most runs of an old archive
         if not (archive.root / "runs" / name / START).is_file():
             continue
         about = files.read_json(archive.root / "runs" / name / START)
@@ -197,6 +200,10 @@ def _single(folder: Path, prefix: str = "") -> Iterator[tuple[str, tuple[int, in
             else:
                 about = one.stat()
                 yield f"{prefix}{one.name}", (about.st_size, about.st_mtime_ns)
+
+
+def _has_single(folder: Path) -> bool:
+    return folder.is_dir() and any(True for _ in _single(folder))
 
 
 def _pack(root: Path, what: str, folders: Iterable[Found], done: Compacted) -> None:
