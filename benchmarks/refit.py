@@ -4,7 +4,7 @@ An archive of lots of ten units is generated (see generated_archive.py), then ru
 processes of one BLAS thread each, once in memory only (as in `tumbleline whatif`), once with all tables written (`tumbleline
 rerun`). For comparison, in the same processes on the same files: the time to read the tables of a fit and to solve
 one weighted batch fit per lot. Memory is the largest total of the parent and its workers. `--units` may be
-repeated, for the cost by number of units.
+repeated, for the cost by number of units. `--stages` prints the processor time of every step.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
@@ -32,6 +32,7 @@ from inertial.fits.linear import fit_lot  # noqa: E402
 from pipelines.archive import Archive, Run  # noqa: E402
 from pipelines.jobs.model_change import ModelChange, change_from_options  # noqa: E402
 from pipelines.parallel import map_partitions  # noqa: E402
+from pipelines.rerun import lot_comparison  # noqa: E402
 from pipelines.rerun.lot_comparison import judged  # noqa: E402
 from pipelines.rerun.partition import Batch, parts, run_again  # noqa: E402
 from pipelines.tables.dwells import lot_arrays  # noqa: E402
@@ -39,6 +40,11 @@ from pipelines.tables.dwells import lot_arrays  # noqa: E402
 PER_LOT = 10
 MB = 1024.0
 POLL_S = 0.2
+WARM = 3  # lots before the measurement: imports and first calls
+STEPS = {
+    "table": "reading of nine tables", "archived_job": "job of the run", "fit_tables": "fit", "verify_tables": "verify",
+    "budget": "budget", "grade": "grade", "_side": "errors and outcomes of both sides",
+}  # fmt: skip
 EFFECTS = (
     *("bias", "scale", "misalignment", "bias_temperature", "bias_temperature_quadratic"),
     *("scale_temperature", "scale_temperature_quadratic"),
@@ -117,17 +123,17 @@ def timed(what: str, function: object, archive: Archive, change: ModelChange, wo
     return seconds, cpu
 
 
+def generate(place: Path, units: int) -> None:
+    """The archive of so many units, in a process of its own."""
+    script = ROOT / "benchmarks" / "generated_archive.py"
+    command = [sys.executable, str(script), str(place), "--lots", str(units // PER_LOT)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
 def measured(units: int, workers: int, folder: Path) -> None:
     """All three measurements on an archive with this number of units."""
     place = folder / f"{units}"
-    generate = [
-        sys.executable,
-        str(ROOT / "benchmarks" / "generated_archive.py"),
-        str(place),
-        "--lots",
-        str(units // PER_LOT),
-    ]
-    subprocess.run(generate, check=True, stdout=subprocess.DEVNULL)
+    generate(place, units)
     archive, change = Archive(place), change_from_options(",".join(EFFECTS))
     print(f"{units} units in {units // PER_LOT} lots × 72 dwells of the fit, {workers} processes of one thread")
     read, read_cpu = timed("reading and solution", bare, archive, ModelChange(), workers)
@@ -138,14 +144,68 @@ def measured(units: int, workers: int, folder: Path) -> None:
     shutil.rmtree(place)
 
 
+def by_stage(units: int, folder: Path) -> None:
+    """Processor time per lot of every step of a re-fit in memory, in this process; each step runs as the product calls it."""
+    place = folder / f"{units}"
+    generate(place, units)
+    archive, change = Archive(place), change_from_options(",".join(EFFECTS))
+    spent: dict[str, float] = dict.fromkeys(STEPS, 0.0)
+    depth = [0]
+
+    def watched(name: str, function: Any) -> Any:
+        def call(*arguments: Any, **named: Any) -> Any:
+            depth[0] += 1
+            start = time.process_time()
+            try:
+                return function(*arguments, **named)
+            finally:
+                depth[0] -= 1
+                if not depth[0]:  # a step within another one is part of that
+                    spent[name] += time.process_time() - start
+
+        return call
+
+    owners = {name: Run if name == "table" else lot_comparison for name in STEPS}
+    before = {name: getattr(owner, name) for name, owner in owners.items()}
+    for portion in parts(archive, archive.run_ids()[:WARM], change, 1):
+        judged(portion)
+        bare(portion)
+    runs = archive.run_ids()[WARM:]
+    start = time.process_time()
+    for portion in parts(archive, runs, ModelChange(), 1):
+        bare(portion)
+    alone = time.process_time() - start
+    for name, owner in owners.items():
+        setattr(owner, name, watched(name, before[name]))
+    try:
+        start = time.process_time()
+        for portion in parts(archive, runs, change, 1):
+            judged(portion)
+        whole = time.process_time() - start
+    finally:
+        for name, owner in owners.items():
+            setattr(owner, name, before[name])
+    print(f"{len(runs)} lots, one process, ms of processor time per lot, load {os.getloadavg()[0]:.1f}")
+    lines = {**spent, "rest": whole - sum(spent.values()), "all": whole, "reading and solution": alone}
+    for name, seconds in lines.items():
+        what = STEPS.get(name, name)
+        print(f"  {what:<34} {1e3 * seconds / len(runs):7.1f}   {100.0 * seconds / whole:4.0f} %")
+    print(f"  ratio {whole / alone:.1f}")
+    shutil.rmtree(place)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--units", type=int, action="append", help="units in the archive; 10000 by default")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--stages", action="store_true", help="processor time of every step instead, in one process")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="tumbleline-refit-") as folder:
         for units in options.units or [10000]:
-            measured(units, options.workers, Path(folder))
+            if options.stages:
+                by_stage(units, Path(folder))
+            else:
+                measured(units, options.workers, Path(folder))
     return 0
 
 

@@ -7,43 +7,33 @@ time leaves every file at least once; the next compaction removes what lies twic
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import time
-import zipfile
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from pipelines.archive import derived, files, packs
+from pipelines.archive import files, packs
 from pipelines.archive.capture_journal import is_number
 from pipelines.archive.locks import LOCK, alone
+from pipelines.archive.pack_merging import merge_packs, remove_replaced
+from pipelines.archive.pack_writing import LARGEST, Found, write_pack
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import START
 from pipelines.archive.run_files import SEALED
-from schemas.errors import ArchiveUnusable, OperatorNeeded, WrongUse
+from schemas.errors import OperatorNeeded, WrongUse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from pipelines.archive.archive import Archive
 
-LARGEST = 2**30  # bytes of one pack: more begins the next, so that a killed compaction has little to do again
 LEAST_AGE_S = 3600.0  # of an event of the ledger: a process that decides on the next one has read it long ago
 LEDGER = "calibrations"
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date of a zip; equal files give equal packs
 MONTH = re.compile(r"\d{4}-\d{2}")
 PAGE = "report.html"  # stays: a browser opens it
-
-
-class Found(NamedTuple):
-    """A folder to pack: its name below the root, time of its last change, and its files with size and time each."""
-
-    name: str
-    mtime_ns: int
-    files: dict[str, tuple[int, int]]
 
 
 @dataclass
@@ -86,6 +76,7 @@ def compact(archive: Archive, before: str = "") -> Compacted:
     with _compacting(root):
         _refuse_open(root)
         files.sweep(root / packs.FOLDER)
+        remove_replaced(root)
         _drop_incomplete(root)
         known = packs.Packs(root)
         months = _runs_by_month(archive, root, before, done)
@@ -98,6 +89,8 @@ def compact(archive: Archive, before: str = "") -> Compacted:
         with alone(root / LEDGER, wait=True):  # nobody certifies meanwhile
             for name in _ledger(root):
                 _free(root, known, name, done)
+        for merged, replaced in merge_packs(root).items():
+            done.packs = [*(one for one in done.packs if one not in replaced), merged]
     return done
 
 
@@ -145,7 +138,10 @@ def _runs_by_month(archive: Archive, root: Path, before: str, done: Compacted) -
     out: dict[str, list[str]] = {}
     captures: set[str] = set()
     there = sorted(place.name for place in (root / "runs").iterdir()) if (root / "runs").is_dir() else []
+    open_captures = any(_has_single(root / name) for name in _below(root, "captures"))
     for name in there:
+        if not open_captures and not _has_single(root / "runs" / name):
+            continue  # packed but for its page: most runs of an old archive
         if not (archive.root / "runs" / name / START).is_file():
             continue
         about = files.read_json(archive.root / "runs" / name / START)
@@ -206,12 +202,16 @@ def _single(folder: Path, prefix: str = "") -> Iterator[tuple[str, tuple[int, in
                 yield f"{prefix}{one.name}", (about.st_size, about.st_mtime_ns)
 
 
+def _has_single(folder: Path) -> bool:
+    return folder.is_dir() and any(True for _ in _single(folder))
+
+
 def _pack(root: Path, what: str, folders: Iterable[Found], done: Compacted) -> None:
     """Write packs of the folders, each up to :data:`LARGEST` bytes."""
     portion, size = list[Found](), 0
     for one in folders:
         portion.append(one)
-        size += sum(length for length, _ in one.files.values())
+        size += one.bytes
         if size >= LARGEST:
             _write(root, what, portion, done)
             portion, size = [], 0
@@ -220,48 +220,10 @@ def _pack(root: Path, what: str, folders: Iterable[Found], done: Compacted) -> N
 
 
 def _write(root: Path, what: str, portion: Sequence[Found], done: Compacted) -> None:
-    """Write and publish one pack: the zip first, its table of contents last."""
-    top = root / packs.FOLDER
-    numbers = [int(place.name[:6]) for place in top.glob(f"*{packs.CONTENTS}") if is_number(place.name[:6])]
-    name = f"{max(numbers, default=0) + 1:06d}-{what}"
-    aside, place = top / f"{files.TEMPORARY}{name}", top / f"{name}{packs.CONTAINER}"
-    with files.writing(top, "archive compact", "make room; nothing was removed"):
-        try:
-            lines, total = _filled(root, aside, portion)
-            aside.replace(place)
-        finally:
-            aside.unlink(missing_ok=True)
-    about = files.json_bytes({"zip": place.name, "sha256": total, "bytes": place.stat().st_size})
-    content = b" ".join(about.split()) + b"\n" + b"".join(lines)
-    files.publish(top / f"{name}{packs.CONTENTS}", derived.framed(content), "archive compact")
-    done.packs.append(place.name)
+    """One pack of single files."""
+    done.packs.append(write_pack(root, what, portion, lambda folder, name: (root / folder / name).read_bytes()))
     done.packed += sum(len(one.files) for one in portion)
-    done.bytes += sum(length for one in portion for length, _ in one.files.values())
-
-
-def _filled(root: Path, aside: Path, portion: Sequence[Found]) -> tuple[list[bytes], str]:
-    """The lines of the table of contents and the hash of the zip, after the zip was read back from the disk's cache."""
-    lines, hashes = list[bytes](), list[tuple[int, int, bytes]]()
-    with aside.open("xb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as container:
-        for folder in portion:
-            where: dict[str, tuple[int, int, int]] = {}
-            for name, (_, mtime_ns) in folder.files.items():
-                data = (root / folder.name / name).read_bytes()
-                container.writestr(zipfile.ZipInfo(f"{folder.name}/{name}", EPOCH), data)
-                where[name] = (stream.tell() - len(data), len(data), mtime_ns)
-                hashes.append((where[name][0], len(data), hashlib.sha256(data).digest()))
-            lines.append(packs.line_of(folder.name, folder.mtime_ns, where))
-        container.close()
-        stream.flush()
-        os.fsync(stream.fileno())
-    with aside.open("rb") as stream:
-        for offset, size, expected in hashes:
-            stream.seek(offset)
-            if hashlib.sha256(stream.read(size)).digest() != expected:
-                raise ArchiveUnusable(
-                    f"archive compact: {aside} was read differently than it was written; check the disk"
-                )
-    return lines, files.sha256(aside)
+    done.bytes += sum(one.bytes for one in portion)
 
 
 def _free(root: Path, known: packs.Packs, name: str, done: Compacted) -> None:

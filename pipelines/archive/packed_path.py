@@ -82,10 +82,10 @@ class PackedPath(Base):
         try:
             return open(self, mode, *arguments, **options)
         except (FileNotFoundError, NotADirectoryError):
-            packed = self._packed() if mode in {"r", "rb"} else None
-            if not isinstance(packed, packs.Member):
+            packed = packs.read_current(self._member) if mode in {"r", "rb"} else None
+            if packed is None:
                 raise
-            data = io.BytesIO(packs.read(packed))
+            data = io.BytesIO(packed)
             return data if mode == "rb" else io.TextIOWrapper(data, options.get("encoding") or "utf-8")
 
     def read_bytes(self) -> bytes:
@@ -153,6 +153,11 @@ class PackedPath(Base):
             return packed.files[rest]
         return packed.mtime_ns if any(one.startswith(f"{rest}/") for one in packed.files) else None
 
+    def _member(self) -> packs.Member | None:
+        """The packed file of this name; None where no pack has it."""
+        packed = self._packed()
+        return packed if isinstance(packed, packs.Member) else None
+
     def _packed_names(self) -> set[str]:
         """Names of what is packed directly below."""
         name = self._below_root()
@@ -181,8 +186,7 @@ def member_of(place: object) -> packs.Member | None:
     """The packed file of a place that has none by itself; None for any other place."""
     if not isinstance(place, PackedPath) or os.path.exists(place):
         return None
-    packed = place._packed()  # noqa: SLF001 - the question of this module
-    return packed if isinstance(packed, packs.Member) else None
+    return place._member()  # noqa: SLF001 - the question of this module
 
 
 @cache

@@ -2,8 +2,9 @@
 
 ``packed/<number>-<what>.zip`` holds files uncompressed, ``<number>-<what>.toc`` its table of contents: a line with the
 seal, a line about the zip, then a line for each folder (of a run, of a capture, of a unit's calibrations) with the place,
-size and time of every file. A pack counts when both exist, and is never changed; where two packs have the same file, that
-of the higher number counts. Any program that unpacks zip files restores the single files.
+size and time of every file. A pack counts when both exist. It is never changed, but may be replaced by one of a higher number
+that has all its files; where two packs have the same file, that of the higher number counts. Any program that unpacks zip files
+restores the single files.
 """
 
 from __future__ import annotations
@@ -12,15 +13,16 @@ import json
 import mmap
 import re
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
 FOLDER = "packed"
 CONTENTS, CONTAINER = ".toc", ".zip"
@@ -28,6 +30,8 @@ NAME = re.compile(r"\d{6}-[0-9a-z-]+")
 FOLDERS_OF = {"runs": 2, "captures": 2, "calibrations": 3}  # parts of the name of a folder that is packed as a whole
 TICK_NS = 2_000_000_000
 LATELY = 256  # folders that are kept
+LISTINGS = 16  # of the folder while another process merges packs
+SEARCHED = 4  # questions to one table before the places of its folders are kept
 BEGINNING = re.compile(rb'\n\{"folder":("(?:[^"\\]|\\.)*")')
 
 
@@ -56,12 +60,22 @@ class Contents:
 
     def __init__(self, place: Path) -> None:
         self.place, self.pack, self.identity = place, place.with_suffix(CONTAINER), identity_of(place)
+        self._asked, self._starts = 0, cast("dict[bytes, int] | None", None)
         with place.open("rb") as file:
             self._lines = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
     def folder(self, name: str) -> PackedFolder | None:
-        """A folder; None where the pack does not have it."""
-        start = self._lines.find(b'\n{"folder":' + _text(name) + b",")
+        """A folder; None where the pack does not have it.
+
+        The first few are searched for, then the table is read once for the places of all: many questions would read it each.
+        """
+        if self._starts is None and self._asked < SEARCHED:
+            self._asked += 1
+            start = self._lines.find(b'\n{"folder":' + _text(name) + b",")
+        else:
+            if self._starts is None:
+                self._starts = {match.group(1): match.start() for match in BEGINNING.finditer(self._lines)}
+            start = self._starts.get(_text(name), -1)
         return None if start < 0 else self._at(start + 1)[1]
 
     def folders(self) -> Iterator[tuple[str, PackedFolder]]:
@@ -110,18 +124,22 @@ class Packs:
         ----------
         kind : ``calibrations``, or another first part of a name: those that may have such folders; empty: all
         """
-        try:
-            stamp = self.top.stat().st_mtime_ns
-        except OSError:
-            return []
-        if stamp != self._stamp:
-            with self._lock:
+        for _ in range(LISTINGS):
+            try:
+                stamp = self.top.stat().st_mtime_ns
+            except OSError:
+                return []
+            if stamp == self._stamp:
+                break
+            with self._lock, suppress(FileNotFoundError):  # packs are merged at this moment
                 self._folders.clear()
                 known = {one.identity: one for one in self._known}
                 places = sorted(place for place in self.top.iterdir() if _is_contents(place))
                 self._known = [known.get(identity_of(place)) or Contents(place) for place in places]
-                # a change within the same tick of the clock leaves the time as it is
-                self._stamp = stamp if time.time_ns() - stamp > TICK_NS else 0
+                if self.top.stat().st_mtime_ns == stamp:
+                    # a change within the same tick of the clock leaves the time as it is
+                    self._stamp = stamp if time.time_ns() - stamp > TICK_NS else 0
+                    break
         if not kind:
             return self._known
         ledger = kind == "calibrations"
@@ -190,6 +208,25 @@ def read(member: Member) -> bytes:
     if len(data) != member.size:
         raise OSError(f"{member.pack} is truncated")
     return data
+
+
+def read_current(ask: Callable[[], Member | None]) -> bytes | None:
+    """The bytes of a packed file, wherever it lies now; None where no pack has it.
+
+    Parameters
+    ----------
+    ask : where it lies; asked again where its pack was merged with others since the answer
+    """
+    for left in reversed(range(LISTINGS)):
+        member = ask()
+        if member is None:
+            return None
+        try:
+            return read(member)
+        except FileNotFoundError:
+            if not left:
+                raise
+    return None
 
 
 def split(name: str) -> tuple[str, str] | None:

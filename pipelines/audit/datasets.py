@@ -87,7 +87,10 @@ def _source(place: Path) -> pa.BufferReader | str:
     member = member_of(place)
     if member is None:
         return str(place)
-    whole = _mapped(str(member.pack))
+    try:
+        whole = _mapped(str(member.pack))
+    except FileNotFoundError:  # its pack was merged with others
+        return pa.BufferReader(place.read_bytes())
     return pa.BufferReader(pa.py_buffer(memoryview(whole)[member.offset : member.offset + member.size]))
 
 

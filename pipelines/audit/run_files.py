@@ -94,6 +94,8 @@ def _read(path: Place, stamp: str) -> RunFiles:
         packed = {name: folder.files[name] for name in WATCHED if name in folder.files and name not in single}
         try:
             content = read_together(packed)
+        except FileNotFoundError:  # its pack was merged with others: file by file, each where it is now
+            single = None
         except OSError as trouble:
             return RunFiles(path.name, stamp, content, str(trouble).splitlines()[0])
     for name in WATCHED:

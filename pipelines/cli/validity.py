@@ -41,12 +41,14 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, with the code, libraries and data that made them."""
     from pipelines.archive import Run
     from pipelines.certificates.certified_coefficients import coefficients_of
+    from pipelines.cli.arrow_alone import import_arrow_alone
     from pipelines.cli.remarks import print_remarks
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():
         return {"coefficients": None, "made": None}
     print_remarks(run, [valid.serial])
+    import_arrow_alone()
     manifest = run.manifest("coefficients")
     return {
         "coefficients": coefficients_of(run, valid),

@@ -17,6 +17,8 @@ from pipelines.archive import Archive, files, packs
 from pipelines.archive.backup import copy_archive
 from pipelines.archive.compaction import compact
 from pipelines.archive.locks import alone
+from pipelines.archive.pack_merging import due_of, merge_packs
+from pipelines.archive.pack_writing import Found, write_pack
 from pipelines.archive.packed_path import PackedPath
 from pipelines.audit.index import up_to_date
 from pipelines.audit.sql import ask
@@ -180,6 +182,142 @@ def test_damage_is_found(archive: Archive, what: str) -> None:
     assert any(packs.FOLDER in finding.path for finding in report.checked.findings)
 
 
+def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_path: Path) -> None:
+    top = tmp_path / packs.FOLDER
+    top.mkdir()
+    names = [f'runs/line-{k}"é' for k in range(3 * packs.SEARCHED)]
+    for number, own in enumerate((names[::2], names[1::2], names[:2]), 1):
+        lines = [packs.line_of(name, number, {"run.json": (100 * number, 7, number)}) for name in own]
+        (top / f"{number:06d}-2026-01.zip").write_bytes(b"zip")
+        (top / f"{number:06d}-2026-01.toc").write_bytes(b"{}\n{}\n" + b"".join(lines))
+    known = packs.Packs(tmp_path)
+    for name in names * 2:
+        number = 3 if name in names[:2] else 1 + names.index(name) % 2
+        folder = known.folder(name)
+        assert folder is not None
+        assert folder.files["run.json"][1:] == (100 * number, 7, number)
+    assert known.folder("runs/line-1") is None
+
+
+def later(archive: Archive, file: str, data: bytes = b"a later file") -> None:
+    """A file that a later command wrote into a folder of which the rest is packed."""
+    place = Path(str(archive.root)) / file
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.write_bytes(data)
+    before = time.time() - 2.0 * HOUR_S
+    os.utime(place, (before, before))
+
+
+def packed_zips(archive: Archive) -> list[str]:
+    return sorted(place.name for place in Path(str(archive.root / packs.FOLDER)).glob("*.zip"))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "count"),
+    [((), 0), ((5,), 1), ((8, 1), 1), ((2, 1), 2), ((9, 5, 1, 1), 2), ((8, 3, 1, 1), 4), ((2**30 - 5, 9), 1)],
+)
+def test_small_packs_are_merged_with_one_at_most_twice_as_large(sizes: tuple[int, ...], count: int) -> None:
+    assert due_of(sizes) == count
+
+
+def test_many_compactions_leave_few_packs_and_the_same_files(archive: Archive) -> None:
+    compact(archive)
+    run, serial = archive.run("latest").id, archive.run("latest").about["lot"]["units"][0]["serial"]
+    ledger = Ledger(archive)
+    for count in range(40):
+        later(archive, f"runs/{run}/more/{count:02d}.json", b"x" * 50_000)
+        ledger.revoke(serial, "dropped") if not count else None
+        done = compact(archive)
+        assert len(done.packs) == 1
+        assert (archive.root / packs.FOLDER / done.packs[0]).is_file()
+        assert len(packed_zips(archive)) <= 10
+    assert len(packed_zips(archive)) < 8
+    assert all(
+        (archive.root / "runs" / run / f"more/{count:02d}.json").read_bytes() == b"x" * 50_000 for count in range(40)
+    )
+    shutil.rmtree(Path(str(archive.root)) / "runs" / run, ignore_errors=True)
+    found = verify(Archive(str(archive.root)), keys={}).checked.findings
+    assert not [one for one in found if packs.FOLDER in one.path]
+
+
+def test_merging_keeps_the_newer_of_two_files_wherever_it_is_packed(archive: Archive) -> None:
+    compact(archive)
+    root = Path(str(archive.root))
+    month = next(name[7:-4] for name in packed_zips(archive) if "calibrations" not in name)
+    folder = f"runs/{archive.run('latest').id}"
+
+    def pack(what: str, data: bytes, size: int) -> None:
+        files_ = {"note.json": (len(data), size), f"{size}.json": (10**6, size)}
+        write_pack(
+            root, what, [Found(folder, 1, files_)], lambda _, name: data if name == "note.json" else b"y" * 10**6
+        )
+
+    pack(month, b"first", 1)
+    pack("2099-12", b"second", 2)
+    pack(month, b"third is not the newest of its own month alone", 3)
+    pack("2099-12", b"fourth", 4)
+    merged = merge_packs(root)
+    assert sorted(len(own) for own in merged.values()) == [2, 3]
+    assert (Archive(str(root)).root / folder / "note.json").read_bytes() == b"fourth"
+    assert {f"{k}.json" for k in range(1, 5)} <= {p.name for p in (archive.root / folder).iterdir()}
+    assert (archive.root / folder / "run.json").is_file()
+
+
+def test_a_damaged_pack_is_not_merged(archive: Archive) -> None:
+    compact(archive)
+    run = archive.run("latest").id
+    name = next(one for one in packed_zips(archive) if "calibrations" not in one)
+    place = Path(str(archive.root / packs.FOLDER / name))
+    data = bytearray(place.read_bytes())
+    data[len(data) // 2] ^= 1
+    place.write_bytes(data)
+    later(archive, f"runs/{run}/large.json", bytes(len(data)))
+    with pytest.raises(ArchiveUnusable, match=r"has changed since it was made; restore it from a copy"):
+        compact(archive)
+    assert place.is_file()
+    assert (archive.root / "runs" / run / "large.json").read_bytes() == bytes(len(data))
+
+
+READING = """
+import sys
+from pathlib import Path
+from pipelines.archive import Archive
+root = Archive(sys.argv[1]).root
+names = sys.stdin.readline().split()
+expected = {name: (root / name).read_bytes() for name in names}
+print("ready", flush=True)
+rounds = 0
+while not (Path(sys.argv[1]) / "stop").exists() or not rounds:
+    assert all((root / name).read_bytes() == data for name, data in expected.items())
+    assert all((root / name).is_file() for name in names)
+    rounds += 1
+print(rounds)
+"""
+
+
+def test_a_reader_finds_every_file_while_packs_are_merged(archive: Archive) -> None:
+    compact(archive)
+    run = archive.run("latest").id
+    names = [name for name in logical(archive) if name.startswith((f"runs/{run}/", "calibrations/"))]
+    words = [sys.executable, "-c", READING, str(archive.root)]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as reader:
+        assert reader.stdin
+        assert reader.stdout
+        reader.stdin.write(" ".join(names) + "\n")
+        reader.stdin.flush()
+        assert reader.stdout.readline() == "ready\n"
+        merged = 0
+        for count in range(12):
+            later(archive, f"runs/{run}/more/{count}.json", bytes(200_000 * (1 + count)))
+            before = len(packed_zips(archive))
+            compact(archive)
+            merged += len(packed_zips(archive)) <= before
+        (Path(str(archive.root)) / "stop").touch()
+        assert int(reader.stdout.read()) > 1
+    assert reader.returncode == 0
+    assert merged > 5
+
+
 KILLED = """
 import os, signal, sys
 from pathlib import Path
@@ -187,7 +325,8 @@ from pipelines.archive import Archive, compaction
 left = int(sys.argv[2])
 def counted(event, arguments):
     global left
-    if event in {"os.rename", "os.remove", "os.rmdir", "os.truncate"} or (event == "open" and "packed" in str(arguments[0])):
+    writes = event in {"os.rename", "os.remove", "os.rmdir", "os.truncate"}
+    if writes or (event == "open" and "packed" in str(arguments[0]) and sys.argv[3] == "opens"):
         left -= 1
         if left < 0:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -202,7 +341,7 @@ def test_killed_at_any_step_leaves_every_file(made: Path, tmp_path: Path) -> Non
     for step in (1, 5, 7, 20, 150):  # before a zip, before its contents, between the packs, among the removals
         root = tmp_path / f"archive-{step}"
         shutil.copytree(made, root)
-        ended = subprocess.run([sys.executable, "-c", KILLED, str(root), str(step)], check=False)
+        ended = subprocess.run([sys.executable, "-c", KILLED, str(root), str(step), "opens"], check=False)
         killed += ended.returncode == -signal.SIGKILL
         assert logical(Archive(str(root))) == expected
         compact(Archive(str(root)))
@@ -210,3 +349,27 @@ def test_killed_at_any_step_leaves_every_file(made: Path, tmp_path: Path) -> Non
         assert len(single(Archive(str(root)))) < len(expected) // 10
         shutil.rmtree(root)
     assert killed == 5
+
+
+def test_killed_while_merging_leaves_every_file(archive: Archive, tmp_path: Path) -> None:
+    compact(archive)
+    run = archive.run("latest").id
+    later(
+        archive, f"runs/{run}/more.json", bytes((archive.root / packs.FOLDER / packed_zips(archive)[0]).stat().st_size)
+    )
+    expected, killed, ended_well = logical(archive), 0, 0
+    for step in range(0, 60, 2):
+        root = tmp_path / f"archive-{step}"
+        shutil.copytree(Path(str(archive.root)), root)
+        ended = subprocess.run([sys.executable, "-c", KILLED, str(root), str(step), "writes"], check=False)
+        killed += ended.returncode == -signal.SIGKILL
+        ended_well += ended.returncode == 0
+        assert logical(Archive(str(root))) == expected
+        compact(Archive(str(root)))
+        assert logical(Archive(str(root))) == expected
+        assert len(list((root / packs.FOLDER).iterdir())) == 5  # a pack of the month, one of the ledger, and the lock
+        shutil.rmtree(root)
+        if ended_well:
+            break
+    assert killed > 3
+    assert ended_well == 1
