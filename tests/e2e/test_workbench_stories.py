@@ -137,7 +137,7 @@ def test_a_lot_without_a_fault_ends_with_its_results_before_unloading(tmp_path: 
         one.shot(tmp_path, "unload")
         one.press("[data-answer='go']")
         one.sees("[data-phase='done']")
-        one.press("text=Run")
+        one.press("text=Open the run")
         until(lambda: one.page.locator("h1").inner_text().startswith("small-"), "the run is shown")
         assert one.outside == [] == one.errors
 
