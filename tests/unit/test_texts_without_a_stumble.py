@@ -12,6 +12,7 @@ from pipelines.certificate_document.file_check import Check, CheckedFile
 from pipelines.cli import app, flowing
 from pipelines.cli.certificate_check import _needed  # pyright: ignore[reportPrivateUsage]
 from pipelines.importers.exchange import read_dwells
+from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.recipe import FaultOrder
@@ -100,3 +101,14 @@ def test_a_contribution_of_nothing_is_not_among_the_largest() -> None:
     text = "noise of the dwells 99 %, references, as far as verification cannot show them 1 %, seat of the fixture 0 %"
     assert without_nothing(text) == text.removesuffix(", seat of the fixture 0 %")
     assert without_nothing("noise of the dwells 80 %, supply 20 %") == "noise of the dwells 80 %, supply 20 %"
+
+
+def test_a_sample_recipe_that_is_not_here_is_named_with_its_path() -> None:
+    with pytest.raises(RecipeInvalid) as end:
+        load_recipe("line-six.toml")
+    path = Path(str(end.value).rpartition("the sample of this name is ")[2])
+    assert path.is_file()
+    assert load_recipe(str(path)).name == "line-six"
+    with pytest.raises(RecipeInvalid) as end:
+        load_recipe("line-seven.toml")
+    assert "sample" not in str(end.value)
