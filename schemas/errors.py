@@ -75,6 +75,11 @@ class LinkLost(StationError):
 class OperatorNeeded(StationError):
     """A condition that only a person at the station can correct (door, interlock, power, a missing unit)."""
 
+    @property
+    def condition(self) -> str:
+        """What to correct, for a person who is asked at the station; there no command has to be given."""
+        return str(self)
+
 
 class LeaseLost(TumblelineError):
     """A run that has lost the lease of its station: it stopped responding, or another run drives. It sends nothing more and ends.

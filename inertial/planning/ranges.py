@@ -20,11 +20,14 @@ class UnseenRange:
     def __str__(self) -> str:
         """The range with its unit."""
         name, unit = self.parameter.replace("_", " "), {"degC": "°C"}.get(self.unit, self.unit)
-        return (
-            f"{name} {self.low:.3g} {unit}"
-            if self.low == self.high
-            else f"{name} {self.low:.3g} to {self.high:.3g} {unit}"
-        )
+        low, high = _plain(self.low), _plain(self.high)
+        return f"{name} {low} {unit}" if self.low == self.high else f"{name} {low} to {high} {unit}"
+
+
+def _plain(value: float) -> str:
+    """Three significant digits, without an exponent from 0.0001 to 10 million."""
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:.0f}" if 1000.0 <= abs(rounded) < 1e7 else f"{rounded:g}"
 
 
 def unseen_ranges(effect: AnyEffect, state: State, seen: Sequence[bool]) -> tuple[UnseenRange, ...]:

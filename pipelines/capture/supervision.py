@@ -181,7 +181,7 @@ class Supervisor:
                 )
                 return
             if now - start > rules.limit_s:
-                raise StillSuspended(f"paused for {now - start:.0f} s", why)
+                raise StillSuspended(f"paused for {_long(now - start)}", why)
             clock.sleep(rules.poll_s)
 
     def raise_operator_cause(self, problem: StationError) -> None:
@@ -217,7 +217,13 @@ class StillSuspended(OperatorNeeded):
 
     def __init__(self, what: str, why: Suspended) -> None:
         self.reasons = why.reasons
-        super().__init__(f"station: {what}: {why}; correct it and give the command again: no measured record is lost")
+        self._condition = f"station: {what}: {why}; correct it"
+        super().__init__(f"{self._condition} and give the command again: no measured record is lost")
+
+    @property
+    def condition(self) -> str:
+        """The condition without the advice to give the command again."""
+        return self._condition
 
 
 def short_of_samples(counts: dict[int, int], overflow: set[int], duration: float, rate: float) -> list[Reason]:
@@ -230,3 +236,8 @@ def short_of_samples(counts: dict[int, int], overflow: set[int], duration: float
     more = f" (and {len(short) - 1} more slots)" if len(short) > 1 else ""
     what = "samples lost in the reader's memory" if slot in overflow else f"{short[slot]} samples of {expected}"
     return [Reason("samples", f"slot {slot}: {what}, all are needed{more}", tuple(short))]
+
+
+def _long(seconds: float) -> str:
+    """A time in seconds, from ten minutes on in minutes."""
+    return f"{seconds:.0f} s" if seconds < 600.0 else f"{seconds / 60.0:.0f} min"

@@ -64,7 +64,7 @@ class Attendance:
             try:
                 done = stage()
             except OperatorNeeded as problem:
-                self._need("trouble", str(problem))
+                self._need("trouble", problem.condition)
                 continue
             self._seated = True
             return done

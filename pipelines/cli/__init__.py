@@ -6,6 +6,7 @@ import errno
 import os
 import sys
 from importlib import import_module
+from inspect import cleandoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -60,11 +61,22 @@ class _OnDemand(TyperCommand):
         from pipelines.cli.candidates import attach
 
         attach(command)
+        for one in (command, *getattr(command, "commands", {}).values()):
+            one.help = flowing(one.help or "")
         command.epilog = _examples(getattr(module, "EXAMPLES", ()), getattr(module, "EPILOG", ()))
         of_subcommands: dict[str, tuple[str, ...]] = getattr(module, "EXAMPLES_OF", {})
         for name, examples in of_subcommands.items():
             getattr(command, "commands")[name].epilog = _examples(examples)  # noqa: B009 - a command without them has none
         return command
+
+
+def flowing(text: str) -> str:
+    """A help text whose paragraphs are one line each, so that a terminal breaks them at its own width only; lists are kept."""
+    paragraphs = cleandoc(text).split("\n\n")
+    return "\n\n".join(
+        one if any(line.startswith((" ", "-", "*", "\b")) for line in one.splitlines()) else " ".join(one.splitlines())
+        for one in paragraphs
+    )
 
 
 def _examples(lines: Sequence[str], before: Sequence[str] = ()) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from inertial.counts import number_of
+from inertial.counts import number_of, size_text
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 
 PART = "Certificates, trace, audit"
@@ -74,7 +74,7 @@ def clean(
     for run in done.sealed:
         out.print(f"sealed   {run}", markup=False, soft_wrap=True)
     word = "found" if only_look else "removed"
-    out.print(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({number_of(done.bytes, 'byte')})")
+    out.print(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({size_text(done.bytes)})")
     if done.anchored:
         out.print(f"{number_of(done.anchored, 'calibration')} added to the chain")
 
@@ -153,7 +153,7 @@ def backup(
         print_json({"archive": str(source.root), "copy": str(copy.root), "database": file, **asdict(done)})
         return
     out = console()
-    counted = f"{number_of(done.files, 'file')} copied ({number_of(done.bytes, 'byte')}), {done.present} already there"
+    counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"
     out.print(counted, markup=False, soft_wrap=True)
     if made is not None:
         out.print(f"database  {made}", markup=False, soft_wrap=True)
@@ -198,7 +198,7 @@ def compact(
         out.print(f"kept     {name}: changed, or in use; the next compaction packs it", markup=False, soft_wrap=True)
     for name in done.unfinished:
         out.print(f"open     {name}: not finished, left as it is", markup=False, soft_wrap=True)
-    packed = f"{number_of(done.packed, 'file')} packed ({number_of(done.bytes, 'byte')})"
+    packed = f"{number_of(done.packed, 'file')} packed ({size_text(done.bytes)})"
     out.print(f"{packed}, {number_of(done.freed, 'single file')} removed", markup=False, soft_wrap=True)
 
 
@@ -236,7 +236,7 @@ def restore(
         print_json({**place, **asdict(done)})
     else:
         out = console()
-        counted = f"{number_of(done.files, 'file')} copied ({number_of(done.bytes, 'byte')})"
+        counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)})"
         out.print(f"{counted}, {done.present} already there", markup=False, soft_wrap=True)
         state = "nothing is wrong" if report.whole else "run 'tumbleline verify' for the findings"
         out.print(f"verified: {number_of(report.runs, 'run')}, {state}", markup=False)

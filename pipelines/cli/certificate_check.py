@@ -101,9 +101,16 @@ def _print(one: CheckedFile) -> None:
         out.print(f"  accepted: nothing is wrong, proven by {proven}", style="bold green", markup=False)
     else:
         out.print(
-            "  not accepted: nothing is wrong, and nothing shows where the file comes from; give --trust FILE with the "
-            "certificate of the laboratory's key, or --archive",
+            f"  not accepted: nothing is wrong, and nothing shows where the file comes from; {_needed(one)}",
             style="bold yellow",
             markup=False,
             soft_wrap=True,
         )
+
+
+def _needed(one: CheckedFile) -> str:
+    """What would prove the origin: an archive proves the values of an XML, and nothing of the pages of a PDF."""
+    signed = any(check.check == "signature" and check.state == "good" for check in one.checks)
+    if one.path.suffix.lower() == ".pdf" and not signed:
+        return "the pages of an unsigned PDF cannot be proven: give its XML with --archive, or ask for a signed PDF"
+    return "give --trust FILE with the certificate of the laboratory's key, or --archive"

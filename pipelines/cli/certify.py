@@ -137,7 +137,13 @@ def _print(run: str, done: Certified) -> None:
         for e in sorted(done.events, key=lambda event: event.serial)
     ]
     if lines:
-        print_table(["certificate", "grade", "from", "until", "", "ends"], lines, title=f"run {run}")
+        print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {run}")
+        console().print(
+            f"The documents: tumbleline certificate {run} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
+            style="dim",
+            markup=False,
+            soft_wrap=True,
+        )
     for serial, why in done.left_out.items():
         console().print(f"  {serial} not certified: {why}", markup=False, soft_wrap=True)
 

@@ -235,6 +235,7 @@ def _next_command(out: Console, document: dict[str, Any], data: FindData, model:
 
 def _unseen(document: dict[str, Any]) -> None:
     if document["unseen"]:
+        console().print()
         reasons = document.get("reasons", {})
         lines = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
         print_table(

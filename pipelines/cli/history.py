@@ -107,12 +107,11 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
         "fresh_ug": "fresh run\nµg",
         "floor_ug": "assumed noise\nµg",
     }
-    errors = [[str(row["version"]), *(short(row[key]) for key in keys), row["text"]] for row in rows]
-    print_table(
-        ["version", *(heads[k] for k in keys), "verdict by data not fitted"],
-        errors,
-        title="Error, rms",
-    )
+    errors = [[str(row["version"]), *(short(row[key]) for key in keys)] for row in rows]
+    print_table(["version", *(heads[k] for k in keys)], errors, title="Error, rms")
+    for row in rows:
+        if row["text"]:
+            out.print(f"version {row['version']}: {row['text']}", markup=False, soft_wrap=True)
     out.print(
         "cross-validated: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "
         "of each unit included · assumed noise: of the fit of each version, missing effects included",

@@ -150,7 +150,7 @@ def _print_intervals(one: InspectDocument) -> None:
         return
     several = [k for k, interval in enumerate(intervals) if interval["positions"] > 1]
     total = sum(interval["end_s"] - interval["start_s"] for interval in intervals)
-    out.print(f"  {len(intervals)} static intervals, {total:.4g} s", soft_wrap=True)
+    out.print(f"  {number_of(len(intervals), 'static interval')}, {total:.4g} s", soft_wrap=True)
     for k in several[:MOST_FAULTS]:
         out.print(
             f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back", soft_wrap=True

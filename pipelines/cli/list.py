@@ -33,7 +33,7 @@ def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> No
         console().print(f"no run in {store.root}; make one with 'tumbleline run'", markup=False)
         return
     out = console()
-    out.print(f"{number_of(len(infos), 'run')} in archive {store.root}", markup=False, soft_wrap=True)
+    out.print(f"{number_of(len(infos), 'run')} in {store.root}", markup=False, soft_wrap=True)
     print_table(["run", "started (UTC)", "station", "passed", "units"], [_line(info) for info in infos])
     for info in infos:
         if info.rerun_of:

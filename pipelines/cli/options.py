@@ -166,19 +166,25 @@ def print_table(
 ) -> None:
     """A table for people; numbers stand to the right.
 
-    Neither they nor the first ``whole`` columns are ever broken or cut. A table that needs more than the terminal continues
-    below with its other columns, the first ``whole`` repeated; in a pipe it is as wide as it needs to be.
+    Neither they nor the first ``whole`` columns are ever broken or cut. A column without any entry is left out. A table that
+    needs more than the terminal has narrower gaps, or continues below with its other columns, the first ``whole`` repeated;
+    in a pipe it is as wide as it needs to be.
     """
     from pipelines.cli.console import limited
 
     shown = out or console()
+    used = [k for k in range(len(columns)) if k < whole or not lines or any(str(line[k]).strip() for line in lines)]
+    columns, lines = [columns[k] for k in used], [[line[k] for k in used] for line in lines]
     least = [_least(number < whole, column, [line[number] for line in lines]) for number, column in enumerate(columns)]
-    for part in _parts(least, whole, shown.width if limited(shown) else None):
-        _print_part(shown, [columns[k] for k in part], [[line[k] for k in part] for line in lines], title, whole)
+    width = shown.width if limited(shown) else None
+    gap = min(GAPS, key=lambda one: (len(_parts(least, whole, width, one)), -one))
+    for part in _parts(least, whole, width, gap):
+        _print_part(shown, [columns[k] for k in part], [[line[k] for k in part] for line in lines], title, whole, gap)
         title = ""
 
 
-PADDING = 3  # characters between two columns
+GAPS = (3, 2)
+"""Characters between two columns; the second where it saves a continuation of the table."""
 
 
 def _least(kept: bool, column: str, cells: Sequence[str | Text]) -> int:
@@ -189,14 +195,14 @@ def _least(kept: bool, column: str, cells: Sequence[str | Text]) -> int:
     return min(_longest([column, *texts], " "), NARROW)
 
 
-def _parts(least: Sequence[int], whole: int, width: int | None) -> list[list[int]]:
+def _parts(least: Sequence[int], whole: int, width: int | None, gap: int) -> list[list[int]]:
     """The columns in portions that fit a width, each with the first ``whole`` ones."""
     head = list(range(min(whole, len(least))))
     if width is None:
         return [list(range(len(least)))]
     parts, own = list[list[int]](), list(head)
     for k in range(len(head), len(least)):
-        if len(own) > len(head) and sum(least[m] + PADDING for m in [*own, k]) + 1 > width:
+        if len(own) > len(head) and sum(least[m] + gap for m in [*own, k]) + 1 > width:
             parts.append(own)
             own = list(head)
         own.append(k)
@@ -204,16 +210,16 @@ def _parts(least: Sequence[int], whole: int, width: int | None) -> list[list[int
 
 
 def _print_part(
-    shown: Console, columns: Sequence[str], lines: Sequence[Sequence[str | Text]], title: str, whole: int
+    shown: Console, columns: Sequence[str], lines: Sequence[Sequence[str | Text]], title: str, whole: int, gap: int
 ) -> None:
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD)
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, gap - 2))
     texts = [[str(line[number]) for line in lines] for number in range(len(columns))]
     least = [_least(number < whole, column, texts[number]) for number, column in enumerate(columns)]
     most = [_longest([column, *own], None) for column, own in zip(columns, texts, strict=True)]
-    widths = _widths(least, most, shown.width - 1 - PADDING * len(columns))
+    widths = _widths(least, most, shown.width - 1 - gap * len(columns))
     for number, column in enumerate(columns):
         numeric = _numeric(texts[number])
         justify = "right" if numeric else "left"
@@ -221,7 +227,7 @@ def _print_part(
         table.add_column(column, justify=justify, overflow="fold", no_wrap=kept, width=widths[number])
     for line in lines:
         table.add_row(*line)
-    table.width = sum(widths) + PADDING * len(widths) + 1
+    table.width = sum(widths) + gap * len(widths) + 1
     if title:
         shown.print(title, style="italic", markup=False)  # the table's own title would wrap to the width of the table
     shown.print(table, crop=False)

@@ -14,6 +14,7 @@ from pipelines.cli.options import (
     ModelOption,
     RecipeArgument,
     StationOption,
+    error_console,
     print_json,
 )
 from pipelines.cli.plan_text import print_plan
@@ -128,6 +129,7 @@ def command(
     For effects that are not visible: the reason, and what to add to the recipe.
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
+    from pipelines.jobs.range_of_station import refused_by_run
     from pipelines.jobs.recipes import folder_of
     from pipelines.jobs.terms import planned_terms
     from pipelines.planning.plan import plan, plan_context
@@ -141,6 +143,10 @@ def command(
     context = plan_context(
         planned_recipe, config, noise_of(planned_recipe, device or planned_recipe.device, noise, wander)
     )
+    for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
+        error_console().print(
+            f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow", markup=False, soft_wrap=True
+        )
     limits = _limits(planned_recipe, folder_of(recipe))
     document = plan(context, planned_terms(planned_recipe, config, limits), limits)
     if page is not None:

@@ -73,8 +73,11 @@ def _released(
     from pipelines.rerun.selection import moment
 
     if model is None or not since:
-        missing = "a model file" if model is None else "--from DATE"
-        raise WrongUse(f"release: {missing} is missing, both are needed; give a model file and a date, or --list")
+        missing = ["a model file"] * (model is None) + ["--from DATE"] * (not since)
+        are = "are" if len(missing) > 1 else "is"
+        raise WrongUse(
+            f"release: {' and '.join(missing)} {are} missing; give 'tumbleline release MODEL --from DATE', or --list"
+        )
     return release(
         store, change_from_options("", model, "", effect_file, where="release"), moment(since, "--from"), **how
     )

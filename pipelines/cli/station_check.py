@@ -108,8 +108,8 @@ def _print(readings: list[RegisterReading], findings: list[CheckResult], *, regi
 
 
 def _line(finding: CheckResult) -> list[str]:
-    value = finding.value if isinstance(finding.value, str) else f"{finding.value:.6g}"
-    sides = ["" if side is None else f"{side:.6g}" for side in (finding.low, finding.high)]
+    value = finding.value if isinstance(finding.value, str) else f"{finding.value:.4g}"
+    sides = ["" if side is None else f"{side:.4g}" for side in (finding.low, finding.high)]
     if finding.high is not None and finding.low == -finding.high:
         allowed = f"± {sides[1]}"
     else:

@@ -74,9 +74,10 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
     print_table(["certificate", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []
     if rows:
+        from inertial.uncertainty.degrees import rounded
+
         cells = [
-            [r["effect"], r["axis"], r["name"], f"{r['value']:.8g}", f"{r['standard_error']:.2g}", r["unit_text"]]
-            for r in rows
+            [r["effect"], r["axis"], r["name"], *rounded(r["value"], r["standard_error"]), r["unit_text"]] for r in rows
         ]
         print_table(["effect", "axis", "name", "value", "standard error", "unit"], cells)
 

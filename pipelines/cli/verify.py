@@ -108,7 +108,7 @@ def _print(report: Report) -> None:
             out.print(f"            and {left} more; --json lists all", markup=False, style="dim")
     for remark in checked.remarks:
         out.print(f"  {remark}", markup=False, style="dim", soft_wrap=True)
-    rate = f"{checked.rows / report.seconds:.3g} rows/s, {checked.bytes / report.seconds / 1e6:.3g} MB/s"
+    rate = f"{checked.bytes / report.seconds / 1e6:.3g} MB/s"
     out.print(
         f"{number_of(report.runs, 'run')}, {number_of(report.captures, 'capture')}: {number_of(checked.tables, 'table')}, "
         f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})",

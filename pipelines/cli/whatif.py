@@ -115,5 +115,5 @@ def _lines(name: str, row: dict[str, Any]) -> list[list[str]]:
     for number, line in enumerate(lines):
         rate = row["yield"][number]
         errors = [short(row[key][number]) for key in ("fit_rms_ug", "verification_rms_ug", "fresh_rms_ug")]
-        line += ["" if rate is None else f"{rate:.1%}", *errors]
+        line += ["" if rate is None else f"{100.0 * rate:.0f} %", *errors]
     return lines

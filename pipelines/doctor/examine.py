@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from pipelines.doctor.archive import archive_checks, key_checks
 from pipelines.doctor.host import host_checks
 from pipelines.doctor.orchestrator import orchestrator_checks
-from pipelines.doctor.software import PRODUCT, shipped, software_checks
+from pipelines.doctor.software import software_checks
 from pipelines.doctor.station import station_checks
+from schemas.shipped import PRODUCT, shipped
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import re
-import sysconfig
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,12 +13,12 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 from pipelines.doctor.check import Check
+from schemas.shipped import PRODUCT, shipped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 PART = "software"
-PRODUCT = "tumbleline"
 TESTED = "3.11"
 """The version of Python that the tests run on and the lock is for."""
 
@@ -39,14 +38,6 @@ class Needed(NamedTuple):
 def software_checks() -> list[Check]:
     """Python, the product, its libraries, the lock, and the optional libraries."""
     return [_python(), _product(), *_libraries(), _pinned(), _optional()]
-
-
-def shipped(name: str) -> Path | None:
-    """A file or folder of the deployment: of the source tree, else of ``share/tumbleline``; None where it is in neither."""
-    tree = Path(__file__).resolve().parents[2]
-    places = [tree] if (tree / "pyproject.toml").is_file() else []
-    paths = [place / name for place in (*places, Path(sysconfig.get_path("data")) / "share" / PRODUCT)]
-    return next((path for path in paths if path.exists()), None)
 
 
 def _python() -> Check:

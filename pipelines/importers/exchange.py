@@ -12,7 +12,7 @@ from pipelines.archive import Archive
 from pipelines.importers import files, values
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import table_check, tables
-from schemas.errors import DataRejected, WrongUse, did_you_mean
+from schemas.errors import DataRejected, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 from schemas.serials import refuse_unusable_serials
 
@@ -113,9 +113,13 @@ def _run(source: str | Path, archive: str | Path | None) -> Run:
 def _require(frame: pd.DataFrame, names: Iterable[str], where: str) -> None:
     missing = [name for name in names if name not in frame.columns]
     if missing:
-        hints = "; ".join(f"{name}: {did_you_mean(name, map(str, frame.columns))}" for name in missing[:3])
+        columns = list(map(str, frame.columns))
+        close = [f"{name}: {did_you_mean(name, columns)}" for name in missing[:3] if close_matches(name, columns)]
+        hints = "; ".join(close) or f"known: {', '.join(columns)}"
+        what, it = ("columns", "them") if len(missing) > 1 else ("column", "it")
+        are = "are" if len(missing) > 1 else "is"
         raise DataRejected(
-            f"{where}: column {', '.join(missing)} is missing; {hints}; rename it, or use 'tumbleline import --map'"
+            f"{where}: {what} {', '.join(missing)} {are} missing; {hints}; rename {it}, or use 'tumbleline import --map'"
         )
 
 

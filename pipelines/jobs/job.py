@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from inertial.errors import InertialError
 from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
+from pipelines.jobs.range_of_station import refuse_beyond_station
 from pipelines.jobs.recipes import MAIN_JOB, folder_of, load_limits, load_recipe, lot_of, units_of
 from pipelines.jobs.terms import refuse_contradictions, refuse_unreachable, with_stability
 from pipelines.procedures import refuse_unusable
@@ -165,7 +166,7 @@ class Request:
         job = Job(with_stability(recipe, station), limits, lot, station)
         _refuse_more_units_than_slots(job)
         _refuse_unknown_device(job)
-        _refuse_beyond_station(job)
+        refuse_beyond_station(job.recipe, job.station)
         _refuse_inconsistent(job, recorded_columns(station.devices.reader))
         refuse_unreachable(job)
         return job
@@ -276,28 +277,3 @@ def _refuse_unknown_device(job: Job) -> None:
         load_preset(job.lot.device, job.station.simulation.preset_overrides)
         for fault in job.station.simulation.faults:
             build_fault(fault, [unit.serial for unit in job.lot.units])
-
-
-def _refuse_beyond_station(job: Job) -> None:
-    """Refuse temperatures, angles and rates that the station is not able to reach or not allowed to."""
-    recipe, limits = job.recipe, job.station.limits
-    low, high = limits.temperature_C
-    temperatures = [*recipe.temperatures_C, *([recipe.static_temperature_C] if recipe.static_record_s > 0.0 else [])]
-    _refuse_outside("temperatures_C", temperatures, (low, high), f"°C, the chamber of station {job.station.name}")
-    chosen = [*recipe.poses, *recipe.verification, recipe.static_pose]
-    where = f"°, the table of station {job.station.name}"
-    _refuse_outside("poses (outer)", [p.outer_deg for p in chosen], (limits.outer_deg[0], limits.outer_deg[1]), where)
-    _refuse_outside("poses (inner)", [p.inner_deg for p in chosen], (limits.inner_deg[0], limits.inner_deg[1]), where)
-    _refuse_outside("rate_hz", [recipe.rate_hz], (0.0, limits.rate_hz), f"Hz, the reader of station {job.station.name}")
-
-
-def _refuse_outside(key: str, values: Sequence[float], bounds: tuple[float, float], what: str) -> None:
-    low, high = bounds
-    outside = [value for value in values if not low <= value <= high]
-    if outside:
-        unit, owner = what.split(", ", 1)
-        raise RecipeInvalid(
-            f"recipe: key '{key}': {outside[0]:g} {unit}, {owner} reaches {low:g} to {high:g} {unit}; change the recipe, "
-            "or measure on another station",
-            key=key.split(" ", 1)[0],
-        )

@@ -28,6 +28,7 @@ TURNS: tuple[tuple[int, Symbol, str], ...] = (
     (0, "circle", "first soak"),
 )
 MOST_POINTS = 600
+SYMBOLS: dict[str, Symbol] = {"before": "diamond", "after": "square"}
 RESIDUAL = "residual / µg"
 CLOSE = 60  # poses from which dots are smaller
 
@@ -96,8 +97,9 @@ def _quantiles(left: LotResiduals, floor_ug: float, *, something: bool) -> Plot:
         step = max(1, ordered.size // MOST_POINTS)
         normal = stats.norm.ppf((np.arange(ordered.size) + 0.5) / ordered.size)
         name = label if something else "residuals"
+        role, symbol = cast("Role", label), SYMBOLS[label]  # the colours are also those of two axes
         traces.append(
-            Trace(name, normal[::step], ordered[::step], role=cast("Role", label), size=3.0, legend=something)
+            Trace(name, normal[::step], ordered[::step], role=role, symbol=symbol, size=3.0, legend=something)
         )
     across, along = PlotAxis("quantile of pure noise"), PlotAxis("residual over the floor")
     return Plot("all units: residuals and noise", across, along, tuple(traces))

@@ -30,7 +30,7 @@ def draw_evolution(rows: list[dict[str, Any]], path: Path, name: str) -> None:
         figure = Figure(figsize=(max(6.4, 2.2 + 1.5 * len(rows)), 4.6), layout="constrained")
         place = figure.subplots()
         draw(place, rows)
-        place.set_title(f"Model {name}", loc="left")
+        place.set_title(f"Error of {name}, version by version", loc="left")
         try:
             figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
         except OSError as problem:

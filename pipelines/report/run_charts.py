@@ -106,7 +106,7 @@ def _verification(rows: pd.DataFrame) -> Plot:
     texts = tuple(f"pose {pose}: {value:.4g} µg" for pose, value in zip(rows["pose"], rows["error_ug"], strict=True))
     traces = (
         Trace("expected, k = 2", number, -expanded, "band", "muted", high=expanded),
-        Trace("magnitude − g", number, rows["error_ug"].to_numpy(float), size=6.0, texts=texts),
+        Trace("magnitude − g", number, rows["error_ug"].to_numpy(float), role="ink", size=6.0, texts=texts),
     )
     return Plot("poses not used by the fit", PlotAxis("verification dwell"), PlotAxis("|a| − g / µg"), traces)
 

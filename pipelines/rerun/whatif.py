@@ -169,7 +169,8 @@ def _verdict(
         return NOTHING, "no lot has dwells that were not fitted; the models cannot be compared"
     before, after = total["yield"]
     old, new = total[figure]
-    sentence = f"the error {where} changes from {old:.3g} to {new:.3g} µg, the yield from {before:.1%} to {after:.1%}"
+    yields = f"the yield from {100.0 * before:.0f} % to {100.0 * after:.0f} %"
+    sentence = f"the error {where} changes from {_three(old)} to {_three(new)} µg, {yields}"
     ratio = _log_ratios(figure, lots, fresh)
     count = number_of(int(ratio.size), "unit")
     if lost := _lost(figure, lots, fresh):
@@ -261,3 +262,9 @@ def _known(row: dict[str, Any]) -> list[str]:
 
 def _share(pair: Sequence[float]) -> float:
     return pair[1] / pair[0] - 1.0
+
+
+def _three(value: float) -> str:
+    """Three significant digits, without an exponent."""
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:.0f}" if abs(rounded) >= 1000.0 else f"{rounded:g}"

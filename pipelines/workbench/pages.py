@@ -21,6 +21,7 @@ from pipelines.report.charts import csv_text, plotly_figure
 from pipelines.report.charts.static_figure import png_bytes
 from pipelines.report.numbers import significant
 from pipelines.report.reasons import plain_reason
+from pipelines.report.unit_panels.budget import without_nothing
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
@@ -182,6 +183,7 @@ def _environment() -> Environment:
     environment.filters["short"] = short
     environment.filters["plain_reason"] = plain_reason
     environment.filters["tuple_of"] = _tuple_of
+    environment.filters["without_nothing"] = without_nothing
     return environment
 
 

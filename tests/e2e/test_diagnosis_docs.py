@@ -73,7 +73,9 @@ def test_the_tutorial_prints_what_it_says(typed):
         assert len(shown) == len(expected), "\n".join(shown)
         wrong = [(a, b) for a, b in zip(shown, expected, strict=True) if not same_line(a, b)]
         assert not wrong, command
-    assert (Path("game") / "report.html").is_file()
+    page = (Path("game") / "report.html").read_text(encoding="utf-8")
+    assert "<th>scope</th>" in page
+    assert "<th>parameters</th>" not in page  # no effect of this story has one
     assert (Path("game") / "history.png").is_file()
 
 

@@ -40,7 +40,7 @@ def test_the_list_shows_result_station_and_what_a_run_is_a_re_run_of(archive: Pa
     text = listed(archive)
     runs = {info.id: info for info in Archive(archive).runs()}
     again = next(info for info in runs.values() if info.rerun_of)
-    assert " ".join(text.split()).startswith(f"3 runs in archive {archive} ")
+    assert " ".join(text.split()).startswith(f"3 runs in {archive} ")
     assert f"{again.id} is a re-run of {again.rerun_of}" in text
     assert text.count(f"{again.passed} of {again.graded}") == 2
     assert "unfinished" in text

@@ -47,6 +47,7 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         assert "Missing: third_order" in one.page.inner_text(".verdict")
         one.press("text=as the fresh measurement")
         one.sees("[data-version='1']")
+        assert one.page.locator("a[data-add=third_order]").first.inner_text() == "Add third_order"
         one.shot(pictures, "workbench-before", tall=1180)
         one.press("[data-add='third_order']")
         one.sees("[data-version='2']")
@@ -137,7 +138,7 @@ def test_a_lot_without_a_fault_ends_with_its_results_before_unloading(tmp_path: 
         one.shot(tmp_path, "unload")
         one.press("[data-answer='go']")
         one.sees("[data-phase='done']")
-        one.press("text=Run")
+        one.press("text=Open the run")
         until(lambda: one.page.locator("h1").inner_text().startswith("small-"), "the run is shown")
         assert one.outside == [] == one.errors
 

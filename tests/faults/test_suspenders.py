@@ -85,6 +85,7 @@ def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
             {"kind": "door", "at_s": DURING}, sink=(sink := MemorySink()), events=(events := MemoryLog()), limit_s=300.0
         )
     assert end.value.exit_status == 3
+    assert end.value.condition.endswith("correct it")  # who is asked at the station gives no command
     assert sorted(sink.records) == [0]
     assert kinds(events) == ["spoilt", "stopped"]
     assert events.recorded()[-1].action == "outer axis stopped; inner axis stopped; sampling stopped; chamber to 25 °C"

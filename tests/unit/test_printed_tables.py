@@ -6,6 +6,7 @@ import pytest
 from rich.console import Console
 from rich.text import Text
 
+from pipelines.cli.console import WordConsole
 from pipelines.cli.options import console, print_table
 
 COLUMNS = ["effect", "of the", "size\nµg", "p", "left\nµg", "left out\nµg", "with"]
@@ -47,3 +48,34 @@ def test_brackets_and_colons_of_a_reason_are_printed_as_they_are(capsys: pytest.
 
 def test_a_cell_may_have_a_style() -> None:
     assert "pass" in printed(40, ["result"], [[Text("pass", style="bold green")]])
+
+
+def test_a_column_without_an_entry_is_left_out_and_an_empty_table_keeps_its_heads() -> None:
+    text = printed(80, COLUMNS, LINES)
+    assert "with" not in text.split()
+    assert "scale_temperature_quadratic" in text
+    assert printed(80, ["serial", "reason"], [["", ""]]).split()[0] == "serial"  # the first column says what a row is
+    assert {"unit", "why"} <= set(printed(80, ["unit", "why"], []).split())
+
+
+def test_narrower_gaps_save_a_continuation_of_one_column() -> None:
+    heads = [
+        "slot",
+        "unit",
+        "result",
+        "grade",
+        "fit\nµg",
+        "verify\nµg",
+        "error\nµg",
+        "period\nµg",
+        "N\nµg/√Hz",
+        "B\nµg",
+    ]
+    line = ["0", "TL0001", "pass", "consumer", "352", "474", "595", "731", "10.3", "299"]
+    out = WordConsole(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
+    print_table(heads, [line], out=out)
+    text = out.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+    assert text.count("slot") == 1
+    assert max(map(len, text.splitlines())) <= 80
+    wide = printed(200, heads, [line])
+    assert "  slot   unit     result" in wide

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 Role = Literal["x", "y", "z", "norm", "accent", "before", "after", "muted", "limit", "good", "ink"]
 Style = Literal["points", "line", "band", "bars", "density", "labels"]
+Anchor = Literal["center", "top left", "top right", "top center", "bottom center"]
 Symbol = Literal["circle", "triangle-up", "triangle-down", "square", "diamond"]
 
 ROLES: dict[Role, str] = {
@@ -73,6 +74,7 @@ class Trace:
     counts : (rows, columns), of a density; x and y are then the middles of columns and rows
     width : of a line, in pixels; 0 for the usual one
     texts : (n,), shown beside a label or at the pointer
+    anchors : (n,), on which side of its point a label stands; on the point where empty
     picks : (n,), selection by a click on a point; empty for none
     """
 
@@ -90,6 +92,7 @@ class Trace:
     colour: Array | None = None
     counts: Array | None = None
     texts: tuple[str, ...] = ()
+    anchors: tuple[Anchor, ...] = ()
     picks: tuple[str, ...] = ()
     legend: bool = True
 

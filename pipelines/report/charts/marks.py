@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.report.charts.chart import ColourScale, Trace
+    from pipelines.report.charts.chart import Anchor, ColourScale, Trace
 
     Array = NDArray[np.float64]
 
@@ -159,11 +159,23 @@ def _density(trace: Trace, place: Place, scale: ColourScale | None) -> str:
 def _labels(trace: Trace, place: Place, scale: ColourScale | None) -> str:
     del scale
     x, y = place.x(trace.x), place.y(trace.y)
-    look = f'text-anchor="middle" font-size="11" fill="{ROLES[trace.role]}"'
+    look = f'font-size="11" fill="{ROLES[trace.role]}"'
+    anchors = trace.anchors or ("center",) * len(trace.texts)
     return "".join(
-        f'<text x="{a:.1f}" y="{b + 4.0:.1f}" {look}>{escape(text, quote=False)}</text>'
-        for a, b, text in zip(x, y, trace.texts, strict=True)
+        f'<text x="{a + ANCHORED[anchor][1]:.1f}" y="{b + ANCHORED[anchor][2]:.1f}" text-anchor="{ANCHORED[anchor][0]}" '
+        f"{look}>{escape(text, quote=False)}</text>"
+        for a, b, text, anchor in zip(x, y, trace.texts, anchors, strict=True)
     )
+
+
+ANCHORED: dict[Anchor, tuple[str, float, float]] = {
+    "center": ("middle", 0.0, 4.0),
+    "top right": ("start", 3.0, -3.0),
+    "top left": ("end", -3.0, -3.0),
+    "top center": ("middle", 0.0, -3.0),
+    "bottom center": ("middle", 0.0, 12.0),
+}
+"""Where a label of 11 px stands beside its point: which end of the text, and the place of its base line, px."""
 
 
 DRAW: dict[str, Callable[[Trace, Place, ColourScale | None], str]] = {

@@ -14,16 +14,19 @@ from pipelines.report.charts.chart import Plot, PlotAxis, Trace
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from pipelines.report.charts.chart import Anchor
+
     Array = NDArray[np.float64]
 
 _STEPS = 30
-LETTERS = {
-    "+x": (1.0, 0.0, 0.0),
-    "+y": (0.0, 1.0, 0.0),
-    "−y": (0.0, -1.0, 0.0),
-    "+z": (0.0, 0.0, 1.0),
-    "−z": (0.0, 0.0, -1.0),
+LETTERS: dict[str, tuple[tuple[float, float, float], Anchor]] = {
+    "+x": ((1.0, 0.0, 0.0), "top right"),
+    "+y": ((0.0, 1.0, 0.0), "top right"),
+    "−y": ((0.0, -1.0, 0.0), "top left"),
+    "+z": ((0.0, 0.0, 1.0), "top center"),
+    "−z": ((0.0, 0.0, -1.0), "bottom center"),
 }
+"""Direction of each letter, and the side on which it stands beside the lines that cross there, whatever the size."""
 
 
 def project(direction: Array) -> tuple[Array, Array]:
@@ -73,7 +76,7 @@ def _graticule() -> tuple[Trace, ...]:
         )
         lines.append(Trace("", *project(around), "line", "muted", legend=False))
     lines.append(Trace("", np.array([-2.0, 2.0]), np.zeros(2), "line", "muted", legend=False))
-    x, y = project(np.array(list(LETTERS.values())))
-    beside = np.array([0.09, 0.09, -0.09, 0.0, 0.0]), np.array([0.08, 0.08, 0.08, 0.09, -0.09])
-    lines.append(Trace("", x + beside[0], y + beside[1], "labels", "ink", texts=tuple(LETTERS), legend=False))
+    x, y = project(np.array([direction for direction, _ in LETTERS.values()]))
+    anchors: tuple[Anchor, ...] = tuple(anchor for _, anchor in LETTERS.values())
+    lines.append(Trace("", x, y, "labels", "ink", texts=tuple(LETTERS), anchors=anchors, legend=False))
     return tuple(lines)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipelines.report.charts.chart import DIVERGING, SEQUENTIAL
+from pipelines.report.charts.ticks import log_ticks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,9 +21,10 @@ if TYPE_CHECKING:
 MANY = 4000
 """Points from which WebGL draws faster than SVG."""
 DAY_MS = 86_400_000.0
-GAP_X, GAP_PX = 0.06, 74.0
+GAP_X, GAP_PX = 0.078, 74.0
 SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
+MOST_NAMES = 40  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
 LONGEST = 28
 CONFIG = {
@@ -95,7 +97,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         (plot.y, along, (top - height, top), across),
     ):
         layout[name.replace("x", "xaxis").replace("y", "yaxis")] = {
-            **_axis(axis, plot, name[0]),
+            **_axis(axis, plot, name[0], chart.columns),
             "domain": [max(domain[0], 0.0), min(domain[1], 1.0)],
             "anchor": other,
         }
@@ -110,7 +112,7 @@ def _place(layout: dict[str, Any], plot: Plot, number: int, chart: Chart) -> Non
         })  # fmt: skip
 
 
-def _axis(axis: PlotAxis, plot: Plot, side: str) -> dict[str, Any]:
+def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]:
     title = {"text": _safe(axis.label), "standoff": 8, "font": {"size": 13}}
     out: dict[str, Any] = {"title": title, "automargin": True, "zeroline": False}
     if plot.sphere:
@@ -121,13 +123,17 @@ def _axis(axis: PlotAxis, plot: Plot, side: str) -> dict[str, Any]:
         positive = values[values > 0.0]
         if positive.size and positive.max() > DECADES * positive.min():
             out["dtick"] = 1  # labels at the decades; between them the digits alone are no numbers
+        elif len(ticks := log_ticks(float(positive.min()), float(positive.max())) if positive.size else []) > 1:
+            out |= {"tickvals": [value for value, _ in ticks], "ticktext": [text for _, text in ticks]}
     if axis.dates:
         out["type"] = "date"
         days = np.concatenate([trace.x for trace in plot.traces]) if plot.traces else np.zeros(0)
         if days.size and np.ptp(days) < NARROW_D:
             out["range"] = [DAY_MS * (float(days.min()) - NARROW_D), DAY_MS * (float(days.max()) + NARROW_D)]
     if axis.names:
-        out |= {"tickvals": list(range(len(axis.names))), "ticktext": [_cut(name) for name in axis.names]}
+        every = -(-len(axis.names) * columns // MOST_NAMES) if side == "x" else 1
+        places = list(range(0, len(axis.names), every))
+        out |= {"tickvals": places, "ticktext": [_cut(axis.names[k]) for k in places]}
     if axis.low is not None and axis.high is not None:
         out["range"] = [axis.low, axis.high]
     return out
@@ -163,7 +169,8 @@ def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) 
     if trace.style == "labels":
         return out | {
             "type": "scatter", "mode": "text", "text": [_safe(t) for t in trace.texts], "textfont": {"color": colour},
-            "hoverinfo": "skip",
+            "hoverinfo": "skip", "cliponaxis": False,
+            **({"textposition": [a if a != "center" else "middle center" for a in trace.anchors]} if trace.anchors else {}),
         }  # fmt: skip
     if trace.style == "line":
         line = {

@@ -136,8 +136,15 @@ def _density(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
 
 def _labels(place: Axes, trace: Trace, scale: ColourScale | None) -> None:
     del scale
-    for x, y, text in zip(trace.x, trace.y, trace.texts, strict=True):
-        place.annotate(text, (x, y), ha="center", va="center", fontsize=8.5, color=ROLES[trace.role])
+    anchors = trace.anchors or ("center",) * len(trace.texts)
+    for x, y, text, anchor in zip(trace.x, trace.y, trace.texts, anchors, strict=True):
+        up, side = anchor.split() if " " in anchor else ("", "center")
+        away = (2.0 * (side == "right") - 2.0 * (side == "left"), 2.0 * (up == "top") - 2.0 * (up == "bottom"))
+        place.annotate(
+            text, (x, y), away, textcoords="offset points", fontsize=8.5, color=ROLES[trace.role],
+            ha={"right": "left", "left": "right"}.get(side, "center"),
+            va={"top": "bottom", "bottom": "top"}.get(up, "center"),
+        )  # fmt: skip
 
 
 _DRAW = {

@@ -47,7 +47,7 @@ TEMPLATE = """\
 {% endif %}
 {% if risks %}<table>
 <tr><th>figure</th><th class="n">limit</th><th class="n">accepted up to<br><small>mean</small></th><th class="n">lot mean</th><th class="n">process σ</th><th class="n">u</th><th class="n">PFA, %</th><th class="n">PFR, %</th><th class="n">largest PFA of an accepted unit, %</th><th>unit</th></tr>
-{% for row in risks %}<tr><td>{{ row.title }}</td>{% for name in ["limit", "accept", "mean", "process", "u", "pfa", "pfr", "largest"] %}<td class="n">{{ row[name] }}</td>{% endfor %}<td>{{ row.unit_text }}</td></tr>{% endfor %}
+{% for row in risks %}<tr><td>{{ row.title }}</td>{% for name in ["limit", "accept", "mean", "process", "u", "pfa", "pfr", "largest"] %}<td class="n">{{ row[name] }}</td>{% endfor %}<td class="unit">{{ row.unit_text }}</td></tr>{% endfor %}
 </table>
 <p class="note">PFA, PFR: probability of false acceptance and false rejection over the production that the lot represents (JCGM 106, normal); –: fewer than three units.</p>{% endif %}
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from inertial.uncertainty.degrees import rounded
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
+from pipelines.stages.budget_rows import LABELS
 from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:
@@ -62,5 +64,13 @@ def _line(row: dict[str, Any]) -> dict[str, Any]:
         "k": f"{row['k']:.2f}",
         "expanded": expanded,
         "unit": row["unit_text"],
-        "largest": row["largest"],
+        "largest": without_nothing(row["largest"]),
     }
+
+
+_NOTHING = re.compile(f", (?:{'|'.join(map(re.escape, LABELS.values()))}) 0 %")
+
+
+def without_nothing(largest: str) -> str:
+    """The largest contributions as they are listed, without those that round to 0 %."""
+    return _NOTHING.sub("", largest)

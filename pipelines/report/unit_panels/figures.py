@@ -21,7 +21,7 @@ TEMPLATE = """\
 <tr><th>figure</th><th class="n">value</th><th class="n">± U <small>(k = {{ coverage }})</small></th><th class="n">limit</th><th class="n">margin</th><th>unit</th><th>result</th><th class="n">false decision, %</th></tr>
 {% for figure in figures %}
 <tr><td>{{ figure.title }}</td><td class="n">{{ figure.value }}</td><td class="n">{{ figure.uncertainty }}</td><td class="n">{{ figure.limit }}</td><td class="n">{{ figure.margin }}</td>
-<td>{{ figure.unit }}</td><td>{% if figure.outcome %}<span class="tag {{ figure.outcome.split(" ")[0] }}">{{ figure.outcome }}</span>{% else %}<small>no limit</small>{% endif %}</td><td class="n">{{ figure.risk }}</td></tr>
+<td class="unit">{{ figure.unit }}</td><td>{% if figure.outcome %}<span class="tag {{ figure.outcome.split(" ")[0] }}">{{ figure.outcome }}</span>{% else %}<small>no limit</small>{% endif %}</td><td class="n">{{ figure.risk }}</td></tr>
 {% endfor %}
 </table>
 <p class="note">False decision: probability that an accepted figure is beyond its limit (PFA), or one that is not accepted within it (PFR); JCGM 106, for this unit.</p>
@@ -36,6 +36,7 @@ def render(unit: UnitContext) -> str:
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
     value, expanded = with_uncertainty(row["value"], row["uncertainty"])
+    value = value if expanded else significant(row["value"])
     limited = bool(np.isfinite(row["limit"]))
     least = float(row.get("least", np.nan))
     if np.isfinite(least):

@@ -47,6 +47,10 @@ def fault_rows() -> list[dict[str, str]]:
     ]
 
 
+TIMES = ("at_s", "for_s")
+"""Keys of every order: start and duration."""
+
+
 def build_fault(order: FaultOrder, serials: Sequence[str]) -> Fault:
     """The fault that an order describes, for a lot of these serial numbers.
 
@@ -60,7 +64,7 @@ def build_fault(order: FaultOrder, serials: Sequence[str]) -> Fault:
     kind = known[order.kind]
     for name in order.figures:
         if name not in figures(kind):
-            close = did_you_mean(name, figures(kind)) if figures(kind) else "it has none"
+            close = did_you_mean(name, [*figures(kind), *TIMES])
             raise RecipeInvalid(f"fault {order.kind}: no figure '{name}'; {close}", key="faults")
     _check_target(order, kind, serials)
     fault = kind(**order.figures)
