@@ -1,5 +1,6 @@
 """Markers by folder, and the folder of real measurements."""
 
+import gc
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +25,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         parts = Path(item.path).relative_to(ROOT / "tests").parts
         if parts[0] in FOLDERS:
             item.add_marker(getattr(pytest.mark, parts[0]))
+
+
+def pytest_collection_finish() -> None:
+    """Leaves what the collection has made, which stays until the end, out of every later search for garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -203,22 +203,23 @@ class Covariance:
 
     def _made(self, place: int, index: list[int | None]) -> tuple[Array, float]:
         kernel = self._kernels[place]
-        there = kernel.there
+        there, whole = kernel.there, bool(kernel.there.all())
         covariance = np.diag(kernel.profile[there] ** 2)
         for i, wander in zip(index, self._wander or (), strict=True):
             if i is not None:
-                covariance += 10.0 ** (i / SHARE_STEP) * wander[place][np.ix_(there, there)]
+                own = wander[place] if whole else wander[place][np.ix_(there, there)]
+                covariance += 10.0 ** (i / SHARE_STEP) * own
         # of the transpose, which is in Fortran order: no copy
         upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
         if failed:
             raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
         logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
         inverse = _invert(upper, lower=0, overwrite_c=1)[0].T
-        if there.all():
+        if whole:
             return inverse, logdet
-        whole = np.zeros((there.size, there.size))
-        whole[np.ix_(there, there)] = inverse
-        return whole, logdet
+        filled = np.zeros((there.size, there.size))
+        filled[np.ix_(there, there)] = inverse
+        return filled, logdet
 
     def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""

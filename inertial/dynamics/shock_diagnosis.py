@@ -115,7 +115,7 @@ def fit_shock(record: ShockRecord, effects: Sequence[str], rows: Sequence[NDArra
         raise NotIdentified(msg)
     whole = np.concatenate(used)
     target = np.concatenate([one.unit / one.error for one in record.shocks])[whole]
-    model = _Design(record, effects, parameters)
+    model = Design(record, effects, parameters)
 
     def design(x: Array) -> Array:
         return model.at(x)[whole]
@@ -162,11 +162,11 @@ def predicted(record: ShockRecord, fit: ShockFit) -> float:
     parameters = [(name, p) for name in fit.effects for p in EFFECTS[name].parameters(record.duration_s)]
     x = np.array([np.log(fit.parameters[p.name][0]) if p.log else fit.parameters[p.name][0] for _, p in parameters])
     c = np.array([fit.sensitivity, *(value for value, _ in fit.coefficients.values())])
-    left = _residuals(record, _Design(record, fit.effects, parameters).at(x), c)
+    left = _residuals(record, Design(record, fit.effects, parameters).at(x), c)
     return _percent(record, left)
 
 
-class _Design:
+class Design:
     """Weighted design of all samples of all shocks, for values of the nonlinear parameters.
 
     A waveform passes the effects in their order: a change of one parameter changes it only from the effect of that parameter on,

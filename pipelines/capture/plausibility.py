@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from inertial.pointing import TURNED_AWAY, Pointing, contradicts
-from pipelines.tables.summaries import MEANS, summarised
+from pipelines.tables.summaries import unit_means
 from schemas.errors import OperatorNeeded, StationError
 from stations.safety.suspenders import Reason, Suspended
 
@@ -85,9 +85,8 @@ class Plausibility:
         """
         if samples.empty:  # all of a long record's samples are stored already
             return
-        summaries = summarised([samples], readings)
-        means = dict(zip(summaries["unit"], summaries[list(MEANS)].to_numpy(dtype=float), strict=True))
         first = readings.iloc[0]
-        text = contradicts(self.pointing.add(soak, (float(first["outer_deg"]), float(first["inner_deg"])), means))
+        angles = float(first["outer_deg"]), float(first["inner_deg"])
+        text = contradicts(self.pointing.add(soak, angles, unit_means(samples)))
         if text:
             raise OperatorNeeded(f"{TABLE}{text}")

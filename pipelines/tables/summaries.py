@@ -48,6 +48,12 @@ def summarised(samples: Iterable[pd.DataFrame], readings: pd.DataFrame, zero_out
     return pd.DataFrame(rows)
 
 
+def unit_means(table: pd.DataFrame) -> dict[str, Array]:
+    """The mean sample (3,) of each unit in one table of a record, the output's unit: the ``out_x`` … of :func:`summarised`."""
+    mean = table.groupby("unit", sort=True)[list(AXES)].mean()
+    return {str(unit): row for unit, row in zip(mean.index, mean.to_numpy(), strict=True)}
+
+
 def _of_record(
     record: int, tables: Iterator[pd.DataFrame], full: pd.Series, zero_output: float
 ) -> Iterator[dict[str, Any]]:

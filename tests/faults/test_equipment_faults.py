@@ -1,6 +1,8 @@
 """Trouble at test equipment ends repeated, refused, or as not determined, and never as a figure."""
 
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -55,6 +57,15 @@ def take(folder: Path, name: str, faults: list[FaultOrder], archive: str):
     return records
 
 
+@cache
+def undisturbed(name: str) -> tuple[float, set[int]]:
+    """When the first recording on the equipment begins, s, and the records, of a run without a fault; once per process."""
+    with TemporaryDirectory() as folder:
+        good = take(Path(folder), name, [], "good")
+        readings = good.gathered("readings")
+        return float(readings[readings["pose"] != "bias"]["start_s"].min()), good.finished()
+
+
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -76,14 +87,12 @@ def take(folder: Path, name: str, faults: list[FaultOrder], archive: str):
     ],
 )
 def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_path: Path) -> None:
-    good = take(tmp_path, name, [], "good")
-    readings = good.gathered("readings")
-    first = float(readings[readings["pose"] != "bias"]["start_s"].min())
+    first, finished = undisturbed(name)
     fault = FaultOrder(kind=kind, at_s=max(0.0, first - 0.2), for_s=0.6)
     again = take(tmp_path, name, [fault], "again")
     events = [event for event in again.events.recorded() if event.kind == "spoilt"]
     assert events
-    assert again.finished() == good.finished()
+    assert again.finished() == finished
     assert {"shock": "shock", "step_response": "step generator"}.get(name, "exciter") in events[0].reason
 
 

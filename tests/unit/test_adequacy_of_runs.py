@@ -73,6 +73,7 @@ CASES = [
 ]
 
 
+@pytest.mark.usefixtures("no_next_measurement")
 @pytest.mark.parametrize(("made", "adequate"), CASES, ids=lambda value: getattr(value, "__name__", str(value)))
 def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
     table = made()

@@ -5,6 +5,7 @@ import pytest
 
 from inertial.noise.allan import overlapping
 from inertial.noise.dwells import DwellNoise, dwell_covariance, whitener
+from inertial.noise.flicker import constants_of_means, summed
 from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset
 
@@ -61,3 +62,19 @@ def test_dwells_are_long_enough_when_white_noise_has_fallen_to_the_wander():
     noise = DwellNoise(1e-5, 1e-5)
     assert noise.white(noise.balanced()) == pytest.approx(noise.wander(noise.balanced()))
     assert DwellNoise(1e-5).balanced() == float("inf")
+
+
+@pytest.mark.parametrize("halves", [True, False])
+def test_flicker_of_means_is_the_sum_of_its_processes_whatever_their_ratio(halves, rng):
+    time = np.sort(rng.uniform(0.0, 3e4, 60))
+    gap, duration = np.abs(time[:, None] - time), 120.0
+    constants = constants_of_means(duration, 3e4) if halves else 3e4 * 3.0 ** -np.arange(9.0)
+    expected = np.zeros(gap.shape)
+    for tau in constants:
+        inside = 1.0 - np.exp(-duration / tau)
+        expected += (tau / duration * inside) ** 2 * np.exp(-np.maximum(gap - duration, 0.0) / tau)
+    shares = constants / duration
+    np.fill_diagonal(expected, np.sum(2.0 * shares * (1.0 - shares * (1.0 - np.exp(-1.0 / shares)))))
+    near = (gap > 0.0) & (gap <= 0.5 * duration)  # dwells that would overlap are one
+    made = summed(gap, constants, duration)
+    np.testing.assert_allclose(made[~near], expected[~near], rtol=1e-11)

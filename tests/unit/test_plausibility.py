@@ -6,7 +6,7 @@ import pytest
 
 from inertial.pointing import force_from_angles
 from pipelines.capture.plausibility import TURNED, Plausibility
-from pipelines.tables.summaries import MEANS, first_outlier, summarised
+from pipelines.tables.summaries import MEANS, first_outlier, summarised, unit_means
 from schemas.errors import OperatorNeeded
 
 ANGLES = [(outer, inner) for inner in (0.0, 40.0, -70.0) for outer in (-150.0, -90.0, -30.0, 30.0, 90.0, 150.0)]
@@ -75,3 +75,15 @@ def test_the_first_sample_that_cannot_be_the_unit_s_is_told_with_the_median():
     assert first_outlier(output[:19], 1.0, 1000.0) is None  # too few to say
     output[3, 2] = np.nan
     assert first_outlier(output, 1.0, 1000.0) is not None  # nothing can be said to lie inside
+
+
+@pytest.mark.parametrize("wild", [None, np.nan, np.inf])
+def test_the_means_of_the_check_of_the_table_are_those_of_validation(wild: float | None) -> None:
+    samples, readings = tables(ANGLES[3], record=4)
+    if wild is not None:
+        samples.loc[60, "y"] = wild
+    whole = summarised([samples], readings).set_index("unit")
+    means = unit_means(samples)
+    assert list(means) == list(UNITS)
+    for unit, mean in means.items():
+        np.testing.assert_array_equal(mean, whole.loc[unit, list(MEANS)].to_numpy(dtype=float))

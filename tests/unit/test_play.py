@@ -67,3 +67,12 @@ def test_small_pieces_and_empty_stores_change_no_number(monkeypatch: pytest.Monk
     monkeypatch.setattr(model, "_SPACES", 0)
     for one, other in zip(numbers(lot), whole, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("rows", [1, 3, 8, 9, 30])
+def test_a_recursion_of_few_signals_is_that_of_many(rows: int, rng: np.random.Generator) -> None:
+    keep, drive, start = rng.random(40), rng.normal(size=(rows, 40)), rng.normal(size=rows)
+    expected = [start]
+    for k in range(drive.shape[1]):
+        expected.append(keep[k] * expected[-1] + drive[:, k])
+    np.testing.assert_array_equal(operators.recursion(start, keep, drive), np.stack(expected, axis=1))

@@ -7,7 +7,7 @@ from scipy import signal
 from inertial.dynamics.centrifuge_diagnosis import diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS as SPIN_EFFECTS
 from inertial.dynamics.centrifuge_effects import Spins
-from inertial.dynamics.shock_diagnosis import ShockRecord, Waves, diagnose_shock, predicted
+from inertial.dynamics.shock_diagnosis import Design, ShockRecord, Waves, diagnose_shock, predicted
 from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
 
 FINE = 200e3
@@ -80,6 +80,18 @@ def test_shocks_in_one_direction_do_not_tell_an_ac_coupled_reference_from_a_zero
     assert "ac_coupled_reference" in both.classes[0].effects
     assert "zero_shift" not in both.classes[0].effects
     assert both.extended.parameters["coupling_s"][0] == pytest.approx(2.0, rel=0.1)
+
+
+def test_a_design_that_keeps_waveforms_is_that_of_a_new_one(rng) -> None:
+    record, effects = shock_of("filter_of_unit", 350.0, rng), ("delay", "filter_of_unit", "filter_of_reference")
+    parameters = [(name, p) for name in effects for p in SHOCK_EFFECTS[name].parameters(record.duration_s)]
+    kept = Design(record, effects, parameters)
+    start = np.array([1e-4, np.log(300.0), np.log(900.0)])
+    for k in (0, 1, 2, 1, 0, 2):  # one parameter after the other, and back
+        x = start.copy()
+        x[k] += 0.01
+        np.testing.assert_array_equal(kept.at(x), Design(record, effects, parameters).at(x))
+        np.testing.assert_array_equal(kept.at(start), Design(record, effects, parameters).at(start))
 
 
 def test_nothing_is_named_in_shocks_without_a_hidden_effect(rng) -> None:
