@@ -79,15 +79,22 @@ class WhitenedColumns:
     def _unit(self, columns: Array) -> Array:
         return columns / self._size_of(columns)[:, None, :]
 
+    def _plain(self) -> Array:
+        """Determined columns, of unit size, and the measurements behind them, (blocks, n, r + 1)."""
+        return np.concatenate([self._unit(self._determined), self.problem.y[..., None]], axis=-1)
+
+    @cached_property
+    def _stored(self) -> Array:
+        """The same, kept for all shares that are tried; not for large lots."""
+        return self._plain()
+
     def at(self, shares: Shares, *, keep: bool = False) -> Array:
         """Determined columns, of unit size, and the measurements behind them, whitened, (blocks, n, r + 1)."""
         kept = self._kept.get(shares)
         if kept is None:
             whiten = self.problem.covariance.whiten
             if self._before is None or self._further is None:
-                kept = whiten(
-                    np.concatenate([self._unit(self._determined), self.problem.y[..., None]], axis=-1), shares
-                )
+                kept = whiten(self._plain() if self.problem.y.size > LARGE else self._stored, shares)
             else:
                 own = self._before.at(shares, keep=True)
                 kept = np.concatenate([own[..., :-1], whiten(self._further, shares), own[..., -1:]], axis=-1)
