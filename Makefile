@@ -3,7 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 CRATE := $(VENV)/crate-validator
-WORKERS ?= auto
+# one more than processors: a fifth of a worker's time it waits for servers, watchdogs and browsers
+WORKERS ?= $(shell expr $$(nproc) + 1)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
