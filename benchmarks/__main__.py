@@ -22,6 +22,7 @@ BENCHMARKS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("throughput.py", ("--rounds", "5"), ("--rounds", "25")),
     ("plans.py", ("--units", "50", "--device", "adxl355"), ()),
     ("archive.py", ("--lots", "50", "--lots", "200"), ("--lots", "100", "--lots", "1000", "--lots", "10000")),
+    ("compaction.py", ("--lots", "50"), ("--lots", "1000")),
     ("refit.py", ("--units", "200"), ("--units", "1000", "--units", "10000")),
     ("investigate.py", ("--scene", "cubic on 18", "--scene", "pendulum on faces"), ("--seeds", "3", "--first", "31")),
     ("blind.py", ("--runs", "40"), ("--runs", "400", "--method", "tumbleline", "--method", "bic", "--method", "bonferroni",

@@ -110,8 +110,9 @@ class PackedPath(Base):
             names |= self._packed_names()
         yield from [self / name for name in names]
 
-    def glob(self, pattern: str, **options: Any) -> Generator[Any, None, None]:
+    def glob(self, pattern: str | os.PathLike[str], **options: Any) -> Generator[Any, None, None]:
         """What lies below and has such a name; with packs every part of the pattern is one level."""
+        pattern = str(pattern)  # from Python 3.13 on rglob gives a path
         if "**" in pattern or not self.known.contents():
             yield from super().glob(pattern, **options)
             return

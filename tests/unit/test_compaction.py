@@ -80,6 +80,9 @@ def test_every_reader_sees_the_same_files(archive: Archive) -> None:
     again = Archive(str(archive.root))
     assert logical(again) == before
     assert again.runs() == listed
+    assert list(again.root.glob(Path("runs/*/run.json"))) == list(
+        again.root.glob("runs/*/run.json")
+    )  # as rglob of Python 3.13
     assert [Ledger(again).events(serial) for serial in serials] == events
     assert all(events)
     run = again.run("latest")
