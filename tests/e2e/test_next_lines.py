@@ -134,7 +134,7 @@ def _imported(given: Given, folder: Path) -> tuple[int, str, str]:
     )
 
 
-CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_": _imported}
+CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_text": _imported}
 
 
 @pytest.mark.parametrize("module", CASES)
