@@ -16,11 +16,12 @@ from pipelines.cli.certificate_check import _needed  # pyright: ignore[reportPri
 from pipelines.cli.console import WordConsole
 from pipelines.cli.optimal import ERROR_HEADS, _error_lines  # pyright: ignore[reportPrivateUsage]
 from pipelines.cli.options import print_table, short
+from pipelines.diagnosis.model_history import _fall  # pyright: ignore[reportPrivateUsage]
 from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
 from pipelines.report.unit_panels.figures import _line  # pyright: ignore[reportPrivateUsage]
-from schemas.errors import DataRejected, RecipeInvalid
+from schemas.errors import DataRejected, RecipeInvalid, WrongUse
 from schemas.key_list import keys_of
 from schemas.limits import decide, parse_limits
 from schemas.reasons import PATTERNS
@@ -225,3 +226,22 @@ def test_the_tables_of_a_plan_are_not_continued_at_eighty_columns(
     assert sink.getvalue().count("coefficient") == 1
     assert "misalignment_temperature x KxzT, µg/(g·K)" in sink.getvalue()
     assert "bias x, µg/(g·K)" in sink.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("fall", "error", "text"),
+    [
+        (97.13, 2.8, "falls by 97.1 ± 5.6 (k = 2) µg"),
+        (-6.41, 0.7, "rises by 6.4 ± 1.4 (k = 2) µg"),
+        (123.4, None, "falls by 123 µg"),
+    ],
+)
+def test_the_fall_of_an_error_has_no_exponent(fall: float, error: float | None, text: str) -> None:
+    assert _fall({"fall_ug": fall, "fall_u_ug": error}) == f"the error {text}"
+
+
+def test_fit_of_a_file_names_the_command_for_it(tmp_path: Path) -> None:
+    (tmp_path / "dwells.csv").write_text(DWELL, encoding="utf-8")
+    result = CliRunner().invoke(app, ["fit", str(tmp_path / "dwells.csv")])
+    assert isinstance(result.exception, WrongUse)
+    assert f"tumbleline compare {tmp_path / 'dwells.csv'}" in str(result.exception)
