@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from schemas.bounds import LARGEST_TIME_S, Number, Text
 from schemas.errors import WrongUse
 from schemas.foreign import shown
+from schemas.reasons import reason_of
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -79,5 +80,5 @@ def parse_fault(text: str) -> FaultOrder:
 def _sentence(detail: ErrorDetails) -> str:
     """The error and its key, as a sentence."""
     where = ".".join(str(part) for part in detail["loc"] if part != "figures")
-    reason = detail["msg"].removeprefix("Value error, ")
+    reason = reason_of(detail)
     return f"{where}: {reason[:1].lower()}{reason[1:]}" if where else reason

@@ -22,9 +22,13 @@ FILES: dict[str, type[BaseModel]] = {"recipe": RecipeFile, "limits": Limits, "st
 STATED = re.compile(r"^(?:(?P<part>[a-z]+)_)?(?P<form>u|U|half_width)_(?P<unit>[a-zA-Z0-9_]+)$")
 FORMS = {
     "u": "Standard uncertainty",
-    "U": "Expanded uncertainty, with k",
-    "half_width": "Half-width, with distribution",
+    "U": "Expanded uncertainty",
+    "half_width": "Half-width",
 }
+BESIDE = {"u": "", "U": "; its factor is 'k'", "half_width": "; its shape is 'distribution'"}
+"""What a form of uncertainty refers to in the same table."""
+PARTS = {"inl": "integral nonlinearity"}
+"""Parts of an entry whose name in a key is no word."""
 UNITS = {
     "urad": "µrad", "arcsec": "″", "deg": "°", "ppm": "ppm", "percent": "%", "ug": "µg", "K": "K", "s": "s", "g": "g",
     "m_s2": "m/s²",
@@ -74,8 +78,8 @@ def meaning(model: type[BaseModel], name: str) -> str:
     match = STATED.match(name)
     if match is None or match["unit"] not in UNITS:
         return ""
-    part = f" of the {match['part']}" if match["part"] else ""
-    return f"{FORMS[match['form']]}{part}, {UNITS[match['unit']]}."
+    part = f" of the {PARTS.get(match['part'], match['part'])}" if match["part"] else ""
+    return f"{FORMS[match['form']]}{part}, {UNITS[match['unit']]}{BESIDE[match['form']]}."
 
 
 @cache

@@ -181,7 +181,7 @@ class Decision:
         unit = "" if self.unit == "1" else f" {self.unit}"
         spread = f" ± {float(f'{self.uncertainty:.2g}'):g}" if self.uncertainty > 0.0 else ""
         side = "at least " if self.least else ""
-        what = f"{self.value:.4g}{spread}{unit}, limit {side}{self.limit:.4g}{unit}"
+        what = f"{float(f'{self.value:.3g}'):g}{spread}{unit}, limit {side}{self.limit:.4g}{unit}"
         if self.outcome.startswith("conditional"):
             risk = f"probability of {'falling below' if self.least else 'exceeding'} it {100.0 * self.risk:.2g} %"
             beyond = "below" if self.least else "above"

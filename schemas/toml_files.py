@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
+from schemas.reasons import reason_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -93,7 +94,7 @@ def _is_branch(part: object) -> bool:
 def _sentence(detail: ErrorDetails, key: str) -> str:
     if detail["type"] == "missing":
         return f"key '{key}' is missing; add it"
-    reason = shown(detail["msg"].removeprefix("Value error, "), LONGEST_REASON)
+    reason = shown(reason_of(detail), LONGEST_REASON)
     if not key:
         return reason
     if isinstance(detail["input"], dict | list):

@@ -134,10 +134,9 @@ class Tab:
         whole = min(6000, self.page.evaluate("() => document.documentElement.scrollHeight"))
         self.page.set_viewport_size({"width": width, "height": max(whole, height)})
         self.ready()
+        self.page.mouse.move(0, 0)  # a figure that is pointed at has buttons
         time.sleep(0.4)
-        self.page.add_style_tag(
-            content=".command, .place, #errors code { visibility: hidden }"
-        )  # they name this machine
+        self.page.add_style_tag(content=".command, .place, #errors code { display: none }")  # they name this machine
         self.page.screenshot(path=str(folder / f"{name}.png"), clip=None if tall is None else clip(width, tall))
         self.page.set_viewport_size({"width": 1280, "height": 720})
 

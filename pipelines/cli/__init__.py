@@ -63,11 +63,24 @@ class _OnDemand(TyperCommand):
         attach(command)
         for one in (command, *getattr(command, "commands", {}).values()):
             one.help = flowing(one.help or "")
+            _name_arguments_once(one)
         command.epilog = _examples(getattr(module, "EXAMPLES", ()), getattr(module, "EPILOG", ()))
         of_subcommands: dict[str, tuple[str, ...]] = getattr(module, "EXAMPLES_OF", {})
         for name, examples in of_subcommands.items():
             getattr(command, "commands")[name].epilog = _examples(examples)  # noqa: B009 - a command without them has none
         return command
+
+
+def _name_arguments_once(command: Command) -> None:
+    """Make the usage line show arguments as the command states them, the optional ones in one pair of brackets.
+
+    typer puts braces around those that are needed, and brackets around names that have them.
+    """
+    for one in command.params:
+        stated = getattr(one, "metavar", None)
+        if stated and one.param_type_name == "argument":
+            shown_name = stated if one.required or stated.startswith("[") else f"[{stated}]"
+            setattr(one, "get_usage_pieces", lambda _context, name=shown_name: [name])  # noqa: B010 - a method of the class
 
 
 def flowing(text: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import typer
 
 from pipelines.cli.options import (
@@ -16,6 +18,7 @@ from pipelines.cli.options import (
     print_json,
 )
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 
 PART = "Old data, new models"
 ORDER = 510
@@ -47,6 +50,11 @@ def command(
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.jobs.job import job_of_run
 
+    if Path(run).is_file():
+        raise WrongUse(
+            f"fit: '{shown(run)}' is a file, a run of the archive is needed; 'tumbleline compare {shown(run)}' fits dwells in a "
+            "file, 'tumbleline import' brings a recording into the archive"
+        )
     store = Archive(archive)
     stored = store.run(run)
     if not stored.about.get("capture"):

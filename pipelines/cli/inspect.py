@@ -42,8 +42,9 @@ def command(
 ) -> None:
     """Show the content of a file and its probable meaning, with reasons: columns, units, rate, gaps, faults, static intervals.
 
-    Nothing is stored. The last line is the import command; values that the file does not state are in capitals. Exit status 1:
-    such values are missing.
+    Nothing is stored. The last line is the import command; values that the file does not state are in capitals. A table of
+    dwells in the exchange format needs no import: the last line is then 'tumbleline diagnose FILE'. Exit status 1: values are
+    missing, or the table cannot be used.
     """
     from pipelines.importers.inspection import inspect
 
@@ -80,7 +81,9 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
     from pipelines.report import recording
 
     if picture is not None and not recording.save_picture(inspection, picture):
-        raise WrongUse("inspect: no columns of acceleration were recognised, nothing can be drawn; leave out --picture")
+        raise WrongUse(
+            "inspect: no samples of acceleration over time were recognised, nothing can be drawn; leave out --picture"
+        )
     if page is not None:
         page.write_text(recording.page(inspection), encoding="utf-8")
 

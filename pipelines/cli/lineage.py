@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from inertial.counts import number_of
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
 
+if TYPE_CHECKING:
+    from rich.tree import Tree
+
 PART = "Certificates, trace, audit"
 ORDER = 430
 SUMMARY = "Show the origin of certificates, tables and samples, and the results made from them."
+LONGEST = 10_000
+"""Characters of a line in a pipe, which has no width."""
 EXAMPLES = (
     "tumbleline lineage latest",
     "tumbleline lineage SN1 --prov sn1.jsonld",
@@ -60,8 +65,20 @@ def command(
         print_json({**traced.document(), "prov": str(prov) if prov else None, "crate": str(crate) if crate else None})
         return
     if prov is None and crate is None:
-        console().print(tree_of(traced), soft_wrap=True)
+        _print(tree_of(traced))
     for what in ([f"PROV in {prov}"] if prov else []) + (
         [f"RO-Crate with {number_of(copied, 'file')} in {crate}"] if crate else []
     ):
         console().print(what, markup=False, soft_wrap=True)
+
+
+def _print(tree: Tree) -> None:
+    """Print a tree: its lines are continued below at a terminal, and as long as they need to be in a pipe."""
+    from pipelines.cli.console import limited
+
+    out = console()
+    if limited(out):
+        out.print(tree)
+    else:
+        out.width = LONGEST
+        out.print(tree, soft_wrap=True)

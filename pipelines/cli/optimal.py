@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 TOLERANCE = 1.1
 """Largest ratio to the textbook plan's errors for which the nearest recipe is written, without required errors in the options."""
+
+
+ERROR_HEADS = ("coefficient, unit", "error\n1σ", "required", "ratio", "given\n1σ")
 
 
 @dataclass(frozen=True)
@@ -207,8 +211,8 @@ def print_optimum(document: dict[str, Any]) -> None:
         lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
         print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)
     else:
-        heads = ["coefficient", "axis", "error, 1σ", "required", "ratio", f"{document['from']}, 1σ", "unit"]
-        print_table(heads, _error_lines(document["coefficients"]))
+        print_table(ERROR_HEADS, _error_lines(document["coefficients"]))
+        out.print(f"error: of the new recipe; given: of {document['from']}", style="dim", markup=False, soft_wrap=True)
     if document["seen_besides"]:
         out.print(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}", soft_wrap=True)
     out.print(f"Recipe file: {document['file']}", markup=False, soft_wrap=True)
@@ -249,15 +253,15 @@ def _comparison(document: dict[str, Any]) -> list[str]:
 
 
 def _error_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
+    count = Counter((r["effect"], r["axis"]) for r in rows)
+    several = {effect for (effect, _), number in count.items() if number > 1}
     return [
         [
-            f"{r['effect']} {r['name']}",
-            r["axis"],
+            f"{r['effect']} {r['axis']}{' ' + r['name'] if r['effect'] in several else ''}, {r['unit']}",
             short(r["uncertainty_ug"]),
             short(r["wanted_ug"]),
             f"{r['uncertainty_ug'] / r['wanted_ug']:.2f}",
             short(r["own_ug"]) or "–",
-            r["unit"],
         ]
         for r in rows
     ]

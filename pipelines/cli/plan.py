@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -340,6 +341,8 @@ def _draw(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
     """Write each picture to a file."""
     from pipelines.report.plan import pictures
 
+    with contextlib.suppress(OSError):  # what is wrong with the folder is said where a picture cannot be written to it
+        folder.mkdir(parents=True, exist_ok=True)
     for name, text in pictures(document, context).items():
         if text:
             _save(folder / f"{document['recipe']}-{name}.svg", text)

@@ -26,7 +26,7 @@ def print_plan(document: dict[str, Any]) -> None:
         f"error of a dwell (1σ): {short(error['together'])} µg; white {short(error['white'])}, wander {short(error['wander'])}"
         f"{_longer(document['dwell_s'])}"
     )
-    print_table(["coefficient", "error x, 1σ", "y", "z", "unit"], _coefficient_lines(document["coefficients"]))
+    print_table(["coefficient, unit", "error x, 1σ", "y", "z"], _coefficient_lines(document["coefficients"]))
     if document["bias"] is not None:
         bias = document["bias"]
         again = (
@@ -39,9 +39,11 @@ def print_plan(document: dict[str, Any]) -> None:
     print_reach(document.get("uncertainty"))
     seen = [row for row in document["effects"] if row["seen"]]
     print_table(
-        ["visible effect", "v", "1/v²", "floor, µg", "coefficient", "unit", "confounded with"],
-        [_visible_line(row) for row in seen],
+        ["visible effect", "v", "1/v²", "floor, µg", "floor of the coefficient"], [_visible_line(row) for row in seen]
     )
+    alike = [[row["effect"], _aliases(row)] for row in seen if row["alias"]]
+    if alike:
+        print_table(["visible effect", "confounded with"], alike)
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
         names = ", ".join(faint)
@@ -92,7 +94,7 @@ def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
         place = count.get((row["effect"], row["axis"]), 0)
         count[row["effect"], row["axis"]] = place + 1
         key = (row["effect"], place if row["axis"] != "*" else 100 + place)
-        line = lines.setdefault(key, [row["effect"] if place == 0 else "", "", "", "", row["unit"]])
+        line = lines.setdefault(key, [f"{row['effect']}, {row['unit']}", "", "", ""])
         line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
     return list(lines.values())
 
@@ -102,9 +104,9 @@ def _visible_line(row: dict[str, Any]) -> list[str]:
 
     size = short(row["floor_size_ug"]) + (" *" if row["faint"] else "")
     v, inflation = short(row["left"]), short(row["variance_inflation"])
-    return [row["effect"], v, inflation, size, scientific(row["floor_ug"], short), row["floor_unit"], _aliases(row)]
+    return [row["effect"], v, inflation, size, f"{scientific(row['floor_ug'], short)} {row['floor_unit']}"]
 
 
 def _aliases(row: dict[str, Any]) -> str:
     exact = set(row["alias_exact"])
-    return ", ".join(f"={name}" if name in exact else name for name in row["alias"]) or "–"
+    return ", ".join(f"={name}" if name in exact else name for name in row["alias"])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
+from pipelines.procedures.wording import with_uncertainty
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -99,5 +101,5 @@ def _fall(progress: dict[str, Any]) -> str:
     fall, error = progress["fall_ug"], progress["fall_u_ug"]
     if fall is None:
         return "the error cannot be judged on dwells left out"
-    wide = "" if error is None else f" ± {2.0 * error:.2g} (k = 2)"
-    return f"the error falls by {fall:.2g}{wide} µg" if fall >= 0.0 else f"the error rises by {-fall:.2g}{wide} µg"
+    size = f"{float(f'{abs(fall):.3g}'):g}" if error is None else f"{with_uncertainty(abs(fall), 2.0 * error)} (k = 2)"
+    return f"the error {'falls' if fall >= 0.0 else 'rises'} by {size} µg"

@@ -25,7 +25,7 @@ TESTED = "3.11"
 LOCK = "requirements-run.lock"
 PIN = re.compile(r"^([\w.-]+)(?:\[[\w, -]+\])?==([^\s;\\]+)", re.MULTILINE)
 SHOWN = 5
-DEVELOPMENT = {"build", "dev", "bench"}  # extras of those who change the product, not of those who use it
+DEVELOPMENT = {"build", "dev", "bench", "docs"}  # extras of those who change the product, not of those who use it
 
 
 class Needed(NamedTuple):
@@ -128,7 +128,7 @@ def _pinned() -> Check:
 
 
 def _optional() -> Check:
-    """Extras whose libraries are installed, and those whose libraries are not."""
+    """Extras whose libraries are installed, and those whose libraries are not: formats of recordings, certificates as PDF."""
     declared = [Requirement(one) for one in metadata.requires(PRODUCT) or ()]
     have: list[str] = []
     lack: list[str] = []
@@ -145,14 +145,12 @@ def _optional() -> Check:
             (have if all(_is_installed(one.name) for one in own) else lack).append(extra)
     if not have and not lack:
         remedy = "install the product again, so that its metadata are those of its code"
-        return Check(
-            PART, "optional formats", "warning", "the metadata name none", "the extras of this version", remedy
-        )
+        return Check(PART, "optional parts", "warning", "the metadata name none", "the extras of this version", remedy)
     found = f"installed: {', '.join(have) or 'none'}; not installed: {', '.join(lack) or 'none'}"
     if not lack:
-        return Check(PART, "optional formats", "good", found)
-    remedy = f"where such files are read, run: pip install '{PRODUCT}[{','.join(lack)}]'"
-    return Check(PART, "optional formats", "not configured", found, "", remedy)
+        return Check(PART, "optional parts", "good", found)
+    remedy = f"where they are used, run: pip install '{PRODUCT}[{','.join(lack)}]'"
+    return Check(PART, "optional parts", "not configured", found, "", remedy)
 
 
 def _is_installed(name: str) -> bool:

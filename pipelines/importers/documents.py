@@ -62,7 +62,9 @@ class InspectDocument(TypedDict):
     faults: list[SampleFaultDocument]
     intervals: list[IntervalDocument]
     open: Annotated[list[str], "values that the file does not state and the command lacks"]
-    command: Annotated[str, "the proposed import command"]
+    command: Annotated[
+        str, "the proposed command: `import`, or `diagnose` for a table of dwells in the exchange format"
+    ]
 
 
 class TransferParameter(TypedDict):

@@ -11,10 +11,17 @@ import numpy as np
 
 from inertial import change_of_level, record_faults, static_intervals
 from pipelines.importers import clocks, files, sample_faults, sources, unit_check, values
+from pipelines.importers.exchange_inspection import (
+    command_of_dwells,
+    content_of_dwells,
+    guesses_of_dwells,
+    problems_of_dwells,
+)
 from pipelines.importers.guesses import Guesses, guesses, measurable
 from pipelines.importers.mapping import TIME_UNITS
 from pipelines.importers.record_time import GAP
 from pipelines.importers.stated_units import TEMPERATURE
+from pipelines.tables.dwell_columns import is_exchange
 from schemas.units import AXES
 
 if TYPE_CHECKING:
@@ -50,6 +57,8 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
     first, _ = files.read_content(paths[0], group)
     time_name = guesses(first).column("time") if len(paths) > 1 else ""
     content, source, _ = sources.read(paths, join=join, time=time_name, group=group)
+    if len(paths) == 1 and is_exchange(content.table.columns):
+        return Inspection(_of_dwells(paths[0], content, source.form), None, None)
     guessed = guesses(content)
     time, gaps, open_ = _time(content, guessed)
     output = _output(content, guessed)
@@ -104,6 +113,29 @@ def inspect(paths: Sequence[Path], *, join: str = "", group: str = "") -> Inspec
         ),
     }
     return Inspection(document, own, kept)
+
+
+def _of_dwells(path: Path, content: Content, form: str) -> InspectDocument:
+    """The document about a table of dwells in the exchange format."""
+    guessed = guesses_of_dwells(content.table)
+    return {
+        "files": [str(path)],
+        "form": form,
+        "rows": len(content.table),
+        "columns": [{**one, "resolution": None, "clipped": 0} for one in _columns(content, guessed)],
+        "remarks": [*content.remarks, content_of_dwells(content.table)],
+        "time_unit": guessed.time_unit.meaning,
+        "time_reason": guessed.time_unit.reason,
+        "output_unit": guessed.output.meaning,
+        "output_reason": guessed.output.reason,
+        "rate_hz": None,
+        "duration_s": None,
+        "gaps": 0,
+        "faults": [],
+        "intervals": [],
+        "open": problems_of_dwells(path),
+        "command": command_of_dwells(path),
+    }
 
 
 def _time(content: Content, guessed: Guesses) -> tuple[NDArray[np.float64] | None, int, list[str]]:

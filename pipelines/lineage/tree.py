@@ -92,7 +92,7 @@ class _Drawer:
         records = {name.split("/")[2] for name in names}
         words = f"raw samples  {len(records)} records of capture {names[0].split('/')[1]}, {len(names)} files"
         known = bool(steps) and all(step.id in self.shown for step in steps)
-        rest = ABOVE if known else f"  ({first.file} {first.sha256[:SHORT]} …)"
+        rest = ABOVE if known else f"  ({'/'.join(names[0].split('/')[2:])} {first.sha256[:SHORT]} …)"
         own = branch.add(Text(words, style=STYLES["samples"]).append(rest, style="dim"))
         for step in steps:
             self._step(own, step)

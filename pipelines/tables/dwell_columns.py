@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, SPREAD_COLUMNS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 REQUIRED = ("unit", "dwell", "time_s", "out_x", "out_y", "out_z")
 
@@ -17,3 +22,8 @@ DEVIATIONS = SPREAD_COLUMNS
 
 
 KNOWN = KNOWN_COLUMNS
+
+
+def is_exchange(names: Iterable[object]) -> bool:
+    """Whether columns are those of a table of dwells in the exchange format."""
+    return set(REQUIRED) <= {str(name) for name in names}

@@ -12,6 +12,7 @@ from urllib.parse import urlencode
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from schemas.foreign import shown
+from schemas.reasons import reason_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -47,7 +48,7 @@ class PageState(BaseModel):
                     if name in values:
                         given = shown(str(error["input"]), 60)
                         problems.append(
-                            f"address: {name} = {given} cannot be used ({error['msg'].lower()}); it is ignored"
+                            f"address: {name} = {given} cannot be used ({reason_of(error).lower()}); it is ignored"
                         )
                         del values[name]
 

@@ -48,7 +48,7 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         one.press("text=as the fresh measurement")
         one.sees("[data-version='1']")
         assert one.page.locator("a[data-add=third_order]").first.inner_text() == "Add third_order"
-        one.shot(pictures, "workbench-before", tall=1180)
+        one.shot(pictures, "workbench-before", tall=1340)
         one.press("[data-add='third_order']")
         one.sees("[data-version='2']")
         one.ready()

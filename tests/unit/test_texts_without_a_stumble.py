@@ -1,5 +1,7 @@
 """Texts that a newcomer met and could not use: what they say now, and how numbers are written in them."""
 
+import io
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -11,11 +13,20 @@ from inertial.planning.ranges import UnseenRange
 from pipelines.certificate_document.file_check import Check, CheckedFile
 from pipelines.cli import app, flowing
 from pipelines.cli.certificate_check import _needed  # pyright: ignore[reportPrivateUsage]
+from pipelines.cli.console import WordConsole
+from pipelines.cli.optimal import ERROR_HEADS, _error_lines  # pyright: ignore[reportPrivateUsage]
+from pipelines.cli.options import print_table, short
+from pipelines.diagnosis.model_history import _fall  # pyright: ignore[reportPrivateUsage]
 from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
-from schemas.errors import DataRejected, RecipeInvalid
+from pipelines.report.unit_panels.figures import _line  # pyright: ignore[reportPrivateUsage]
+from schemas.errors import DataRejected, RecipeInvalid, WrongUse
+from schemas.key_list import keys_of
+from schemas.limits import decide, parse_limits
+from schemas.reasons import PATTERNS
 from schemas.recipe import FaultOrder
+from schemas.station import StationConfig
 from stations.plant.faults.catalogue import build_fault
 
 RECIPE = """name = "hot"
@@ -112,3 +123,125 @@ def test_a_sample_recipe_that_is_not_here_is_named_with_its_path() -> None:
     with pytest.raises(RecipeInvalid) as end:
         load_recipe("line-seven.toml")
     assert "sample" not in str(end.value)
+
+
+DWELL = "unit,dwell,time_s,force_x,force_y,force_z,out_x,out_y,out_z,humidity_pct\n"
+
+
+def inspected(folder: Path, text: str) -> tuple[int, str]:
+    (folder / "my dwells.csv").write_text(DWELL + text, encoding="utf-8")
+    result = CliRunner().invoke(app, ["inspect", str(folder / "my dwells.csv")], env={"COLUMNS": "200"})
+    return result.exit_code, result.stdout
+
+
+def test_inspect_sends_dwells_in_the_exchange_format_to_diagnose(tmp_path: Path) -> None:
+    status, text = inspected(tmp_path, "A1,0,0,0,0,1,0.01,0.02,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n")
+    assert status == 0
+    assert text.splitlines()[-1] == f"tumbleline diagnose '{tmp_path / 'my dwells.csv'}'"
+    assert "1 unit, 2 dwells; reference: the force on each axis" in text
+    assert {"reference", "covariate"} <= set(text.split())
+    assert "--map" not in text
+
+
+def test_inspect_says_why_dwells_in_the_exchange_format_cannot_be_used(tmp_path: Path) -> None:
+    status, text = inspected(tmp_path, "A1,0,0,0,0,1,0.01,oops,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n")
+    assert status == 1
+    assert "column out_y: found oops, a finite number is needed" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "usage"),
+    [
+        (["run"], "run [OPTIONS] [RECIPE]"),
+        (["diagnose"], "diagnose [OPTIONS] DWELLS"),
+        (["inspect"], "inspect [OPTIONS] FILE…"),
+        (["show"], "show [OPTIONS] [RUN|UNIT] [TABLE]"),
+        (["plan", "optimise"], "plan optimise [OPTIONS] [RECIPE]"),
+    ],
+    ids=" ".join,
+)
+def test_arguments_of_a_usage_line_have_one_pair_of_brackets(words: list[str], usage: str) -> None:
+    line = next(line for line in CliRunner().invoke(app, [*words, "--help"]).stdout.splitlines() if "Usage" in line)
+    assert line.strip().removeprefix("Usage: ").split(" ", 1)[1] == usage
+
+
+def test_a_name_that_is_refused_says_what_is_needed_in_words(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text(
+        RECIPE.replace('"hot"', '"my recipe"').replace("TEMPERATURES", "25.0"), encoding="utf-8"
+    )
+    with pytest.raises(RecipeInvalid, match="found 'my recipe'") as refused:
+        load_recipe(str(tmp_path / "bad.toml"))
+    assert str(refused.value).endswith("small letters a to z, digits and . _ - are needed, a letter or digit first")
+
+
+def test_every_pattern_of_a_schema_is_explained_in_words() -> None:
+    root = Path(__file__).resolve().parents[2]
+    rooms = (root / "schemas", root / "pipelines", root / "stations")
+    text = "".join(path.read_text(encoding="utf-8") for room in rooms for path in room.rglob("*.py"))
+    stated = re.findall(r'[(\s]pattern=r"(.*?)"[,)]', text)
+    assert len(stated) > 10
+    assert set(stated) <= set(PATTERNS)
+
+
+def test_the_key_of_an_expanded_uncertainty_is_explained_in_words() -> None:
+    meanings = {key.name: key.meaning for key in keys_of(StationConfig)}
+    assert meanings["offset_U_ug"] == "Expanded uncertainty of the offset, µg; its factor is 'k'."
+    assert meanings["inl_half_width_ug"].startswith("Half-width of the integral nonlinearity, µg; its shape is")
+
+
+def test_report_and_reason_give_the_digits_of_the_summary() -> None:
+    row = {
+        "figure": "bias_error_ug", "value": 473.64, "uncertainty": 490.2, "limit": 1000.0, "unit_text": "µg", "outcome": "pass",
+    }  # fmt: skip
+    line = _line(row)
+    assert (line["value"], line["uncertainty"]) == (short(473.64), "490") == ("474", "490")
+    limits = parse_limits(
+        'name = "own"\ngrade = "consumer"\n[figures.bias_error_ug]\nmax = 500.0\nunit = "µg"\n',
+        "limits",
+        {"bias_error_ug": "µg"},
+    )
+    assert "846 ± 490 µg, limit 500 µg" in decide(limits, "bias_error_ug", 845.7, 245.1).sentence
+
+
+def test_the_tables_of_a_plan_are_not_continued_at_eighty_columns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NO_COLOR", "1")
+    text = CliRunner().invoke(app, ["plan"], env={"COLUMNS": "80"}).stdout
+    heads = [line.split() for line in text.splitlines() if line.startswith("  visible effect ")]
+    assert heads == [
+        ["visible", "effect", "v", "1/v²", "floor,", "µg", "coefficient"],
+        ["visible", "effect", "confounded", "with"],
+    ]
+    assert text.count("coefficient, unit") == 1
+    assert "scale_temperature_quadratic, µg/(g·K²)" in text
+    assert re.search(r"thermal_rate .* µg/\(K/min\)", text)
+    sink = io.StringIO()
+    out = WordConsole(file=sink, width=80, force_terminal=True, color_system=None)
+    row = {"effect": "misalignment_temperature", "name": "KxyT", "axis": "x", "unit": "µg/(g·K)"}
+    errors = {"uncertainty_ug": 0.0518, "wanted_ug": 0.0654, "own_ug": 1060.0}
+    lines = _error_lines([{**row, **errors}, {**row, **errors, "name": "KxzT"}, {**row, **errors, "effect": "bias"}])
+    print_table(ERROR_HEADS, lines, out=out)
+    assert sink.getvalue().count("coefficient") == 1
+    assert "misalignment_temperature x KxzT, µg/(g·K)" in sink.getvalue()
+    assert "bias x, µg/(g·K)" in sink.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("fall", "error", "text"),
+    [
+        (97.13, 2.8, "falls by 97.1 ± 5.6 (k = 2) µg"),
+        (-6.41, 0.7, "rises by 6.4 ± 1.4 (k = 2) µg"),
+        (123.4, None, "falls by 123 µg"),
+    ],
+)
+def test_the_fall_of_an_error_has_no_exponent(fall: float, error: float | None, text: str) -> None:
+    assert _fall({"fall_ug": fall, "fall_u_ug": error}) == f"the error {text}"
+
+
+def test_fit_of_a_file_names_the_command_for_it(tmp_path: Path) -> None:
+    (tmp_path / "dwells.csv").write_text(DWELL, encoding="utf-8")
+    result = CliRunner().invoke(app, ["fit", str(tmp_path / "dwells.csv")])
+    assert isinstance(result.exception, WrongUse)
+    assert f"tumbleline compare {tmp_path / 'dwells.csv'}" in str(result.exception)

@@ -1,4 +1,4 @@
-"""Figures of merit of a unit against their limits."""
+"""Figures of merit of a unit against their limits: three digits, as everywhere that a run is shown, and U to two."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipelines.report.numbers import significant, with_uncertainty
+from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
@@ -35,8 +35,7 @@ def render(unit: UnitContext) -> str:
 
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:
-    value, expanded = with_uncertainty(row["value"], row["uncertainty"])
-    value = value if expanded else significant(row["value"])
+    value, expanded = significant(row["value"]), significant(row["uncertainty"], 2) if row["uncertainty"] > 0.0 else ""
     limited = bool(np.isfinite(row["limit"]))
     least = float(row.get("least", np.nan))
     if np.isfinite(least):

@@ -10,6 +10,7 @@ from starlette.responses import Response
 
 from pipelines.audit.calibrations import day_of
 from pipelines.certificates import Ledger
+from pipelines.report.numbers import with_uncertainty
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import figure, page, page_part, part_of, run_table, state_of, table_csv, workbench_of
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 router = APIRouter()
 CERTIFICATES = 20
+COVERAGE = 2.0
+"""Coverage factor of the coefficients, and of figures whose run names none."""
 
 
 @router.get("/unit")
@@ -57,6 +60,7 @@ def unit(request: Request) -> Response:
         request, "unit.html", state, problems, run=run, grade=grade, own=own, tables=tables, units=units,
         before=units[place - 1] if place else "", after=units[place + 1] if place + 1 < len(units) else "",
         coefficients=_by_axis(own.get("coefficients", [])), parameters=parameters,
+        coverage=float((run.about.get("limits") or {}).get("coverage_factor", COVERAGE)),
         labels={name: kind.label for name, kind in FIGURES.items()},
         certificates=Ledger(bench.archive).calibrations(state.unit)[-CERTIFICATES:][::-1],
     )  # fmt: skip
@@ -112,7 +116,7 @@ def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
 
 
 def _by_axis(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One line per effect, its axes side by side."""
+    """One line per effect, its axes side by side: value and expanded uncertainty as texts."""
     lines: dict[tuple[str, int], dict[str, Any]] = {}
     count: dict[tuple[str, str], int] = {}
     for row in rows:
@@ -120,9 +124,7 @@ def _by_axis(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         place = count.get((effect, axis), 0)
         count[effect, axis] = place + 1
         line = lines.setdefault((effect, place), {"effect": effect, "unit": row["unit_text"], "cells": {}})
-        line["cells"]["x" if axis == "*" else axis] = (
-            row["name"],
-            float(row["value"]),
-            2.0 * float(row["standard_error"]),
+        line["cells"]["x" if axis == "*" else axis] = with_uncertainty(
+            float(row["value"]), COVERAGE * float(row["standard_error"])
         )
     return list(lines.values())

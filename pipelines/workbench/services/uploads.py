@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.tables.dwell_columns import REQUIRED
+from pipelines.tables.dwell_columns import is_exchange
 from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected, TumblelineError, WrongUse
 
@@ -104,7 +104,7 @@ def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
     offered = _offered(names)
     plain = UploadReading(
         file=page.file, rows=len(table), columns=names, head=_head(table), offered=offered,
-        is_exchange=set(REQUIRED) <= set(names),
+        is_exchange=is_exchange(names),
     )  # fmt: skip
     if not page.columns or not page.output:
         return plain
