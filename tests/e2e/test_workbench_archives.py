@@ -84,7 +84,8 @@ def test_a_finding_of_the_audit_leads_to_the_values_that_it_is_drawn_from(bench:
             bench.address + str(opened.locator("a:text-is('CSV')").get_attribute("href"))
         ).text()
         subject = str(name).split(".")[1]
-        points = "plot => (plot._fullData ?? []).reduce((n, t) => n + t.x.length, 0)"  # none while the page draws it again
+        # a chart that the page draws again has no points for a moment
+        points = "plot => (plot._fullData ?? []).reduce((n, t) => n + t.x.length, 0)"
         until(lambda: opened.locator("[data-drawn]").evaluate(points) >= 2, "the points of the evidence are drawn")
         assert len(numbers.splitlines()) > 2
         assert subject in main_text(one)
