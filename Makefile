@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 CRATE := $(VENV)/crate-validator
-# one more than processors: a fifth of a worker's time it waits for servers, watchdogs and browsers
+# one more than processors: a worker waits a fifth of its time, for servers, watchdogs and browsers
 WORKERS ?= $(shell expr $$(nproc) + 1)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1

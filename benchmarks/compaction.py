@@ -26,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.archive import UNTIL, prepared  # noqa: E402 - run as a script from any folder
+from benchmarks.family_memory import family_bytes  # noqa: E402
 from pipelines.archive import Archive, Run  # noqa: E402
 
 MB = 2.0**20
@@ -53,7 +54,7 @@ def spent(*arguments: str) -> Spent:
             reader = threading.Thread(target=lambda: lines.extend(process.stderr or ()))
             reader.start()
             while process.poll() is None:
-                most = max(most, sum(_resident(pid) for pid in _family(process.pid)))
+                most = max(most, family_bytes(process.pid))
                 time.sleep(POLL_S)
             reader.join()
         if process.returncode not in {0, 1}:
@@ -63,21 +64,6 @@ def spent(*arguments: str) -> Spent:
     seconds, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return Spent(seconds, processor, 512.0 * (after.ru_inblock - before.ru_inblock), most, text)
-
-
-def _family(pid: int) -> list[int]:
-    try:
-        children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
-    except OSError:
-        return []
-    return [pid, *(one for child in children for one in _family(int(child)))]
-
-
-def _resident(pid: int) -> float:
-    try:
-        return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]) * float(os.sysconf("SC_PAGESIZE"))
-    except (OSError, IndexError):
-        return 0.0
 
 
 def seal_all(folder: Path) -> None:

@@ -28,6 +28,7 @@ sys.path.insert(0, str(ROOT))
 
 import numpy as np  # noqa: E402
 
+from benchmarks.family_memory import family_bytes  # noqa: E402
 from inertial.fits.linear import fit_lot  # noqa: E402
 from pipelines.archive import Archive, Run  # noqa: E402
 from pipelines.jobs.model_change import ModelChange, change_from_options  # noqa: E402
@@ -81,25 +82,7 @@ class Memory:
 
     def _watch(self) -> None:
         while not self._stop.wait(POLL_S):
-            self.most = max(self.most, sum(_resident(pid) for pid in _family(os.getpid())))
-
-
-def _family(pid: int) -> list[int]:
-    """A process and all its descendants."""
-    try:
-        children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
-    except OSError:
-        return []
-    return [pid, *(one for child in children for one in _family(int(child)))]
-
-
-def _resident(pid: int) -> float:
-    """Resident memory of a process, MB; shared pages count for each process."""
-    try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
-    except (OSError, IndexError):
-        return 0.0
-    return pages * resource.getpagesize() / MB / MB
+            self.most = max(self.most, family_bytes(os.getpid()) / MB / MB)
 
 
 def used() -> float:

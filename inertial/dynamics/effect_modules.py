@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-Found = TypeVar("Found")
+AnyEffect = TypeVar("AnyEffect")
 
 
 class IncompleteEffect(Exception):
     """A module without exactly one effect of its own name; its author must correct it."""
 
 
-def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str, Found]:
+def effects_of(package: str, path: Iterable[str], base: type[AnyEffect]) -> dict[str, AnyEffect]:
     """One effect of each module of a package, by name.
 
     Raises
@@ -25,7 +25,7 @@ def effects_of(package: str, path: Iterable[str], base: type[Found]) -> dict[str
     IncompleteEffect
         A module does not define exactly one effect with its own name.
     """
-    effects: dict[str, Found] = {}
+    effects: dict[str, AnyEffect] = {}
     for info in iter_modules(list(path)):
         if info.name == "base":
             continue

@@ -19,7 +19,7 @@ from pipelines.archive import files, packs
 from pipelines.archive.capture_journal import is_number
 from pipelines.archive.locks import LOCK, alone
 from pipelines.archive.pack_merging import merge_packs, remove_replaced
-from pipelines.archive.pack_writing import LARGEST, Found, write_pack
+from pipelines.archive.pack_writing import LARGEST, FolderToPack, write_pack
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import START
 from pipelines.archive.run_files import SEALED
@@ -171,7 +171,7 @@ def _ledger(root: Path) -> list[str]:
     return sorted(f"{LEDGER}/{shard.name}/{unit}" for shard in top.glob("??") for unit in os.listdir(shard))  # noqa: PTH208 - names
 
 
-def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Found]:
+def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[FolderToPack]:
     """The folders with files that no pack has as they are; files of killed writers, locks and young events are left out."""
     latest = time.time_ns() - int(LEAST_AGE_S * 1e9)
     for name in names:
@@ -181,7 +181,7 @@ def _new(root: Path, known: packs.Packs, names: Iterable[str]) -> Iterator[Found
             single = {one: at for one, at in single.items() if at[1] < latest and is_number(one.removesuffix(".json"))}
         new = {one: at for one, at in single.items() if there is None or not _is_packed(there, one, at)}
         if new:
-            yield Found(name, (root / name).stat().st_mtime_ns, new)
+            yield FolderToPack(name, (root / name).stat().st_mtime_ns, new)
 
 
 def _is_packed(folder: packs.PackedFolder, name: str, at: tuple[int, int]) -> bool:
@@ -206,9 +206,9 @@ def _has_single(folder: Path) -> bool:
     return folder.is_dir() and any(True for _ in _single(folder))
 
 
-def _pack(root: Path, what: str, folders: Iterable[Found], done: Compacted) -> None:
+def _pack(root: Path, what: str, folders: Iterable[FolderToPack], done: Compacted) -> None:
     """Write packs of the folders, each up to :data:`LARGEST` bytes."""
-    portion, size = list[Found](), 0
+    portion, size = list[FolderToPack](), 0
     for one in folders:
         portion.append(one)
         size += one.bytes
@@ -219,7 +219,7 @@ def _pack(root: Path, what: str, folders: Iterable[Found], done: Compacted) -> N
         _write(root, what, portion, done)
 
 
-def _write(root: Path, what: str, portion: Sequence[Found], done: Compacted) -> None:
+def _write(root: Path, what: str, portion: Sequence[FolderToPack], done: Compacted) -> None:
     """One pack of single files."""
     done.packs.append(write_pack(root, what, portion, lambda folder, name: (root / folder / name).read_bytes()))
     done.packed += sum(len(one.files) for one in portion)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.archive import derived, files, packs
 from pipelines.archive.hash_chain import is_number
-from pipelines.archive.pack_writing import LARGEST, Found, write_pack
+from pipelines.archive.pack_writing import LARGEST, FolderToPack, write_pack
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
@@ -75,13 +75,15 @@ def _merged(root: Path, what: str, own: Sequence[Path]) -> str:
         for name, folder in one.folders():
             names[name] = max(names.get(name, 0), folder.mtime_ns)
     held: dict[tuple[str, str], packs.Member] = {}
-    portion = list[Found]()
+    portion = list[FolderToPack]()
     for name, mtime_ns in names.items():
         current = known.folder(name)
         inside = {} if current is None else {file: one for file, one in current.files.items() if one.pack in own}
         held |= {(name, file): one for file, one in inside.items()}
         if inside:
-            portion.append(Found(name, mtime_ns, {file: (one.size, one.mtime_ns) for file, one in inside.items()}))
+            portion.append(
+                FolderToPack(name, mtime_ns, {file: (one.size, one.mtime_ns) for file, one in inside.items()})
+            )
     if not portion:
         return ""
     replaced = [place.name for place in own]

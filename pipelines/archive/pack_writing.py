@@ -21,7 +21,7 @@ LARGEST = 2**30  # bytes of one pack: more begins the next, so that a killed com
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date of a zip; equal files give equal packs
 
 
-class Found(NamedTuple):
+class FolderToPack(NamedTuple):
     """A folder to pack: its name below the root, time of its last change, and its files with size and time each."""
 
     name: str
@@ -34,7 +34,9 @@ class Found(NamedTuple):
         return sum(length for length, _ in self.files.values())
 
 
-def write_pack(root: Path, what: str, portion: Sequence[Found], read: Reader, replaced: Sequence[str] = ()) -> str:
+def write_pack(
+    root: Path, what: str, portion: Sequence[FolderToPack], read: Reader, replaced: Sequence[str] = ()
+) -> str:
     """Write and publish one pack; the name of its zip.
 
     Parameters
@@ -60,7 +62,7 @@ def write_pack(root: Path, what: str, portion: Sequence[Found], read: Reader, re
     return place.name
 
 
-def _filled(aside: Path, portion: Sequence[Found], read: Reader) -> tuple[list[bytes], str]:
+def _filled(aside: Path, portion: Sequence[FolderToPack], read: Reader) -> tuple[list[bytes], str]:
     """The lines of the table of contents and the hash of the zip, after the zip was read back from the disk's cache."""
     lines, hashes = list[bytes](), list[tuple[int, int, bytes]]()
     with aside.open("xb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as container:

@@ -11,7 +11,7 @@ from inertial.dynamics.centrifuge_effects import EFFECTS
 from inertial.dynamics.goodness import p_value
 from pipelines.procedures.base import FigureValue
 from pipelines.procedures.centrifuge_radii import OF_RADII, ONE_RADIUS
-from pipelines.procedures.wording import probability, verdict_of, with_uncertainty
+from pipelines.procedures.wording import improvement, not_separated, probability, verdict_of, with_uncertainty
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -79,14 +79,12 @@ def diagnosis_text(diagnosis: SpinDiagnosis) -> list[tuple[str, str]]:
     for one in diagnosis.classes:
         name = one.effects[0]
         value, error = diagnosis.extended.of(name)
-        rivals = f"; the points do not separate it from {', '.join(one.effects[1:])}" if len(one.effects) > 1 else ""
+        rivals = not_separated(one.effects, "the points")
         size = f"{with_uncertainty(value, 2.0 * error)} {EFFECTS[name].unit} (k = 2)"
         out.append(("missing effect", f"{name}: {size}, {probability(one.p_value)}{rivals}"))
     if diagnosis.classes:
-        text = (
-            f"rms residual {MICRO * diagnosis.error_g:.3g} → {MICRO * diagnosis.extended_g:.3g} µg; points left out, in standard "
-            f"uncertainties: {diagnosis.left_out[0]:.2f} → {diagnosis.left_out[1]:.2f}"
-        )
+        errors = (f"{MICRO * diagnosis.error_g:.3g}", f"{MICRO * diagnosis.extended_g:.3g} µg")
+        text = improvement(*errors, "points", diagnosis.left_out)
         out.append(("with the missing effects", text))
     if diagnosis.unexplained:
         out.append(("unexplained", "no known effect explains the residual; look at it over the acceleration"))

@@ -13,7 +13,7 @@ from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
-from pipelines.procedures.wording import probability, with_uncertainty
+from pipelines.procedures.wording import improvement, not_separated, probability, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,16 +116,13 @@ def diagnosis_text(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence
         text += f"; {100.0 * diagnosis.where[1]:.0f} % of χ² is in the samples of {diagnosis.where[0]}"
     out = [("comparison of the waveforms", text)]
     for one in diagnosis.classes:
-        best, *others = one.effects
-        rivals = f"; the shocks do not separate it from {', '.join(others)}" if others else ""
+        best, rivals = one.effects[0], not_separated(one.effects, "the shocks")
         out.append(
             ("missing effect", f"{best}: {_size(diagnosis, best, settings)}, {probability(one.p_value)}{rivals}")
         )
     if diagnosis.classes:
-        text = (
-            f"rms residual {diagnosis.error_percent:.2g} → {diagnosis.extended_percent:.2g} % of the peak; samples left out, in "
-            f"standard uncertainties: {diagnosis.left_out[0]:.2f} → {diagnosis.left_out[1]:.2f}"
-        )
+        errors = (f"{diagnosis.error_percent:.2g}", f"{diagnosis.extended_percent:.2g} % of the peak")
+        text = improvement(*errors, "samples", diagnosis.left_out)
         out.append(("with the missing effects", text))
     if diagnosis.unexplained:
         out.append(

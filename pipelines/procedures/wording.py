@@ -9,6 +9,8 @@ from inertial.counts import degrees_of_freedom
 from inertial.dynamics.goodness import adequate, p_value
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from inertial.dynamics.goodness import Fitted
 
 MINUS = "−"
@@ -30,6 +32,17 @@ def verdict_of(fit: Fitted) -> str:
     """Verb phrase of a fit's verdict with its evidence: ``is adequate: χ² 3.2 for 4 degrees of freedom, p = 0.53``."""
     verdict = {None: "cannot be judged", True: "is adequate", False: "is not adequate"}[adequate(fit)]
     return f"{verdict}: χ² {fit.chi_square:.1f} for {degrees_of_freedom(fit.dof)}, {probability(p_value(fit))}"
+
+
+def not_separated(effects: Sequence[str], by: str) -> str:
+    """End of the sentence on a missing effect: the others of its class, which ``by`` (``the points``) does not separate."""
+    return f"; {by} do not separate it from {', '.join(effects[1:])}" if len(effects) > 1 else ""
+
+
+def improvement(before: str, after: str, what: str, left_out: tuple[float, float]) -> str:
+    """What the missing effects bring: rms residuals with their unit, and residuals of what was left out (``points``)."""
+    text = f"rms residual {before} → {after}; {what} left out, in standard uncertainties: "
+    return f"{text}{left_out[0]:.2f} → {left_out[1]:.2f}"
 
 
 def signed(value: float, places: int) -> str:

@@ -18,7 +18,7 @@ from pipelines.archive.backup import copy_archive
 from pipelines.archive.compaction import compact
 from pipelines.archive.locks import alone
 from pipelines.archive.pack_merging import due_of, merge_packs
-from pipelines.archive.pack_writing import Found, write_pack
+from pipelines.archive.pack_writing import FolderToPack, write_pack
 from pipelines.archive.packed_path import PackedPath
 from pipelines.audit.index import up_to_date
 from pipelines.audit.sql import ask
@@ -252,7 +252,7 @@ def test_merging_keeps_the_newer_of_two_files_wherever_it_is_packed(archive: Arc
     def pack(what: str, data: bytes, size: int) -> None:
         files_ = {"note.json": (len(data), size), f"{size}.json": (10**6, size)}
         write_pack(
-            root, what, [Found(folder, 1, files_)], lambda _, name: data if name == "note.json" else b"y" * 10**6
+            root, what, [FolderToPack(folder, 1, files_)], lambda _, name: data if name == "note.json" else b"y" * 10**6
         )
 
     pack(month, b"first", 1)
