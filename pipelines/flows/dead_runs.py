@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from datetime import timedelta
 from pathlib import Path
+from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 from prefect.client.orchestration import SyncPrefectClient, get_client
@@ -25,6 +27,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from prefect.client.schemas.objects import FlowRun
+
+PROCESSES = Path("/proc")
+STARTED_WITHIN = timedelta(seconds=1)
+"""Longest time for which a process that is being started may have no environment yet."""
 
 MANY = 200  # largest page of the server
 WORKING = (StateType.PENDING, StateType.RUNNING, StateType.CANCELLING)
@@ -89,8 +95,23 @@ def lives(run: FlowRun) -> bool:
     pid = run.infrastructure_pid
     if not pid or not pid.isdecimal():
         return False
-    try:
-        environment = Path(f"/proc/{pid}/environ").read_bytes()
-    except OSError:
-        return False
+    environment = _environment(PROCESSES / pid)
     return f"PREFECT__FLOW_RUN_ID={run.id}".encode() in environment.split(b"\0") and int(pid) != os.getpid()
+
+
+def _environment(process: Path) -> bytes:
+    """Environment of a process as ``/proc`` tells it; empty where the process has ended.
+
+    A process that is just being started has none for a moment: it is asked again until it has, for at most ``STARTED_WITHIN``.
+    """
+    until = monotonic() + STARTED_WITHIN.total_seconds()
+    try:
+        while not (environment := (process / "environ").read_bytes()):
+            # the state follows the name, which may hold brackets itself; Z: ended, and not yet collected by its parent
+            state = (process / "stat").read_text(errors="replace").rpartition(")")[2].split()[0]
+            if state in "ZX" or monotonic() > until:
+                break
+            sleep(0.01)
+    except OSError:
+        return b""
+    return environment
