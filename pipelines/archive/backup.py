@@ -2,8 +2,9 @@
 
 Files of an archive are written once, so a repeated copy adds only new files. The chain is read first and copied last: every file
 that an entry of the copy names was copied before it. Files that the chain does not name yet (a lot that is being measured) are
-copied in their present state and completed by the next copy. Derived files (``index/``) are left out; they are made again.
-What is packed is copied as single files; the copy may be compacted by itself.
+copied in their present state and completed by the next copy; the seal of a run that ends during the copy is left to the next one
+like the entry that it names. Derived files (``index/``) are left out; they are made again. What is packed is copied as single
+files; the copy may be compacted by itself.
 
 A file of the copy is never replaced by a damaged one. Files are written once, so one that differs from its copy is copied only
 where the chain or its manifest states that it is sound; a capture's samples and records are stated by their record and by the
@@ -12,6 +13,7 @@ record after it. Only what an archive makes again in its place (reports, seals, 
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record
 REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/]+/state/.*|.*/lock|orchestrator/.*")
+SEAL = re.compile(r"runs/[^/]+/sealed\.json")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
 PAGE = ".html"
 
@@ -41,6 +44,29 @@ class Copied:
     files: int = 0
     bytes: int = 0
     present: int = 0
+
+
+@dataclass(frozen=True)
+class _ChainAtStart:
+    """The chain of the source as it was when the copy began.
+
+    Attributes
+    ----------
+    entries : numbers of its entries
+    hashes : SHA-256 of files by their names, as the newest entry that names each states it
+    """
+
+    entries: frozenset[int]
+    hashes: Mapping[str, str]
+
+    def lacks_entry_of(self, name: str, data: bytes) -> bool:
+        """Whether a file is the seal of a run that names an entry written since the copy began."""
+        if not SEAL.fullmatch(name):
+            return False
+        try:
+            return json.loads(data)["entry"] not in self.entries
+        except (ValueError, TypeError, KeyError):  # 'tumbleline verify' reports it
+            return False
 
 
 def copy_archive(source: Archive, target: Archive) -> Copied:
@@ -63,13 +89,13 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
     entries = _names(source.root / CHAIN, CHAIN)
     target.prepare()
     _refuse_another(source, target, entries)
-    copied, sealed = Copied(), _sealed(source.root, entries)
+    copied, chain = Copied(), _chain_of(source.root, entries)
     names = [
         name
         for name in _names(source.root, "")
         if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK
     ]
-    kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, sealed, copied)]
+    kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, chain, copied)]
     _drop_old_states(source.root, target.root)
     if kept:
         raise ArchiveUnusable(
@@ -79,20 +105,20 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
     return copied
 
 
-def _sealed(root: Place, entries: set[str]) -> dict[str, str]:
-    """Hashes of files by their names, as the newest entry of the chain that names each states it."""
+def _chain_of(root: Place, entries: set[str]) -> _ChainAtStart:
     hashes: dict[str, str] = {}
     for name in sorted(entries):
         try:
             hashes.update(files.read_json(root / name).get("files", {}))
         except ArchiveUnusable:  # 'tumbleline verify' reports it
             continue
-    return hashes
+    numbers = (PurePosixPath(name).stem for name in entries)
+    return _ChainAtStart(frozenset(int(number) for number in numbers if number.isdecimal()), hashes)
 
 
-def _as_stated(root: Place, name: str, sealed: Mapping[str, str]) -> bool | None:
+def _as_stated(root: Place, name: str, chain: _ChainAtStart) -> bool | None:
     """Whether a file is as the chain states, or a table as its manifest states; None where neither states its hash."""
-    expected = sealed.get(name, "") or _stated(root, name)
+    expected = chain.hashes.get(name, "") or _stated(root, name)
     return files.sha256(root / name) == expected if expected else None
 
 
@@ -110,14 +136,14 @@ def _stated(root: Place, name: str) -> str:
     return str(stated)
 
 
-def _is_damaged(source: Place, target: Place, name: str, sealed: Mapping[str, str]) -> bool:
+def _is_damaged(source: Place, target: Place, name: str, chain: _ChainAtStart) -> bool:
     """Whether a file of the source that differs from its copy must not replace it."""
-    sound = _as_stated(source, name, sealed)
+    sound = _as_stated(source, name, chain)
     if REMADE.fullmatch(name):
         return name.endswith(".json") and not _is_readable(source / name)
     if sound is not None:
-        return not sound and _as_stated(target, name, sealed) is not False
-    return _as_stated(target, name, sealed) is not False
+        return not sound and _as_stated(target, name, chain) is not False
+    return _as_stated(target, name, chain) is not False
 
 
 def _is_readable(place: Place) -> bool:
@@ -152,8 +178,8 @@ def _walk(folder: Place, prefix: str) -> Iterator[tuple[Place, str]]:
             yield path, name
 
 
-def _copy(source: Place, target: Place, name: str, sealed: Mapping[str, str], copied: Copied) -> bool:
-    """Copy a file unless it is there; one that vanished meanwhile (a state, a temporary file) is left out.
+def _copy(source: Place, target: Place, name: str, chain: _ChainAtStart, copied: Copied) -> bool:
+    """Copy a file unless it is there; one that vanished meanwhile (a state, a temporary file) is left out, as is a newer seal.
 
     False where the one of the target was kept, because that of the source is damaged.
     """
@@ -162,10 +188,12 @@ def _copy(source: Place, target: Place, name: str, sealed: Mapping[str, str], co
         if place.is_file() and _same(there, place, name):
             copied.present += 1
             return True
-        if place.is_file() and _is_damaged(source, target, name, sealed):
+        if place.is_file() and _is_damaged(source, target, name, chain):
             return False
         data = there.read_bytes()
     except FileNotFoundError:
+        return True
+    if chain.lacks_entry_of(name, data):
         return True
     files.publish(place, data)
     if files.sha256(place) != files.hash_of(data):

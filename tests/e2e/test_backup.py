@@ -117,6 +117,25 @@ def test_a_copy_while_a_lot_is_measured_is_sound(made: Path, tmp_path: Path) -> 
     assert verify(copy, keys={}).whole
 
 
+def test_a_copy_during_which_a_run_ends_is_sound(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    names, listed = backup._names, list[str]()
+
+    def ends_after_the_chain_is_listed(folder: Path, prefix: str) -> set[str]:
+        if not prefix and not listed:
+            listed.append("files")
+            measure(tmp_path / "line", 2)  # the interrupted run is completed and sealed
+        return names(folder, prefix)
+
+    monkeypatch.setattr(backup, "_names", ends_after_the_chain_is_listed)
+    copy_archive(archive, copy)
+    assert {one.kind for one in verify(copy, keys={}).checked.findings} <= {"unsealed"}
+    copy_archive(archive, copy)
+    assert content(copy.root) == content(archive.root)
+    assert verify(copy, keys={}).whole
+
+
 def test_an_older_copy_restored_leaves_the_checkpoint_of_records_measured_since(made: Path, tmp_path: Path) -> None:
     shutil.copytree(made, tmp_path / "line")
     line, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
