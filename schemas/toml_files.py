@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
 from schemas.reasons import reason_of
+from schemas.shipped import hint_of_sample
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,8 +40,9 @@ def read_text(path: Path, what: str, form: str = "TOML") -> str:
     except (OSError, ValueError) as problem:  # a name with a zero byte is a ValueError, too
         strerror = problem.strerror if isinstance(problem, OSError) else None
         reason = strerror or ("not UTF-8 text" if isinstance(problem, UnicodeDecodeError) else str(problem))
+        sample = hint_of_sample(what, str(path)) if isinstance(problem, FileNotFoundError) else ""
         raise RecipeInvalid(
-            f"{what}: {shown(str(path))} cannot be read ({reason}); give the path of a {what} file in {form}"
+            f"{what}: {shown(str(path))} cannot be read ({reason}); give the path of a {what} file in {form}{sample}"
         ) from None
     if len(data) > LONGEST_FILE:
         raise RecipeInvalid(

@@ -22,7 +22,7 @@ from schemas.limits import Limits, parse_limits, unknown_limits
 from schemas.own_files import own_file, own_names, refuse_built_in_name
 from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, parse_recipe
 from schemas.serials import refuse_unusable_serials
-from schemas.shipped import shipped
+from schemas.shipped import hint_of_sample
 from schemas.toml_files import explain, read_text
 from schemas.units import AXES
 
@@ -199,15 +199,9 @@ def _recipe_text(name: str) -> tuple[str, str, Path]:
         return text, f"recipe {name}", Path()
     known = recipe_names()
     raise RecipeInvalid(
-        f"recipe: no file and no recipe is called '{shown(name)}'; {did_you_mean(name, known)}{_sample(name)}",
+        f"recipe: no file and no recipe is called '{shown(name)}'; {did_you_mean(name, known)}{hint_of_sample('recipe', name)}",
         close=close_matches(name, known),
     )
-
-
-def _sample(name: str) -> str:
-    """The path of a sample recipe of this name, which a newcomer means; empty where there is none."""
-    sample = shipped(f"deploy/recipes/{Path(name).name}") if Path(name).suffix == ".toml" else None
-    return f"; the sample of this name is {sample}" if sample is not None else ""
 
 
 def _model(file: RecipeFile, folder: Path, source: str, line: LineModel | None) -> dict[str, Any]:

@@ -16,7 +16,7 @@ RECIPE = short_recipe(poses=6, temperatures=(25.0, 40.0))
 
 def captured(slots: int, units: int, *faults: str) -> MemorySink:
     config = load_station(ROOT / "deploy" / "stations" / f"simulated-{slots}.toml")
-    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.3, "read_attempts": 1})})
+    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 1.0, "read_attempts": 1})})
     sink, lot = MemorySink(), lot_of(units)
     with open_station(with_faults(config, [parse_fault(text) for text in faults]), lot) as station:
         capture(station, RECIPE, lot, sink, progress=quiet_progress)

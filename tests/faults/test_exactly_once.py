@@ -107,13 +107,13 @@ def test_nothing_moves_twice_in_a_thousand_runs(drive):
 
 def test_reading_back_does_not_overtake_a_write_that_is_slow_on_its_way():
     config, plant = station_with(), plant_of(station_with(), lot_of(1))
-    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.3, "read_attempts": 1})})
+    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 1.0, "read_attempts": 1})})
     with PlantServer(plant) as server, ChaosProxy(server.host, server.port) as proxy:
         table, links = table_through(proxy, config, plant)
         outer = table.axes["outer"]
 
         def slow(way, frame):
-            return WireAction("delay", "request", delay_s=0.45) if way == "request" and frame[7] == 16 else None
+            return WireAction("delay", "request", delay_s=1.5) if way == "request" and frame[7] == 16 else None
 
         outer.position()
         proxy.script = slow

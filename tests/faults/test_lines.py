@@ -41,7 +41,7 @@ def speaker(*answers: bytes | None):
 @contextmanager
 def linked(*answers: bytes | None, attempts: int = 2):
     with speaker(*answers) as (address, heard):
-        link = LineLink(*address, timeout_s=0.2, read_attempts=attempts)
+        link = LineLink(*address, timeout_s=0.5, read_attempts=attempts)
         try:
             yield link, heard
         finally:
@@ -53,7 +53,7 @@ def test_questions_are_put_again_after_silence_and_orders_are_not():
         assert link.ask("TEMP?", "air") == "23.0,23.0,180.0,-70.0"
         assert heard == [b"TEMP?\r\n"] * 2
     with linked(b"") as (link, heard):
-        with pytest.raises(StationTimeout, match=r"no answer to set point 'TEMP, S25.0' in 0\.2 s"):
+        with pytest.raises(StationTimeout, match=r"no answer to set point 'TEMP, S25.0' in 0\.5 s"):
             link.tell("TEMP, S25.0", "set point")
         assert heard == [b"TEMP, S25.0\r\n"]
 
@@ -70,11 +70,12 @@ def test_what_is_not_one_line_is_no_answer(answer):
 
 
 def test_an_answer_without_an_end_costs_one_time_out():
-    with linked(b"23.", attempts=1) as (link, _):
+    with linked(b"23.", attempts=1) as (link, heard):
         begun = time.monotonic()
         with pytest.raises(StationTimeout):
             link.ask("TEMP?", "air")
-        assert time.monotonic() - begun < 1.0
+        assert time.monotonic() - begun < 5.0
+        assert heard == [b"TEMP?\r\n"]
 
 
 def test_a_late_answer_never_meets_the_next_question():

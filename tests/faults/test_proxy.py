@@ -42,7 +42,7 @@ def echo():
 def through(*actions: WireAction):
     with echo() as address, ChaosProxy(*address) as proxy:
         proxy.once(*actions)
-        with socket.create_connection((proxy.host, proxy.port), timeout=0.3) as client:
+        with socket.create_connection((proxy.host, proxy.port), timeout=0.8) as client:
             yield proxy, client
 
 

@@ -19,7 +19,7 @@ SLOT_1 = 12
 def captured(monkeypatch: pytest.MonkeyPatch, script) -> tuple[MemorySink, MemoryLog]:
     monkeypatch.setattr(wire, "script_of", lambda _world, _faults: script)
     config, lot = load_station(), lot_of()
-    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.2})})
+    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.6})})
     sink, events = MemorySink(), MemoryLog()
     with serve_plant(config, lot, make_plant(config, lot)) as station:
         capture(station, short_recipe(), lot, sink, progress=quiet_progress, events=events)

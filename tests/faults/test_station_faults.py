@@ -74,7 +74,7 @@ def test_a_unit_that_falls_silent_between_records_keeps_its_earlier_samples():
 
 def test_a_unit_that_sends_nothing_at_all_costs_one_time_out_and_is_reported():
     config = station_of(faults=[{"kind": "mute", "at_s": 905.0, "serial": "U002"}])
-    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 0.5, "read_attempts": 1})})
+    config = config.model_copy(update={"link": config.link.model_copy(update={"timeout_s": 1.0, "read_attempts": 1})})
     readings = run(config, lot_of()).all(1)
     assert (readings.query("unit == 'U002'")["status"] == "slot 2: no answer").all()
     assert (readings.query("unit != 'U002'")["status"] == "ok").all()
@@ -175,7 +175,7 @@ def test_a_write_whose_answer_is_lost_is_sent_once():
     plant = make_plant(config, lot)
     plant.inject(FaultOrder(kind="mute", serial="U000"))
     with PlantServer(plant) as server:
-        link = ModbusLink(server.host, server.port, timeout_s=0.3, read_attempts=3)
+        link = ModbusLink(server.host, server.port, timeout_s=0.6, read_attempts=3)
         with pytest.raises(StationTimeout, match=r"device 11: no answer to 'write tail"):
             link.write(11, 42, [0, 0], "tail")
         assert link.read(10, 0, 1, "slots") == [8]
@@ -219,7 +219,7 @@ def test_a_server_that_is_gone_is_a_lost_link_with_its_address():
     plant = make_plant(load_station(), lot_of(1))
     with PlantServer(plant) as server:
         port = server.port
-        link = ModbusLink(server.host, port, timeout_s=0.5, read_attempts=2)
+        link = ModbusLink(server.host, port, timeout_s=1.0, read_attempts=2)
         assert link.read(10, 0, 1, "slots") == [8]
     with pytest.raises((LinkLost, StationTimeout), match=f"127.0.0.1:{port}"):
         link.read(10, 0, 1, "slots")

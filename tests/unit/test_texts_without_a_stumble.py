@@ -26,7 +26,7 @@ from schemas.key_list import keys_of
 from schemas.limits import decide, parse_limits
 from schemas.reasons import PATTERNS
 from schemas.recipe import FaultOrder
-from schemas.station import StationConfig
+from schemas.station import StationConfig, load_station
 from stations.plant.faults.catalogue import build_fault
 
 RECIPE = """name = "hot"
@@ -114,14 +114,26 @@ def test_a_contribution_of_nothing_is_not_among_the_largest() -> None:
     assert without_nothing("noise of the dwells 80 %, supply 20 %") == "noise of the dwells 80 %, supply 20 %"
 
 
-def test_a_sample_recipe_that_is_not_here_is_named_with_its_path() -> None:
+@pytest.mark.parametrize("name", ["line-six.toml", "line-six", "recipes/line-six.toml"])
+def test_a_sample_recipe_that_is_not_here_is_named_with_its_path(name: str) -> None:
     with pytest.raises(RecipeInvalid) as end:
-        load_recipe("line-six.toml")
+        load_recipe(name)
     path = Path(str(end.value).rpartition("the sample of this name is ")[2])
     assert path.is_file()
     assert load_recipe(str(path)).name == "line-six"
     with pytest.raises(RecipeInvalid) as end:
         load_recipe("line-seven.toml")
+    assert "sample" not in str(end.value)
+
+
+@pytest.mark.parametrize("name", ["simulated-awry", "simulated-awry.toml"])
+def test_a_sample_station_that_is_not_here_is_named_with_its_path(name: str) -> None:
+    with pytest.raises(RecipeInvalid) as end:
+        load_station(Path(name))
+    path = Path(str(end.value).rpartition("the sample of this name is ")[2])
+    assert load_station(path).simulation is not None
+    with pytest.raises(RecipeInvalid) as end:
+        load_station(Path("simulated-calm"))
     assert "sample" not in str(end.value)
 
 
