@@ -125,8 +125,8 @@ WorkersOption = Annotated[
     int | None, typer.Option("--workers", min=1, help="Processes on this machine; as many as it has cores by default.")
 ]
 
-NARROW = 24
-"""Smallest width of a text column in a narrow terminal, characters."""
+NARROW = 28
+"""Characters of a word that a narrow terminal shows unbroken: the longest name of an effect has 27."""
 
 STYLES = {"pass": "bold green", "fail": "bold red", "refused": "bold magenta"}
 
@@ -175,11 +175,12 @@ def print_table(
     shown = out or console()
     used = [k for k in range(len(columns)) if k < whole or not lines or any(str(line[k]).strip() for line in lines)]
     columns, lines = [columns[k] for k in used], [[line[k] for k in used] for line in lines]
-    least = [_least(number < whole, column, [line[number] for line in lines]) for number, column in enumerate(columns)]
     width = shown.width if limited(shown) else None
+    least = [_least(k < whole, column, [line[k] for line in lines], width) for k, column in enumerate(columns)]
     gap = min(GAPS, key=lambda one: (len(_parts(least, whole, width, one)), -one))
     for part in _parts(least, whole, width, gap):
-        _print_part(shown, [columns[k] for k in part], [[line[k] for k in part] for line in lines], title, whole, gap)
+        kept = [[line[k] for k in part] for line in lines]
+        _print_part(shown, [columns[k] for k in part], kept, title, [least[k] for k in part], whole, gap)
         title = ""
 
 
@@ -187,12 +188,16 @@ GAPS = (3, 2)
 """Characters between two columns; the second where it saves a continuation of the table."""
 
 
-def _least(kept: bool, column: str, cells: Sequence[str | Text]) -> int:
-    """Characters that a column needs at least: its longest line where it is kept whole, else its longest word."""
+def _least(kept: bool, column: str, cells: Sequence[str | Text], width: int | None) -> int:
+    """Characters that a column needs at least: its longest line where it is kept whole, else its longest word.
+
+    Words longer than any name are broken, but not in a pipe, which has no ``width``.
+    """
     texts = [str(cell) for cell in cells]
     if kept or _numeric(texts):
         return _longest([column, *texts], None)
-    return min(_longest([column, *texts], " "), NARROW)
+    longest = _longest([column, *texts], " ")
+    return longest if width is None else min(longest, NARROW)
 
 
 def _parts(least: Sequence[int], whole: int, width: int | None, gap: int) -> list[list[int]]:
@@ -210,14 +215,19 @@ def _parts(least: Sequence[int], whole: int, width: int | None, gap: int) -> lis
 
 
 def _print_part(
-    shown: Console, columns: Sequence[str], lines: Sequence[Sequence[str | Text]], title: str, whole: int, gap: int
+    shown: Console,
+    columns: Sequence[str],
+    lines: Sequence[Sequence[str | Text]],
+    title: str,
+    least: Sequence[int],
+    whole: int,
+    gap: int,
 ) -> None:
     from rich import box
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, gap - 2))
     texts = [[str(line[number]) for line in lines] for number in range(len(columns))]
-    least = [_least(number < whole, column, texts[number]) for number, column in enumerate(columns)]
     most = [_longest([column, *own], None) for column, own in zip(columns, texts, strict=True)]
     widths = _widths(least, most, shown.width - 1 - gap * len(columns))
     for number, column in enumerate(columns):

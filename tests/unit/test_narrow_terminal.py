@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from inertial.effects import built_in
 from pipelines.cli import app
 from pipelines.cli.console import WordConsole
 from pipelines.cli.options import print_table
@@ -35,6 +36,17 @@ def test_a_table_in_a_pipe_is_one_table(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.delenv("COLUMNS", raising=False)
     assert sum("production-30db20d7e5" in line for line in printed(80, terminal=False)) == 2
     assert sum("production-30db20d7e5" in line for line in printed(80)) > 2
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_the_name_of_an_effect_is_not_broken(*, terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    sink = io.StringIO()
+    out = WordConsole(file=sink, width=80, force_terminal=terminal, color_system=None, legacy_windows=False)
+    longest = max(built_in(), key=len)
+    figures = ["4697.7", "0.38", "-45.882", "1.9034", "LSB/(g·K)"]
+    print_table(["unit", "effect", "value", "error", "low", "high", "text"], [["LT-01", longest, *figures]], out=out)
+    assert longest in sink.getvalue()
 
 
 def test_a_sentence_is_wrapped_between_words_and_a_command_stays_whole() -> None:
