@@ -23,7 +23,7 @@ from pipelines.archive.store import address_of, place_of
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
 
@@ -98,6 +98,11 @@ class Archive:
     def run_name(name: str, decisive: object) -> str:
         """The id of a run: its name and the hash of what decides its result."""
         return f"{name}-{digest(decisive)[:10]}"
+
+    def first_run_of(self, capture_id: str, units: Sequence[str]) -> Run | None:
+        """The run that measured a capture; None where no run of these units is of it. Later ones analyse the same data again."""
+        same = (info.id for info in self.runs() if not info.rerun_of and info.units == tuple(units))
+        return next((run for one in same if (run := Run(self, one)).about.get("capture") == capture_id), None)
 
     def capture(self, capture_id: str) -> Records:
         """The records of a capture, for reading or for continuing."""

@@ -46,6 +46,12 @@ class Run:
         return files.read_json(self.path / START)
 
     @property
+    def origin(self) -> dict[str, str]:
+        """What ``run.json`` of a re-analysis of this run says of it: the run, and when its data were measured."""
+        about = self.about
+        return {"rerun_of": self.id, "measured": str(about.get("measured") or about["when"])}
+
+    @property
     def records(self) -> Records | None:
         """What was captured for this run; None for a run on imported tables."""
         capture = self.about.get("capture")

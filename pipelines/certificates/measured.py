@@ -11,12 +11,28 @@ START, END = "run.json", "readings.json"
 def measured_span(run: Run) -> tuple[str, str] | None:
     """Start of a run and end of its capture; None where unknown, or where the capture belongs to another run."""
     about = run.about
-    if about.get("rerun_of") or not about.get("capture") or not (run.path / END).is_file():
+    if _analysed_again(run) is not None or not about.get("capture") or not (run.path / END).is_file():
         return None
     return str(files.read_json(run.path / START)["when"]), str(files.read_json(run.path / END)["when"])
 
 
 def measured_on(run: Run) -> str:
     """The day on which the measurement of a run ended, UTC; for a re-run and for imported data the stated day."""
+    first = _analysed_again(run)
+    if first is not None:
+        return day_of(first, f"run {run.id}")
     own, about = measured_span(run), run.about
     return day_of(own[1] if own else str(about.get("measured") or about["when"]), f"run {run.id}")
+
+
+def _analysed_again(run: Run) -> str | None:
+    """When the data of a re-analysis were measured; None for a run that measured its own, or was imported.
+
+    A re-fit by an older version does not state which run it analyses again: it began after the last event of its capture.
+    """
+    about, records = run.about, run.records
+    if about.get("rerun_of"):
+        return str(about.get("measured") or about["when"])
+    events = records.events.documents() if records is not None and records.is_complete() else []
+    times = sorted(str(event["when"]) for event in events)
+    return times[0] if times and str(about["when"]) > times[-1] else None

@@ -67,6 +67,14 @@ def decisive(job: Job) -> dict[str, Any]:
     return {**about, "code": code}
 
 
+def _origin(job: Job, archive: Archive) -> dict[str, str]:
+    """The run of which a new one analyses the data again, where another run has measured them; the new one is no measurement."""
+    if not archive.capture(job.capture_id).is_complete():
+        return {}
+    first = archive.first_run_of(job.capture_id, [unit.serial for unit in job.lot.units])
+    return {} if first is None else first.origin
+
+
 class Runner:
     """The chain for one job in one archive."""
 
@@ -76,7 +84,8 @@ class Runner:
         self.job, self.archive, self.progress, self.measure = job, archive, progress, measure
         name = archive.run_name(job.recipe.name, content := decisive(job))
         self._was_there = (archive.root / "runs" / name / START).is_file()
-        self.run: Run = archive.open_run(job.recipe.name, job.about, content)
+        origin = {} if self._was_there else _origin(job, archive)
+        self.run: Run = archive.open_run(job.recipe.name, {**job.about, **origin}, content)
 
     def all(self) -> Iterator[Done]:
         """Every stage, in order, as it is done."""

@@ -171,9 +171,7 @@ def _short_text(value: Any) -> str:
 
 def _about(old: Run, plan: Plan, because: list[dict[str, str]]) -> dict[str, Any]:
     """What a re-run is begun with."""
-    about = old.about
-    origin = {"rerun_of": old.id, "because": because, "measured": about.get("measured", about["when"])}
-    return {**provenance(), **plan.about, **origin}
+    return {**provenance(), **plan.about, **old.origin, "because": because}
 
 
 class StageRunner:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, time
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,8 @@ class SelectedRun:
     """One run of an archive, from its ``run.json``.
 
     measured : time of the measurement; for a re-run that of the first run of the data
-    derived : whether the run is a re-run of another, or continues with its measurements
+    derived : whether the run is a re-run of another, analyses its data again, or continues with its measurements
+    capture : what was captured; empty for an import
     """
 
     id: str
@@ -33,12 +34,19 @@ class SelectedRun:
     units: tuple[str, ...]
     measured: datetime
     derived: bool
+    capture: str = ""
 
 
 def entries(archive: Archive) -> list[SelectedRun]:
     """Every run, in the order of measurement."""
     runs = [_entry(path.parent.name, files.read_json(path)) for path in (archive.root / "runs").glob("*/run.json")]
-    return sorted(runs, key=lambda entry: (entry.measured, entry.id))
+    known = set[str]()
+    for k, entry in enumerate(runs := sorted(runs, key=lambda entry: (entry.measured, entry.id))):
+        if entry.capture in known:  # a fit of an older version does not state whose data it has
+            runs[k] = replace(entry, derived=True)
+        elif entry.capture and not entry.derived:
+            known.add(entry.capture)
+    return runs
 
 
 def entry_of(run_id: str, about: dict[str, Any]) -> SelectedRun:
@@ -150,4 +158,5 @@ def _entry(run_id: str, about: dict[str, Any]) -> SelectedRun:
         units=tuple(unit["serial"] for unit in lot.get("units", [])),
         measured=when if when.tzinfo else when.replace(tzinfo=UTC),
         derived="rerun_of" in about or bool(about.get("parents")),
+        capture=str(about.get("capture") or ""),
     )

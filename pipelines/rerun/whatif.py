@@ -79,13 +79,18 @@ def fresh_tasks(lots: Sequence[LotComparison], archive: str, change: ModelChange
         earlier: dict[str, list[str]] = defaultdict(list)
         runs = {before.entry.id: before for before in last.values()}
         for unit in judged.new.fitted:
-            if unit in last:
+            if unit in last and not _same_data(last[unit], judged):
                 earlier[last[unit].entry.id].append(unit)
             last[unit] = judged
         pairs = tuple((tuple(units), *_calibrations(runs[run])) for run, units in earlier.items())
         if pairs:
             tasks.append(FreshTask(archive, judged.entry.id, change, pairs))
     return tasks
+
+
+def _same_data(one: LotComparison, other: LotComparison) -> bool:
+    """Whether two runs are of one capture: the dwells of one are not fresh for the other."""
+    return bool(one.entry.capture) and one.entry.capture == other.entry.capture
 
 
 def _calibrations(judged: LotComparison) -> tuple[Any, Any]:

@@ -15,15 +15,19 @@ from pipelines.archive.signatures import VARIABLE, make_key
 from pipelines.certificates import Ledger
 from pipelines.certificates.coefficient_remarks import library_remarks
 from pipelines.certificates.days import months_after
-from pipelines.certificates.measured import measured_on
+from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.refusals import allowed_months
 from pipelines.chain import certify as certifying
 from pipelines.chain.certify import certify
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
 from pipelines.cli import app
+from pipelines.jobs.job import job_of_run
 from pipelines.jobs.model_change import change_from_options
 from pipelines.rerun.rerun import again
 from pipelines.stages.figures import UNITS
 from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
+from schemas.event import Event
 from schemas.limits import VALIDITY_MONTHS, parse_limits
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -56,23 +60,29 @@ def typed(run: Run) -> Typed:
     return type_
 
 
+def end_of(run: Run) -> str:
+    """The day on which a run was measured: a suite may run over midnight."""
+    return str(run.manifest("readings")["when"])[:10]
+
+
 def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_args: object) -> None:
         raise WrongUse("stopped before anything was written")
 
     with monkeypatch.context() as patch:
         patch.setattr(certifying, "refuse_unsound", refused)
-        assert f"certify: run {run.id}, measured on {day()}, 3 units: A1, A2, A3" in typed("certify").stderr
+        assert f"certify: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in typed("certify").stderr
     done = typed("certify", "--json")
-    assert f"certify: run {run.id}, measured on {day()}" in done.stderr
+    assert f"certify: run {run.id}, measured on {end_of(run)}" in done.stderr
     assert json.loads(done.stdout)["run"] == run.id
 
 
 def test_a_certificate_does_not_begin_before_the_measurement(run: Run, typed: Typed) -> None:
     refused = typed("certify", run.id, "--from", "2020-01-01").exception
     assert isinstance(refused, WrongUse)
-    assert f"valid from 2020-01-01, run {run.id} was measured on {day()}, that day or a later one is needed" in str(
-        refused
+    assert (
+        f"valid from 2020-01-01, run {run.id} was measured on {end_of(run)}, that day or a later one is needed"
+        in str(refused)
     )
     assert typed("certify", run.id, "--from", day(-1)).exit_code == 1
     assert Ledger(run.archive).events("A1") == []
@@ -90,24 +100,48 @@ def test_a_certificate_lasts_no_longer_than_the_policy_allows(run: Run, typed: T
 def test_without_dates_it_lasts_as_long_as_is_allowed(run: Run, typed: Typed) -> None:
     assert allowed_months(run) == VALIDITY_MONTHS
     typed("certify", run.id)
-    assert Ledger(run.archive).events("A1")[0].until == months_after(day(), VALIDITY_MONTHS)
+    assert Ledger(run.archive).events("A1")[0].until == months_after(end_of(run), VALIDITY_MONTHS)
 
 
 def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
     new = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
     assert allowed_months(new) == 6
-    assert measured_on(new) == day()
+    assert measured_on(new) == end_of(run)
     ledger = Ledger(run.archive)
     with pytest.raises(WrongUse, match=r"no more than until .* is allowed; limits 'half' allow 6 months"):
         certify(ledger, new, months=7)
-    assert certify(ledger, new).written[0].until == months_after(day(), 6)
+    assert certify(ledger, new).written[0].until == months_after(end_of(run), 6)
 
 
 @pytest.mark.parametrize("months", ["0", "121", '"6"', "true", "6.5"])
 def test_the_months_of_a_limits_file_are_bounded(months: str) -> None:
     with pytest.raises(RecipeInvalid, match="validity_months"):
         parse_limits(LIMITS.replace("= 6", f"= {months}"), "half.toml", UNITS)
+
+
+def test_a_fit_of_archived_data_has_the_date_of_the_measurement(run: Run) -> None:
+    start = "2020-02-03T04:05:06.000+00:00"
+    about = {**run.about, "when": start}
+    (run.path / "run.json").write_bytes(files.json_bytes(about))
+    runner = Runner(job_of_run(run, effects=[*run.about["recipe"]["effects"], "second_order"]), run.archive)
+    for stage in ORDER[:-1]:
+        runner.stage(stage)
+    assert runner.run.id != run.id
+    assert measured_span(runner.run) is None
+    assert measured_on(runner.run) == "2020-02-03"
+
+
+def test_a_fit_by_an_older_version_has_the_date_of_its_capture(run: Run) -> None:
+    assert run.records is not None
+    happened = Event(kind="soak", time_s=0.0, record=0, reason="25 °C", action="settled")
+    run.records.events.note(happened)
+    [place] = (run.records.path / "events").iterdir()
+    place.write_bytes(files.json_bytes({**happened.document(), "when": "2020-02-03T23:30:00.000+00:00"}))
+    assert measured_span(run) is None
+    assert measured_on(run) == "2020-02-03"
+    (run.path / "run.json").write_bytes(files.json_bytes({**run.about, "when": "2020-02-03T23:00:00.000+00:00"}))
+    assert measured_span(run) is not None
 
 
 def test_limits_that_do_not_say_how_long_are_kept_as_before() -> None:

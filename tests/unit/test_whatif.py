@@ -1,5 +1,6 @@
 """A model before it is released: yield and errors of all lots, and the records that make it the line's."""
 
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -7,16 +8,17 @@ import numpy as np
 import pytest
 from capture_double import CaptureDouble, recipe_file, small_job
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, files
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.jobs.job import Request
+from pipelines.jobs.job import Request, job_of_run
 from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.jobs.recipes import load_recipe
 from pipelines.jobs.releases import evidence_for, keep_evidence, line_model, release, released, releases
 from pipelines.rerun.lot_comparison import applied, fresh, judged
 from pipelines.rerun.partition import Batch
 from pipelines.rerun.rerun import again
+from pipelines.rerun.selection import selected
 from pipelines.rerun.whatif import fresh_tasks, summary
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
@@ -112,6 +114,29 @@ def test_the_error_on_a_fresh_run_is_that_of_the_corrected_norm(archive: Archive
     expected = 1e6 * (np.linalg.norm(force, axis=1) - true)
     assert sums["A2"][0] == pytest.approx(float(np.sum(expected**2)), rel=1e-6)
     assert sums["A2"][1] == len(own)
+
+
+@pytest.mark.parametrize("stated", [True, False], ids=["stated", "by an older version"])
+def test_a_fit_of_measured_data_is_no_measurement_and_no_fresh_run(
+    archive: Archive, tmp_path: Path, *, stated: bool
+) -> None:
+    shutil.copytree(archive.root, tmp_path / "archive")
+    own = Archive(tmp_path / "archive")
+    measured = [info.id for info in own.runs() if not info.rerun_of]
+    job = job_of_run(own.run(measured[-1]), effects=list(GOOD))
+    runner = Runner(job, own)
+    for stage in ORDER[:-1]:
+        assert runner.stage(stage).reused or stage != "capture"
+    fitted = runner.run
+    assert fitted.about["rerun_of"] == measured[-1]
+    assert fitted.about["measured"] == own.run(measured[-1]).about["when"]
+    if not stated:
+        about = {key: value for key, value in fitted.about.items() if key not in {"rerun_of", "measured"}}
+        (fitted.path / "run.json").write_bytes(files.json_bytes(about))
+    assert [one.id for one in selected(own, ["all"])] == measured
+    change = change_from_options("", model_file(tmp_path))
+    both = judged(Batch(own.address, (measured[-1], fitted.id), change))
+    assert fresh_tasks(both, own.address, change) == []
 
 
 def test_a_model_that_was_there_already_is_no_better(archive: Archive, tmp_path: Path) -> None:
