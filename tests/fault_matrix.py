@@ -20,7 +20,8 @@ from pipelines.stages.validate import validate
 from schemas.errors import StationError
 from schemas.event import MemoryLog
 from schemas.fault import parse_fault
-from schemas.recipe import Pose, Recipe
+from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station
 from stations.opening import make_plant, serve_plant
 from stations.plant.device import PlantDevices
