@@ -2,8 +2,9 @@
 
 Files of an archive are written once, so a repeated copy adds only new files. The chain is read first and copied last: every file
 that an entry of the copy names was copied before it. Files that the chain does not name yet (a lot that is being measured) are
-copied in their present state and completed by the next copy. Derived files (``index/``) are left out; they are made again.
-What is packed is copied as single files; the copy may be compacted by itself.
+copied in their present state and completed by the next copy; the seal of a run is copied with the entry that it names. Derived
+files (``index/``) are left out; they are made again. What is packed is copied as single files; the copy may be compacted by
+itself.
 
 A file of the copy is never replaced by a damaged one. Files are written once, so one that differs from its copy is copied only
 where the chain or its manifest states that it is sound; a capture's samples and records are stated by their record and by the
@@ -17,8 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from pipelines.archive import files, packs
+from pipelines.archive import files, hash_chain, packs
 from pipelines.archive.files import TEMPORARY
+from pipelines.archive.run_files import SEALED
 from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record
+SEAL = re.compile(rf"runs/[^/]+/{re.escape(SEALED)}")
 REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/]+/state/.*|.*/lock|orchestrator/.*")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
 PAGE = ".html"
@@ -67,7 +70,10 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
     names = [
         name
         for name in _names(source.root, "")
-        if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK
+        if name not in entries
+        and not name.startswith(f"{CHAIN}/")
+        and name != MARK
+        and not _sealed_since(source.root, name, entries)
     ]
     kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, sealed, copied)]
     _drop_old_states(source.root, target.root)
@@ -88,6 +94,17 @@ def _sealed(root: Place, entries: set[str]) -> dict[str, str]:
         except ArchiveUnusable:  # 'tumbleline verify' reports it
             continue
     return hashes
+
+
+def _sealed_since(root: Place, name: str, entries: set[str]) -> bool:
+    """Whether a file is the seal of a run by an entry that the chain got after it was read."""
+    if not SEAL.fullmatch(name):
+        return False
+    try:
+        number = files.read_json(root / name).get("entry")
+    except ArchiveUnusable:  # 'tumbleline verify' reports it
+        return False
+    return isinstance(number, int) and number > 0 and hash_chain.name_of_entry(number) not in entries
 
 
 def _as_stated(root: Place, name: str, sealed: Mapping[str, str]) -> bool | None:

@@ -117,6 +117,30 @@ def test_a_copy_while_a_lot_is_measured_is_sound(made: Path, tmp_path: Path) -> 
     assert verify(copy, keys={}).whole
 
 
+def test_a_run_that_is_sealed_between_the_chain_and_the_files_is_copied_without_its_seal(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    names, ended = backup._names, []
+
+    def meanwhile(folder: Path, prefix: str) -> set[str]:
+        found = names(folder, prefix)
+        if not ended:  # the chain was listed, and the files were not yet
+            ended.append(measure(tmp_path / "line", 3).run.id)
+        return found
+
+    monkeypatch.setattr(backup, "_names", meanwhile)
+    copy_archive(archive, copy)
+    folder = copy.root / "runs" / ended[0]
+    assert (folder / "report.json").is_file()
+    assert not (folder / "sealed.json").exists()
+    assert [one for one in verify(copy, keys={}).checked.findings if one.kind != "unchained"] == []
+    copy_archive(archive, copy)
+    assert (folder / "sealed.json").is_file()
+    assert verify(copy, keys={}).whole
+
+
 def test_an_older_copy_restored_leaves_the_checkpoint_of_records_measured_since(made: Path, tmp_path: Path) -> None:
     shutil.copytree(made, tmp_path / "line")
     line, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
