@@ -188,7 +188,7 @@ def chromium() -> Iterator[Any]:
         browser = playwright.chromium.launch(
             executable_path=program,
             headless=True,
-            args=["--no-sandbox", "--disable-dev-shm-usage", f"--proxy-server={NOBODY}"],
+            args=["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", f"--proxy-server={NOBODY}"],
         )
         try:
             yield browser
