@@ -24,7 +24,7 @@ MOVER = """
 import json, random, sys
 import stations.devices.table
 from schemas.errors import TumblelineError
-from schemas.recipe import Lot
+from schemas.lot import Lot
 from schemas.station import StationConfig
 from stations.opening import open_station
 stations.devices.table.POLL_S = 0.005  # nearly all of its time between readings and orders
