@@ -38,8 +38,10 @@ from pipelines.archive.keys import digest, libraries, stage_key  # noqa: E402
 from pipelines.stages.figures import UNITS  # noqa: E402
 from pipelines.tables.calibration import column_names, unit_texts  # noqa: E402
 from schemas import tables  # noqa: E402
-from schemas.limits import describe_rule, limits_of  # noqa: E402
-from schemas.recipe import Pose, Recipe  # noqa: E402
+from schemas.decisions import describe_rule  # noqa: E402
+from schemas.limits import limits_of  # noqa: E402
+from schemas.poses import Pose  # noqa: E402
+from schemas.recipe import Recipe  # noqa: E402
 from schemas.station import load_station  # noqa: E402
 from stations.plant.device import stream  # noqa: E402
 

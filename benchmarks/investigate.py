@@ -131,8 +131,10 @@ def job_of(scene: Scene, seed: int, units: int) -> Any:
     from inertial import poses
     from pipelines.jobs.job import Job
     from pipelines.jobs.recipes import load_limits, load_recipe
-    from schemas.recipe import Lot, Recipe, Unit
-    from schemas.station import Hidden, Simulation, load_station
+    from schemas.lot import Lot, Unit
+    from schemas.recipe import Recipe
+    from schemas.simulation import Hidden, Simulation
+    from schemas.station import load_station
 
     rng = np.random.default_rng([seed, 7])
     order = rng.permutation(len(poses.plan(scene.plan)))

@@ -41,9 +41,10 @@ from pipelines.jobs.recipes import load_recipe
 from pipelines.procedures import PROCEDURES, parts_of, roles_of, shock_waves
 from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.schedule.steps import steps
+from schemas.lot import Lot, Unit
 from schemas.progress import silent
-from schemas.recipe import Lot, Unit
-from schemas.station import Hidden, ReferenceErrors, Simulation, load_station
+from schemas.simulation import Hidden, ReferenceErrors, Simulation
+from schemas.station import load_station
 from stations import open_station
 from stations.plant.plant import Plant
 

@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 
 from pymodbus.client import ModbusTcpClient  # noqa: E402
 
-from schemas.recipe import Lot, Unit  # noqa: E402
+from schemas.lot import Lot, Unit  # noqa: E402
 from schemas.station import load_station  # noqa: E402
 from stations.codec import WORDS_PER_SAMPLE  # noqa: E402
 from stations.devices.registers import Registers  # noqa: E402

@@ -20,7 +20,7 @@ from schemas.errors import ArchiveUnusable
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence
 
-Part = TypeVar("Part")
+Partition = TypeVar("Partition")
 Result = TypeVar("Result")
 
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -35,8 +35,8 @@ class Distributor(Protocol):
 
 
 def map_partitions(
-    function: Callable[[Part], Result],
-    partitions: Sequence[Part],
+    function: Callable[[Partition], Result],
+    partitions: Sequence[Partition],
     distribute: Distributor | None = None,
     *,
     workers: int = 1,
@@ -48,8 +48,8 @@ def map_partitions(
     ----------
     function : of a module, not of a block: workers import it by its name
     partitions : values that can be pickled
-    spread : where the work is done instead of on this machine
-    workers : processes on this machine, where there is no spread
+    distribute : where the work is done instead of on this machine
+    workers : processes on this machine, where there is no ``distribute``
     name : of the work in logs
     """
     if not partitions:
@@ -61,7 +61,7 @@ def map_partitions(
     return _in_processes(function, partitions, min(workers, len(partitions)))
 
 
-def in_one_thread(function: Callable[[Part], Result], part: Part) -> Result:
+def in_one_thread(function: Callable[[Partition], Result], part: Partition) -> Result:
     """What the function makes of one partition, on one thread of BLAS and of Arrow."""
     import pyarrow as pa
 
@@ -99,7 +99,9 @@ def with_environment(values: Mapping[str, str]) -> Generator[None, None, None]:
             os.environ.update({} if value is None else {key: value})
 
 
-def _in_processes(function: Callable[[Part], Result], partitions: Sequence[Part], workers: int) -> list[Result]:
+def _in_processes(
+    function: Callable[[Partition], Result], partitions: Sequence[Partition], workers: int
+) -> list[Result]:
     with one_thread_each(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         futures = [pool.submit(in_one_thread, function, part) for part in partitions]
         try:

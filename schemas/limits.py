@@ -8,7 +8,6 @@ an allowed probability of false acceptance needs (JCGM 106:2012, 8.3.3).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -37,17 +36,6 @@ MOST_MONTHS = 120
 Rule = Literal["guarded_acceptance", "simple_acceptance", "allowed_pfa"]
 LARGEST_PFA = 0.02
 """Largest probability of false acceptance of one decision that limits may allow."""
-Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
-
-# The notes give the grades by the bias that is left: consumer to 1000 µg, industrial to 200 µg, navigation under 50 µg.
-GRADES: Mapping[str, float] = {
-    "navigation": 50.0,
-    "industrial": 200.0,
-    "consumer": 1000.0,
-}
-GRADE_FIGURE = "bias_error_ug"
-PERIOD_FIGURE = "bias_error_period_ug"
-"""The figure that a grade rests on where it is known: the error over the period of validity."""
 
 
 class Limit(Strict):
@@ -137,144 +125,6 @@ def _units(info: ValidationInfo) -> Mapping[str, str]:
     if info.context is None:
         raise TypeError("limits are checked against the known figures; make them by limits_of or parse_limits")
     return info.context
-
-
-@dataclass(frozen=True)
-class Decision:
-    """What a rule says of one figure of one unit."""
-
-    figure: str
-    value: float
-    uncertainty: float
-    limit: float
-    unit: str
-    rule: str
-    outcome: Outcome
-    risk: float = 0.0
-    accept: float = float("nan")
-    least: bool = False
-    """Whether ``limit`` is the least value that the figure may have."""
-
-    @property
-    def pfa(self) -> float:
-        """Probability of false acceptance of an accepted unit: that its figure is beyond the limit (JCGM 106, 7.4)."""
-        return self.risk if self.passed else 0.0
-
-    @property
-    def pfr(self) -> float:
-        """Probability of false rejection of a unit that is not accepted: that its figure is within the limit."""
-        return 0.0 if self.passed else 1.0 - self.risk
-
-    @property
-    def passed(self) -> bool:
-        """Whether the unit may be delivered: a conditional pass may not, under a guarded rule."""
-        return self.outcome == "pass"
-
-    @property
-    def margin(self) -> float:
-        """Distance of the figure from the limit, in the figure's unit: negative where the limit is broken."""
-        return self.value - self.limit if self.least else self.limit - abs(self.value)
-
-    @property
-    def sentence(self) -> str:
-        """The decision for people: figure, value, uncertainty, limit and margin."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        spread = f" ± {float(f'{self.uncertainty:.2g}'):g}" if self.uncertainty > 0.0 else ""
-        side = "at least " if self.least else ""
-        what = f"{float(f'{self.value:.3g}'):g}{spread}{unit}, limit {side}{self.limit:.4g}{unit}"
-        if self.outcome.startswith("conditional"):
-            risk = f"probability of {'falling below' if self.least else 'exceeding'} it {100.0 * self.risk:.2g} %"
-            beyond = "below" if self.least else "above"
-            where = (
-                "inside the guard band" if self.margin >= 0.0 else f"{beyond} the limit by less than its uncertainty"
-            )
-            return f"{self.figure} not accepted: {where}, {what}, {risk}: measure longer, or again"
-        return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
-
-
-def decide(limits: Limits, figure: str, value: float, standard_uncertainty: float) -> Decision:
-    """The decision on a figure by the limits' rule.
-
-    Parameters
-    ----------
-    figure : a key of ``limits.figures``.
-    value, standard_uncertainty : in the figure's unit; the rule's coverage factor is applied here.
-    """
-    guard = limits.guard_factor * standard_uncertainty
-    expanded = limits.coverage_factor * standard_uncertainty
-    own = limits.figures[figure]
-    if own.min is not None:
-        return Decision(
-            figure=figure,
-            value=value,
-            uncertainty=expanded,
-            limit=own.min,
-            unit=own.unit,
-            rule=describe_rule(limits),
-            outcome=_outcome(-value, -own.min, guard),
-            risk=below(value, standard_uncertainty, own.min),
-            accept=own.min + guard,
-            least=True,
-        )
-    limit = own.max or 0.0  # a limit has one of both
-    return Decision(
-        figure=figure,
-        value=value,
-        uncertainty=expanded,
-        limit=limit,
-        unit=limits.figures[figure].unit,
-        rule=describe_rule(limits),
-        outcome=_outcome(abs(value), limit, guard),
-        risk=outside(value, standard_uncertainty, limit),
-        accept=limit - guard,
-    )
-
-
-def outside(value: float, u: float, limit: float) -> float:
-    """Probability that a figure measured as ``value`` with standard uncertainty ``u`` lies beyond ± limit (JCGM 106, 7.4)."""
-    if not u > 0.0:
-        return float(not abs(value) <= limit)
-    normal = NormalDist()
-    return normal.cdf((-limit - value) / u) + normal.cdf((value - limit) / u)
-
-
-def below(value: float, u: float, least: float) -> float:
-    """Probability that a figure measured as ``value`` with standard uncertainty ``u`` lies below its least value."""
-    return NormalDist().cdf((least - value) / u) if u > 0.0 else float(not value >= least)
-
-
-def _outcome(magnitude: float, limit: float, guard: float) -> Outcome:
-    if magnitude <= limit - guard:
-        return "pass"
-    if magnitude > limit + guard:
-        return "fail"
-    return "conditional pass" if magnitude <= limit else "conditional fail"
-
-
-def describe_rule(limits: Limits) -> str:
-    """The decision rule in the words that stand beside every result."""
-    if limits.rule == "simple_acceptance":
-        return f"ILAC-G8:09/2019 simple acceptance, U with k = {limits.coverage_factor:g}"
-    if limits.rule == "allowed_pfa":
-        allowed = 100.0 * (limits.pfa_max or LARGEST_PFA)
-        return (
-            f"JCGM 106:2012 guard band {limits.guard_factor:.3f}·u, probability of false acceptance at most {allowed:g} %, "
-            f"U with k = {limits.coverage_factor:g}"
-        )
-    return f"ILAC-G8:09/2019 guarded acceptance, w = U with k = {limits.coverage_factor:g}"
-
-
-def grade_of(value_ug: float, expanded_ug: float, rule: Rule) -> str | None:
-    """The best grade whose bias limit accepts the value under the rule with w = U; None where not even the lowest does."""
-    return grade_with(value_ug, 0.0 if rule == "simple_acceptance" else expanded_ug)
-
-
-def grade_with(value_ug: float, guard_ug: float) -> str | None:
-    """The best grade whose bias limit accepts the value with a guard band; None where not even the lowest does."""
-    for name, limit in GRADES.items():
-        if _outcome(abs(value_ug), limit, guard_ug) == "pass":
-            return name
-    return None
 
 
 def limits_of(document: Mapping[str, Any], units: Mapping[str, str]) -> Limits:

@@ -37,7 +37,7 @@ from schemas.bounds import (
     Wait,
 )
 from schemas.fault import FaultOrder
-from schemas.serials import LONGEST_SERIAL, SERIAL_PATTERN
+from schemas.poses import Pose, SoakPart
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml
 from schemas.uncertainty import Uncertainty
@@ -52,71 +52,6 @@ MOST_SAMPLES = 10**9  # of one record, on one axis
 
 Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2)]
 Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth lies between 9.76 and 9.84 m/s²
-
-
-class Pose(Strict):
-    """One attitude of the table: outer angle about the laboratory's x, inner angle about the fixture's z, degrees."""
-
-    name: str
-    outer_deg: Degrees
-    inner_deg: Degrees
-
-
-class Unit(Strict):
-    """One device under test and the slot of the fixture that it sits in, counted from 0."""
-
-    serial: Annotated[
-        str,
-        Field(min_length=1, max_length=LONGEST_SERIAL, pattern=SERIAL_PATTERN),
-    ]
-    slot: Annotated[int, Field(ge=0, le=MOST_UNITS)]
-
-
-class SoakPart(Strict):
-    """What is measured at one soak, where not every pose is measured at every temperature.
-
-    ``poses`` and ``verification`` are numbers in the recipe's lists, from 1, in order of measurement; a pose may come again.
-    Left out, all of the list are meant. ``waits_s`` are waits after the move, one for each of ``poses``, in place of the recipe's
-    ``settle_s``. With ``settled = false`` the dwells begin at once, while the devices still follow the chamber. ``off_s`` are
-    seconds for which the devices are switched off before the move to each of ``poses``; 0 leaves them on.
-    """
-
-    temperature_C: Celsius
-    poses: Annotated[list[Annotated[int, Field(ge=1)]], Field(max_length=MOST_POSES)] | None = None
-    verification: Annotated[list[Annotated[int, Field(ge=1)]], Field(max_length=MOST_POSES)] | None = None
-    waits_s: list[Wait] | None = None
-    off_s: list[Wait] | None = None
-    settled: bool = True
-
-
-MOST_REPEATS = 2**28
-"""A deployed run takes seven hexadecimal digits of its id as its number: two runs of one lot must not have the same."""
-
-
-class Lot(Strict):
-    """The units measured together, the kind of device they are, and the seed of a simulated station.
-
-    ``repeat`` counts fresh measurements of the same lot: the devices stay, the noise is new.
-    """
-
-    units: Annotated[list[Unit], Field(min_length=1)]
-    device: str
-    seed: Seed = 0
-    repeat: Annotated[int, Field(ge=0, lt=MOST_REPEATS)] = 0
-
-    @model_validator(mode="after")
-    def _each_once(self) -> Lot:
-        for what, values in (
-            ("serial", [u.serial for u in self.units]),
-            ("slot", [u.slot for u in self.units]),
-        ):
-            texts = [str(value) for value in values]
-            twice = sorted({text for text in texts if texts.count(text) > 1})
-            if twice:
-                raise ValueError(
-                    f"{what} {', '.join(twice)} is there twice, each may be there once; correct the list of units"
-                )
-        return self
 
 
 class _Measurement(Strict):

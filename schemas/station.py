@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,14 +13,15 @@ from pydantic import (
     model_validator,
 )
 
-from schemas.bounds import Celsius, Degrees, Name, NotNegative, Number, Positive, Rate, Seconds, Seed, Text, Wait
-from schemas.carrier import Carried
+from schemas.bounds import Celsius, Degrees, Name, Positive, Rate, Seconds, Text, Wait
 from schemas.errors import WrongUse
 from schemas.fault import FaultOrder
 from schemas.foreign import is_file
 from schemas.own_files import own_file
 from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
+from schemas.simulation import Simulation
+from schemas.station_devices import Device, Devices, Equipment, built_in_equipment
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.uncertainty import TO_SI, Uncertainty
@@ -30,85 +30,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-Bounds = tuple[Number, Number]
 Angles = tuple[Degrees, Degrees]
 SIMULATED = "simulated.toml"
 BUILT_IN = "simulated"
-SIMULATED_EQUIPMENT = "simulated_equipment.toml"
-MOST_SLOTS = 32  # the reader's registers name that many
-LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
-
-
-class Device(Carried):
-    """A device at an address.
-
-    ``maximum`` bounds what may be ordered, by the names of the profile's orders, below the profile's own largest values; for an
-    exciter also ``displacement_mm``, ``velocity_m_s`` and ``acceleration_g``, all peak values. The absolute maximum of the
-    devices' supply is ``maximum.voltage`` of the power supply.
-    """
-
-    device_id: Annotated[int, Field(ge=1, le=247)]
-    maximum: dict[str, Positive] = Field(default_factory=dict[str, float])
-
-    @model_serializer(mode="wrap")
-    def _without_default(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without an empty ``maximum``: captures of earlier versions keep their names."""
-        content = handler(self)
-        return {name: value for name, value in content.items() if name != "maximum" or value}
-
-
-class Slots(Carried):
-    """The fixture's slots, ``count`` of them: slot n answers at ``device_id`` + n."""
-
-    device_id: Annotated[int, Field(ge=1, le=240)]
-    count: Annotated[int, Field(ge=1, le=MOST_SLOTS)] = 8
-
-    @model_validator(mode="after")
-    def _addressable(self) -> Slots:
-        last = self.device_id + self.count - 1
-        if last > LAST_DEVICE_ID:
-            raise ValueError(
-                f"count: {self.count} slots from device_id {self.device_id} end at {last}, {LAST_DEVICE_ID} is the last id "
-                "that Modbus has; begin lower"
-            )
-        return self
-
-
-class Devices(Strict):
-    """Everything that answers on the station's links."""
-
-    outer: Device
-    inner: Device
-    chamber: Device
-    reader: Device
-    slots: Slots
-
-
-class Equipment(Strict):
-    """Equipment for test procedures besides table, chamber and reader, by the role that it has; none where it is left out.
-
-    A simulated station has the built-in equipment besides, unless ``built_in`` is false.
-    """
-
-    built_in: bool = True
-    exciter: Device | None = None
-    shock_machine: Device | None = None
-    centrifuge: Device | None = None
-    power_supply: Device | None = None
-    step_generator: Device | None = None
-
-    def there(self) -> dict[str, Device]:
-        """The equipment that the station has, by role."""
-        devices = {role: getattr(self, role) for role in type(self).model_fields if role != "built_in"}
-        return {role: device for role, device in devices.items() if device is not None}
-
-
-@cache
-def built_in_equipment() -> Equipment:
-    """The test equipment of a simulated station whose file has none of its own."""
-    source = f"stations/{SIMULATED_EQUIPMENT}"
-    content = parse_toml(files("stations").joinpath(SIMULATED_EQUIPMENT).read_text("utf-8"), source)
-    return Equipment.model_validate(content["equipment"])
 
 
 class Limits(Strict):
@@ -166,53 +90,6 @@ class LinkSettings(Strict):
 
     timeout_s: Seconds = 3.0
     read_attempts: Annotated[int, Field(ge=1, le=5)] = 2
-
-
-class Hidden(Strict):
-    """A hidden effect of the simulated station, with figures other than its usual ones."""
-
-    kind: str
-    figures: dict[str, Number] = Field(default_factory=dict[str, float])
-
-
-class ReferenceErrors(Strict):
-    """Standard deviations of the simulated station's own errors; each station draws its errors from its seed, once.
-
-    ``pose_urad`` is drawn at every move, the thermometer's for the station, ``soak_K`` at every soak, ``slot_gradient_K`` of the
-    element against its thermometer for each slot.
-    """
-
-    gravity_ppm: NotNegative = 0.0
-    level_urad: NotNegative = 0.0
-    orthogonality_urad: NotNegative = 0.0
-    outer_offset_urad: NotNegative = 0.0
-    inner_offset_urad: NotNegative = 0.0
-    harmonics_urad: NotNegative = 0.0
-    pose_urad: NotNegative = 0.0
-    thermometer_offset_K: NotNegative = 0.0
-    thermometer_slope_percent: NotNegative = 0.0
-
-
-class Simulation(Strict):
-    """How the simulated station is made."""
-
-    seed: Seed = 1
-    room_C: Celsius = 23.0
-    local_gravity_m_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] = 9.80665
-    slot_rotation_mrad: NotNegative = 1.0
-    slot_lag_s: Bounds = (90.0, 200.0)
-    slot_gradient_K: NotNegative = 0.1
-    supply_spread: NotNegative = 1e-3
-    preset_overrides: dict[str, Number] = Field(default_factory=dict[str, float])
-    hidden: list[Hidden] = Field(default_factory=list[Hidden])
-    faults: list[FaultOrder] = Field(default_factory=list[FaultOrder])
-    reference_errors: ReferenceErrors | None = None
-
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without what is not stated: captures of earlier versions keep their names."""
-        content = handler(self)
-        return {name: value for name, value in content.items() if name != "reference_errors" or value is not None}
 
 
 class StationConfig(Strict):

@@ -13,7 +13,7 @@ from schemas.errors import DataRejected
 from schemas.tables import TABLES
 
 if TYPE_CHECKING:
-    from schemas.tables import Table
+    from schemas.table import Table
 
 
 def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from contextlib import AbstractContextManager
 
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
     from schemas.station import StationConfig
     from stations.station import Station
 

@@ -25,9 +25,10 @@ from stations.station import Station, nobody_else
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from schemas.lot import Lot
     from schemas.profile import Carrier, Profile
-    from schemas.recipe import Lot
-    from schemas.station import Device, Limits, StationConfig
+    from schemas.station import Limits, StationConfig
+    from schemas.station_devices import Device
     from stations.devices.axis import TableAxis
     from stations.devices.chamber import ThermalChamber
     from stations.devices.values import Values

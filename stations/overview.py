@@ -14,7 +14,7 @@ from stations.safety.safety_status import unsafe_reason
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
     from schemas.station import StationConfig
     from stations.station import Station
 

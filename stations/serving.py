@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from threading import Event
 
+    from schemas.lot import Lot
     from schemas.profile import Register
-    from schemas.recipe import Lot
     from schemas.station import StationConfig
     from stations.codec import Value
     from stations.plant.plant import Plant

@@ -26,7 +26,8 @@ from schemas.station import StationConfig
 from stations.clock import steady
 from stations.opening import open_devices
 from stations.safety.folder import log_event
-from stations.safety.leases import Leases, Part, addresses, new_holder
+from stations.safety.lease_parts import Part, addresses
+from stations.safety.leases import Leases, new_holder
 from stations.safety.safe_state import SafeStep, reach_safe_state
 from stations.safety.watchdog_protocol import BEAT, DONE, READY
 

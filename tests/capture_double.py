@@ -17,8 +17,9 @@ from pipelines.archive.signatures import key_place
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job, Request
+from schemas.poses import Pose
 from schemas.progress import Progress
-from schemas.recipe import Pose, Recipe
+from schemas.recipe import Recipe
 
 LSB_PER_G = 256000.0
 FULL_SCALE_LSB = 524287.0

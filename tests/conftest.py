@@ -27,10 +27,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(getattr(pytest.mark, parts[0]))
 
 
+# the collection makes hundreds of thousands of objects that all stay: searching them for garbage is a quarter of its time
+gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Leaves what the collection has made, which stays until the end, out of every later search for garbage."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

@@ -21,7 +21,7 @@ SLOW = {"speed_deg_s": 5.0}
 
 DRIVER = """
 import sys, time
-from schemas.recipe import Lot
+from schemas.lot import Lot
 from schemas.station import StationConfig
 from stations.opening import open_station
 config = StationConfig.model_validate_json(sys.argv[1])

@@ -15,12 +15,14 @@ from small_station import QUIET, MemorySink, lot_of, quiet_progress
 from inertial import poses
 from pipelines.capture.capture import capture
 from pipelines.schedule.steps import steps
-from pipelines.stages.reduce import reduce
-from pipelines.stages.validate import validate
+from pipelines.stages.reduce import reduced_summaries
+from pipelines.stages.validate import verdicts
+from pipelines.tables.summaries import summarised
 from schemas.errors import StationError
 from schemas.event import MemoryLog
 from schemas.fault import parse_fault
-from schemas.recipe import Pose, Recipe
+from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station
 from stations.opening import make_plant, serve_plant
 from stations.plant.device import PlantDevices
@@ -105,19 +107,20 @@ def run_case(case: Case) -> CaseResult:
     spoilt = [event.reason for event in events.recorded() if event.kind in {"spoilt", "suspended"}]
     if not sink.records:
         return CaseResult(RUN, message, status, [], 0, planned, spoilt)
-    verdicts = validate([sink.records[n][0] for n in sorted(sink.records)], sink.all(1), lot.units)
-    refused = verdicts.loc[verdicts["refused"], "unit"].tolist()
+    readings = sink.all(1)
+    summaries = summarised([sink.records[n][0] for n in sorted(sink.records)], readings)
+    judged = verdicts(summaries, readings, lot.units)
+    refused = judged.loc[judged["refused"], "unit"].tolist()
     if not message and refused:
-        message = verdicts.loc[verdicts["refused"], "reason"].iloc[0]
+        message = judged.loc[judged["refused"], "reason"].iloc[0]
     outcome = RUN if status else UNIT if refused else RECOVERED
-    bad = list(far_from_the_truth(plant, sink, verdicts, recipe))
+    dwells = reduced_summaries(summaries, readings, judged, recipe.local_gravity_m_s2)
+    bad = list(far_from_the_truth(plant, dwells))
     return CaseResult(outcome, message, status, refused, len(sink.records), planned, spoilt, bad)
 
 
-def far_from_the_truth(plant: Plant, sink: MemorySink, verdicts: pd.DataFrame, recipe: Recipe) -> Iterator[str]:
+def far_from_the_truth(plant: Plant, dwells: pd.DataFrame) -> Iterator[str]:
     """Means of accepted units that differ from the true output; the truth is that of the plant, not of the station."""
-    samples = [sink.records[n][0] for n in sorted(sink.records)]
-    dwells = reduce(samples, sink.all(1), verdicts, recipe.local_gravity_m_s2)
     by_serial = {truth.serial: truth for truth in (plant.truth(unit.serial) for unit in lot_of(UNITS).units)}
     for row in dwells.itertuples():
         truth = by_serial[row.unit]

@@ -5,8 +5,9 @@ from pathlib import Path
 from pipelines.archive import Records
 from pipelines.jobs.job import Job
 from pipelines.jobs.recipes import load_limits, load_recipe
-from schemas.recipe import Lot, Unit
-from schemas.station import Hidden, Simulation, load_station
+from schemas.lot import Lot, Unit
+from schemas.simulation import Hidden, Simulation
+from schemas.station import load_station
 
 RECIPE = """
 name = "ambiguous"

@@ -29,15 +29,21 @@ class Line:
     to_host: list = field(default_factory=list)  # functions that each spoil one piece, spent in order
     heard: list = field(default_factory=list)  # what the host has sent
     host_end: int = -1
+    held: bytes = b""  # what is on its way to the host and has not arrived
 
-    def late(self, seconds):
-        """What holds a piece back and delivers it after a while."""
+    def hold(self, data):
+        """Keeps a piece on its way."""
+        self.held += data
+        return b""
 
-        def spoil(data):
-            threading.Timer(seconds, os.write, (self.host_end, data)).start()
-            return b""
+    def behind_what_is_held(self, data):
+        """The pieces that were kept on their way, and this one behind them."""
+        before, self.held = self.held, b""
+        return before + data
 
-        return spoil
+    def deliver(self):
+        """Lets what is kept on its way arrive."""
+        os.write(self.host_end, self.behind_what_is_held(b""))
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import pytest
 import tomlkit
 from small_station import lot_of, station_of
 
-from schemas.recipe import Lot
+from schemas.lot import Lot
 from schemas.station import StationConfig
 from stations import opening
 from stations.plant.journal import Write

@@ -5,7 +5,9 @@ from typing import Any
 
 import pandas as pd
 
-from schemas.recipe import Lot, Pose, Recipe, Unit
+from schemas.lot import Lot, Unit
+from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station
 from stations.codec import encode
 from stations.opening import make_plant

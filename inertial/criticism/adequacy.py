@@ -6,12 +6,12 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from inertial.criticism.covariance import Noise, Shares
 from inertial.criticism.decisions import CERTAIN_BELOW, DRAWS, ENOUGH, LEAST_SHARE
 from inertial.criticism.drivers import Driver
 from inertial.criticism.field import Candidates
 from inertial.criticism.likelihood import scatter_of_poses, shared_noise
 from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.shares import place_of, shares_at
 from inertial.criticism.space import SEEN, Candidate, Space

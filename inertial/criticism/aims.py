@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.heldout import Fitting
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.penalty import freedom, price
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.separation import Apart, Rivals, apart, predictions, residual_squares, separations, widened
+from inertial.criticism.term import Term
 from inertial.criticism.turn_on import with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace
 

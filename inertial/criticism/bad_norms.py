@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import gammaln
 
-from inertial.criticism.covariance import Noise
 from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise
 from inertial.criticism.problem import Lot, Problem
 
 Array = NDArray[np.float64]

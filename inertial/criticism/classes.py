@@ -6,9 +6,10 @@ from inertial.criticism import decisions
 from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.refinement import refine
 from inertial.criticism.search import judge, ranked, scanned, size_of
+from inertial.criticism.term import Term
 
 __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.problem import Problem
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 

@@ -10,28 +10,22 @@ that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directi
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_blas_funcs, get_lapack_funcs, solve_triangular
+from scipy.linalg import solve_triangular
 
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, walk_kernel
+from inertial.criticism.noise_shares import Noise, Shares
+from inertial.criticism.whitener import EVEN, DwellProfile, applied, whitener_of
 from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
 
-_factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
-_times = get_blas_funcs(("trmm",), dtype=np.float64)[0]
-
 _FEW = 16
 """Columns of a block up to which a triangular product, including its transposition, is faster than a general one."""
-
-_EVEN = 1.5
-"""White standard errors of a block that differ by less than this factor are taken as equal."""
 
 _WHITENERS = 12_000_000
 """Largest number of stored whiteners."""
@@ -45,57 +39,10 @@ LARGE = 15_000
 that a pass goes through in turn, and each would be gone before it is used again."""
 
 
-class Shares(NamedTuple):
-    """Variances of 1/f and of random walk at the end of the record, over the lot's white variance."""
-
-    flicker: float = 0.0
-    walk: float = 0.0
-
-
 @lru_cache(maxsize=256)
 def _lattice(shares: Shares) -> tuple[int | None, ...]:
     """The steps of the lattice at which shares stand; None for none."""
     return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in shares)
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Noise of a lot.
-
-    scale : (blocks,), s: ratio of the standard deviations to those of the white errors and shares
-    prior : prior degrees of freedom of the blocks' variances; infinite if all are equal
-    """
-
-    shares: Shares
-    scale: Array
-    prior: float = np.inf
-
-    def pick(self, blocks: list[int]) -> "Noise":
-        """The noise of some blocks."""
-        return Noise(self.shares, self.scale[blocks], self.prior)
-
-
-@dataclass(frozen=True)
-class _Kernel:
-    """Valid dwells, their times and white profile, common to the blocks of one whitener."""
-
-    time: Array
-    there: NDArray[np.bool_]
-    profile: Array
-    direction: Array | None = None
-
-    def fits(self, time: Array, there: NDArray[np.bool_], profile: Array) -> bool:
-        if self.direction is not None:
-            return False
-        alike = bool(np.array_equal(there, self.there)) and bool(np.all(np.abs(time - self.time) < 1.0))
-        ratio = np.where(there, profile / self.profile, 1.0)
-        return alike and float(ratio.max()) < _EVEN and float(ratio.min()) > 1.0 / _EVEN
-
-
-def _applied(lower: Array, series: Array) -> Array:
-    """Series (blocks, m, n) times a lower triangle (n, n), by half of the products, as the matrix is triangular."""
-    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
-    return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1).T.reshape(series.shape)
 
 
 class Covariance:
@@ -118,7 +65,7 @@ class Covariance:
         self.white = float(np.exp(np.mean(np.log(self.level**2))))
         """White variance that is the unit of the shares, g²."""
         self.span = max(float(np.ptp(time)), 1.0)
-        self._kernels: list[_Kernel] = []
+        self._kernels: list[DwellProfile] = []
         self._groups = self._grouped(time, error, direction)
         self._whiteners: OrderedDict[tuple[int, int | None, int | None], tuple[Array, float]] = OrderedDict()
         self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
@@ -130,13 +77,13 @@ class Covariance:
         for block, there in enumerate(self.there):
             profile = np.where(there, np.where(there, error[block], 1.0) / self.level[block], 1.0)
             own = profile[there]
-            if own.size and own.max() < _EVEN * own.min():
+            if own.size and own.max() < EVEN * own.min():
                 profile = np.ones_like(profile)
             place = next((i for i, k in enumerate(self._kernels) if k.fits(time[block], there, profile)), None)
             if place is None:
                 place = len(self._kernels)
                 way = None if direction is None else direction[block]
-                self._kernels.append(_Kernel(time[block], there, profile, way))
+                self._kernels.append(DwellProfile(time[block], there, profile, way))
             # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
             steps = 2 * round(0.5 * SHARE_STEP * np.log10(self.white / self.level[block] ** 2))
             groups.setdefault((place, steps), []).append(block)
@@ -185,14 +132,15 @@ class Covariance:
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
-        if self._wander is None:
+        wander = self._wander
+        if wander is None:
             return None
         index = [None if step is None else step + steps for step in _lattice(shares)]
         if index == [None, None]:
             return None
         key = (place, index[0], index[1])
         if key not in self._whiteners:
-            self._whiteners[key] = self._made(place, index)
+            self._whiteners[key] = whitener_of(self._kernels[place], index, (wander[0][place], wander[1][place]))
             # applied to many blocks, a whitener costs little beside its use
             room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 4
             most = max(room // self.there.shape[1] ** 2, 4)
@@ -200,26 +148,6 @@ class Covariance:
                 self._whiteners.popitem(last=False)
         self._whiteners.move_to_end(key)
         return self._whiteners[key]
-
-    def _made(self, place: int, index: list[int | None]) -> tuple[Array, float]:
-        kernel = self._kernels[place]
-        there, whole = kernel.there, bool(kernel.there.all())
-        covariance = np.diag(kernel.profile[there] ** 2)
-        for i, wander in zip(index, self._wander or (), strict=True):
-            if i is not None:
-                own = wander[place] if whole else wander[place][np.ix_(there, there)]
-                covariance += 10.0 ** (i / SHARE_STEP) * own
-        # of the transpose, which is in Fortran order: no copy
-        upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
-        if failed:
-            raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
-        logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
-        inverse = _invert(upper, lower=0, overwrite_c=1)[0].T
-        if whole:
-            return inverse, logdet
-        filled = np.zeros((there.size, there.size))
-        filled[np.ix_(there, there)] = inverse
-        return filled, logdet
 
     def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
@@ -233,7 +161,7 @@ class Covariance:
                     white /= level[:, None, None]
                     return white
                 own = columns / level[:, None, None]
-                return np.swapaxes(_applied(whitener[0], np.swapaxes(own, -1, -2)), -1, -2)
+                return np.swapaxes(applied(whitener[0], np.swapaxes(own, -1, -2)), -1, -2)
         place_of = np.arange(len(self.level)) if blocks is None else blocks
         where = np.full(len(self.level), -1)
         where[place_of] = np.arange(place_of.size)

@@ -21,10 +21,11 @@ from inertial.criticism.handling.base import Handling
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival
 from inertial.criticism.smallest import Smallest, smallest_named
+from inertial.criticism.term import Term
 from inertial.criticism.unseen import unseen
 from inertial.criticism.verdict import Unexplained, judged
 from inertial.effects.covariate import Covariate

@@ -19,12 +19,13 @@ from inertial.criticism.handling.base import Exchangeable, Handling, Misfit
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
-from inertial.criticism.model import Model, Term, refuse_without_freedom
+from inertial.criticism.model import Model, refuse_without_freedom
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import terms_of
 from inertial.criticism.search import SearchResult, anything, judge, search
 from inertial.criticism.slope import slope_of
+from inertial.criticism.term import Term
 from inertial.criticism.turn_on import with_turn_on
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect

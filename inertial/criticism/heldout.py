@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.model import Term
 from inertial.criticism.problem import Problem
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 

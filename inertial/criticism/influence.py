@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.penalty import fall, freedom
 from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 

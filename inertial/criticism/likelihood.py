@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inertial.criticism import variance
-from inertial.criticism.covariance import Noise
 from inertial.criticism.decisions import TOGETHER
 from inertial.criticism.handling.base import Handling, by_block, tilts
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise
 from inertial.criticism.penalty import freedom, price
 from inertial.criticism.space import Space
 from inertial.criticism.tail_areas import log_chi2_tail
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 

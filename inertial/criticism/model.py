@@ -1,20 +1,19 @@
 """A model under criticism: its columns in a problem, and the noise of its residuals."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism import variance
-from inertial.criticism.covariance import LARGE, Noise, Shares
-from inertial.criticism.handling.base import Handling
-from inertial.criticism.problem import SHARED, Problem
+from inertial.criticism.covariance import LARGE
+from inertial.criticism.noise_shares import Noise, Shares
+from inertial.criticism.problem import Problem
 from inertial.criticism.shares import best_shares, plausible_shares
 from inertial.criticism.space import Candidate, Space
+from inertial.criticism.term import Term
 from inertial.criticism.whitened_columns import WhitenedColumns
-from inertial.effects.base import AnyEffect
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
@@ -35,35 +34,6 @@ _SHARE_OF_WHITE = 0.5
 
 _OWN = 20
 """Degrees of freedom of a block from which on its own variance is used for the shares; blocks with fewer have a common one."""
-
-
-@dataclass(frozen=True)
-class Term:
-    """An effect in a model, at values of its nonlinear parameters.
-
-    values : of nonlinear parameters and constants; one value, or one per sensor axis
-    first : how many of its columns are used; None for all
-    rest : whether its memory was at rest before the first dwell; its state then is unknown otherwise
-    """
-
-    effect: AnyEffect | Handling
-    values: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
-    first: int | None = None
-    rest: bool = False
-
-    @property
-    def shared(self) -> bool:
-        """Whether all blocks share its coefficients."""
-        return self.effect.scope in SHARED
-
-    @property
-    def keywords(self) -> dict[str, float | tuple[float, ...]]:
-        """Values as keywords of the effect's columns."""
-        return dict(self.values)
-
-    def candidate(self, problem: Problem) -> Candidate:
-        """The term's columns in a problem, as a candidate."""
-        return problem.candidate(self.effect, [self.keywords], first=self.first)
 
 
 class Model:

@@ -4,9 +4,10 @@ import numpy as np
 
 from inertial.criticism import variance
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.space import Gain, Space
 from inertial.criticism.tail_areas import log_f_tail
+from inertial.criticism.term import Term
 
 PER_COEFFICIENT = 2.5
 PER_COLUMN = 6.0

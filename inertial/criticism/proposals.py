@@ -11,9 +11,10 @@ from inertial.criticism.aims import Objective, RivalDiscrimination, Sighting
 from inertial.criticism.classes import EffectClass
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.menus import Kind, StepSequence, TableReach, courses, pose_grid, present, reach_of, temperatures
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.offers import Offer, Offers
 from inertial.criticism.separation import FEW, MANY, Rivals, rivals_of
+from inertial.criticism.term import Term
 from inertial.criticism.twins import never_apart, twins_of
 from inertial.design import grid_of
 from inertial.errors import MissingInput

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism import decisions
-from inertial.criticism.covariance import Noise
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise
 from inertial.criticism.problem import Problem
 from inertial.criticism.space import Candidate, Space
+from inertial.criticism.term import Term
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, Nonlinear
 

@@ -15,9 +15,10 @@ from inertial.criticism.bad_dwells import bad_dwells, without
 from inertial.criticism.comparison import Estimate, residuals_of
 from inertial.criticism.decisions import BLOCKS, CONFIRMED, REFUTED
 from inertial.criticism.likelihood import shared_noise
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.space import Space
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 

@@ -7,15 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism import decisions
-from inertial.criticism.covariance import Shares
 from inertial.criticism.decisions import MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.likelihood import Ratio, likelihood_ratio, weighed
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Shares
 from inertial.criticism.penalty import cost_of_model, fall
 from inertial.criticism.refinement import refine
 from inertial.criticism.space import Gain, Space
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 

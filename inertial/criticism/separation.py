@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.comparison import estimate
-from inertial.criticism.covariance import Covariance, Noise
+from inertial.criticism.covariance import Covariance
 from inertial.criticism.decisions import AXES_DIFFER
 from inertial.criticism.handling.base import Handling
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.profile import LikelihoodProfile
 from inertial.criticism.shared_noise import shared_factor
 from inertial.criticism.space import Space
+from inertial.criticism.term import Term
 from inertial.criticism.turn_on import with_turn_on
 from inertial.planning.sequences import SequenceStep, StationPace, extended
 

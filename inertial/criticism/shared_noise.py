@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from inertial.criticism import decisions
 from inertial.criticism.comparison import estimate
 from inertial.criticism.heldout import residuals
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from inertial.criticism.covariance import Shares
 from inertial.criticism.decisions import LARGEST_SHARE, LEAST_SHARE, SHARE_STEP
+from inertial.criticism.noise_shares import Shares
 
 Place = tuple[int | None, int | None]
 

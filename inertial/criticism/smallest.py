@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from inertial.criticism.covariance import Noise, Shares
 from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
 from inertial.criticism.field import Candidates
 from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import price
 from inertial.criticism.space import SEEN, Space
 

@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.covariance import Covariance, Noise
+from inertial.criticism.covariance import Covariance
+from inertial.criticism.noise_shares import Noise
 
 Array = NDArray[np.float64]
 

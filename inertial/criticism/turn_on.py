@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.criticism.model import Term
+from inertial.criticism.term import Term
 from inertial.effects.base import Array, SensorEffect, stack
 from inertial.power import switched
 from inertial.state import State

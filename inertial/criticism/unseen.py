@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.covariance import Noise
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import soaks
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise
 from inertial.criticism.problem import Problem
+from inertial.criticism.term import Term
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, SensorEffect
 from inertial.planning.ranges import UnseenRange, unseen_ranges

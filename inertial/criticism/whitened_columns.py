@@ -5,7 +5,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.covariance import LARGE, Shares
+from inertial.criticism.covariance import LARGE
+from inertial.criticism.noise_shares import Shares
 from inertial.criticism.problem import Problem
 
 Array = NDArray[np.float64]

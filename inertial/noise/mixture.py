@@ -1,6 +1,8 @@
 """Non-negative mixtures of noise terms under an Allan variance curve, in units of one sample."""
 
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ _ROUNDS = 4  # of weights from the strengths before
 _STEPS = 12  # of Gauss-Newton, and halvings of one
 _SETTLED = 1e-6  # chi-square that a step no longer takes off
 _FEWEST_DOF = 1.0
+_FLOOR = 1e-6  # of the eigenvalues of a covariance, over the largest
 
 
 def basis(m: NDArray[np.int64]) -> Array:
@@ -24,17 +27,18 @@ def basis(m: NDArray[np.int64]) -> Array:
 
     3/tau^2, 1/tau, 2 ln2/pi, tau/3, tau^2/2: IEEE Std 952-1997, annex C.
     """
-    tau = m.astype(np.float64)
-    return np.stack(
-        [
-            3.0 / tau**2,
-            1.0 / tau,
-            np.full_like(tau, 2.0 * np.log(2.0) / np.pi),
-            tau / 3.0,
-            tau**2 / 2.0,
-        ],
-        1,
+    return _basis(m.astype(np.float64).tobytes())
+
+
+@lru_cache(maxsize=64)
+def _basis(times: bytes) -> Array:
+    """The same for the bytes of averaging times; not to be written to."""
+    tau = np.frombuffer(times)
+    columns = np.stack(
+        [3.0 / tau**2, 1.0 / tau, np.full_like(tau, 2.0 * np.log(2.0) / np.pi), tau / 3.0, tau**2 / 2.0], 1
     )
+    columns.setflags(write=False)
+    return columns
 
 
 def degrees_of_freedom(variance: Array, m: NDArray[np.int64], n: int) -> Array:
@@ -143,7 +147,7 @@ def problem(variance: Array, moments: Sums, strengths: Array) -> MixtureFit:
     return MixtureFit(
         model=basis(moments.m),
         target=np.log(variance) - (digamma(half) - np.log(half)),
-        whiten=solve_triangular(_root(correlation * np.outer(spread, spread)), np.eye(len(half)), lower=True),
+        whiten=_whitener(correlation * np.outer(spread, spread)),
     )
 
 
@@ -177,10 +181,16 @@ def deviance(
     return best, likeliest
 
 
-def _root(covariance: Array) -> Array:
-    """Cholesky factor; rounding may cost a nearly singular one its definiteness by a hair."""
+def _whitener(covariance: Array) -> Array:
+    """Inverse of the lower Cholesky factor; rounding may cost a nearly singular covariance its definiteness by a hair."""
+    identity = np.eye(len(covariance))
+    with suppress(np.linalg.LinAlgError):
+        whiten = solve_triangular(np.linalg.cholesky(covariance), identity, lower=True)
+        # the smallest eigenvalue is at least this, and the largest at most the trace
+        if 1.0 / float(np.sum(whiten * whiten)) > _FLOOR * float(np.trace(covariance)):
+            return whiten
     values, vectors = np.linalg.eigh(covariance)
-    floor = 1e-6 * float(values[-1])
-    if values[0] > floor:
-        return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-    return np.asarray(np.linalg.cholesky((vectors * np.maximum(values, floor)) @ vectors.T), dtype=np.float64)
+    floor = _FLOOR * float(values[-1])
+    if values[0] <= floor:
+        covariance = (vectors * np.maximum(values, floor)) @ vectors.T
+    return solve_triangular(np.linalg.cholesky(covariance), identity, lower=True)

@@ -1,6 +1,7 @@
 """Which terms an Allan curve needs, and between which values each may lie, in units of one sample."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -128,6 +129,7 @@ class _Curve:
     def low_end(self, j: int, start: float, threshold: float) -> float:
         """Strength below ``start`` at which the deviance has risen by ``threshold``, for a term that is worth more than that."""
 
+        @cache
         def excess(log_strength: float) -> float:
             return min(self.at(j, float(np.exp(log_strength))) - threshold, 1e6)
 
@@ -165,6 +167,7 @@ def _profile(task: MixtureFit, strengths: Array, best: float, j: int, threshold:
     free[j] = False
     whole_curve = float(np.exp(np.min(task.target - np.log(task.model[:, j]))))
 
+    @cache
     def excess(log_strength: float) -> float:
         start = strengths.copy()
         start[j] = np.exp(log_strength)
@@ -182,7 +185,10 @@ def _profile(task: MixtureFit, strengths: Array, best: float, j: int, threshold:
 
 
 def _crossing(excess: Callable[[float], float], a: float, b: float, resolution: float = _RESOLUTION) -> float:
-    """Strength where `excess` of its logarithm changes sign; the nearer end where it does not."""
+    """Strength where `excess` of its logarithm changes sign; the nearer end where it does not.
+
+    `excess` keeps its values: each end is asked for again by the search.
+    """
     at_a, at_b = excess(a), excess(b)
     if at_a * at_b > 0.0:
         return float(np.exp(a if abs(at_a) < abs(at_b) else b))

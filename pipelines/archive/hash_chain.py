@@ -71,9 +71,14 @@ def entries(root: Place) -> Iterator[tuple[int, Place]]:
         yield number, place_of_entry(root, number)
 
 
+def name_of_entry(number: int) -> str:
+    """Name of an entry's file, below the root of the archive."""
+    return f"{FOLDER}/{number // SHARD:06d}/{number:09d}.json"
+
+
 def place_of_entry(root: Place, number: int) -> Place:
     """Where an entry lies."""
-    return root / FOLDER / f"{number // SHARD:06d}" / f"{number:09d}.json"
+    return root / name_of_entry(number)
 
 
 def _below(folder: Place) -> list[Place]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.audit.calibrations import Calibrations, captures_of, later, load, runs_of, undated
 from pipelines.audit.certificates import Certificates, certificates_of
-from pipelines.audit.drifts import KindDrift, UnitDrift, kind_drifts, unit_drifts
+from pipelines.audit.drifts import KindDrift, kind_drifts
 from pipelines.audit.due import Due, due, last_measured
 from pipelines.audit.exchanged_serials import Stranger, strangers
 from pipelines.audit.gauge_mounts import Study, studies
@@ -26,6 +26,7 @@ from pipelines.audit.population import (
     yields,
 )
 from pipelines.audit.stations_over_time import ControlChart, StationSeries, charts, slot_series, station_series
+from pipelines.audit.unit_drifts import UnitDrift, unit_drifts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

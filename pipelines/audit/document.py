@@ -15,8 +15,8 @@ from pipelines.audit.parameters import unit_text
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
-    from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.stations_over_time import ControlChart, StationSeries
+    from pipelines.audit.unit_drifts import UnitDrift
 
 MOST_UNITS = 200  # histories in the document; ``tumbleline query`` gives the others by their serial
 SCHEMA = 1

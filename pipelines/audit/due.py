@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 
     from pipelines.audit.calibrations import Calibrations
     from pipelines.audit.certificates import Certificates
-    from pipelines.audit.drifts import KindDrift, UnitDrift
+    from pipelines.audit.drifts import KindDrift
     from pipelines.audit.rules import Rules
+    from pipelines.audit.unit_drifts import UnitDrift
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]

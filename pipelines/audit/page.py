@@ -16,9 +16,9 @@ from pipelines.report.templates import template
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
-    from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.finding import AuditFinding
     from pipelines.audit.stations_over_time import ControlChart, StationSeries
+    from pipelines.audit.unit_drifts import UnitDrift
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 

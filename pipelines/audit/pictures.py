@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pipelines.audit.audit import Audit
-    from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.population import Share
     from pipelines.audit.stations_over_time import ControlChart, StationSeries
+    from pipelines.audit.unit_drifts import UnitDrift
 
 BLUE, RED, GREY, ORANGE, GREEN = "#0072b2", "#c62828", "#b4b4b4", "#d55e00", "#009e73"
 ROW_IN = 2.5

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from pipelines.audit.audit import Audit
     from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.drifts import UnitDrift
+    from pipelines.audit.unit_drifts import UnitDrift
 
 
 def of_units(audit: Audit) -> Iterator[AuditFinding]:

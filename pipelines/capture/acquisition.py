@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from pipelines.capture.sink import CaptureSink
     from pipelines.schedule.steps import Step
-    from schemas.recipe import Lot, Recipe, Unit
+    from schemas.lot import Lot, Unit
+    from schemas.recipe import Recipe
     from stations.devices.reader import Instruments
     from stations.devices.slot import Identity
     from stations.station import Station

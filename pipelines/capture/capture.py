@@ -18,8 +18,9 @@ from stations.station import Unsettled
 
 if TYPE_CHECKING:
     from schemas.event import EventLog
+    from schemas.lot import Lot
     from schemas.progress import Progress
-    from schemas.recipe import Lot, Recipe
+    from schemas.recipe import Recipe
     from stations.station import Station
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pipelines.capture.record import Record
     from schemas.event import Event
-    from schemas.recipe import Unit
+    from schemas.lot import Unit
     from stations.devices.reader import Reader
     from stations.devices.slot import Identity
 

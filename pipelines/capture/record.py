@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from schemas.recipe import Pose, Unit
+    from schemas.lot import Unit
+    from schemas.poses import Pose
     from stations.devices.reader import Instruments
     from stations.devices.slot import Identity, Samples
 

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
     from pipelines.schedule.steps import Step
     from schemas.event import Kind
-    from schemas.recipe import Pose, Unit
+    from schemas.lot import Unit
+    from schemas.poses import Pose
     from stations.devices.reader import Instruments
     from stations.station import Station
 

@@ -5,20 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.archive import Archive, Run, files
+from pipelines.archive import Run, files
 from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates.days import day_of, months_after, today
 from pipelines.certificates.entries import FOLDER, LedgerEntry
-from pipelines.certificates.measured import END, measured_span
 from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
-from pipelines.integrity import verify
-from pipelines.jobs.terms import archived_terms
-from pipelines.stages.grade import BUDGET
+from pipelines.chain.certifiable import (
+    refuse_inadequate_import,
+    refuse_meanwhile,
+    refuse_overdue,
+    refuse_two_at_once,
+    refuse_unsound,
+    refuse_unstated,
+)
 from pipelines.tables.frames import rows_of
-from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
+from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,12 +30,6 @@ if TYPE_CHECKING:
 
     from pipelines.certificates.ledger import Ledger
 
-NEVER_LEFT_OUT = ("gravity", "level", "orthogonality", "outer_offset", "harmonics", "pose", "thermometer")
-"""Entries of [uncertainty] without which nothing is certified; without the seat the misalignment to the case is not."""
-NEEDED_OF_FACES = ("gravity", "level", "pose", "thermometer")
-"""The same for an import whose units were put down on known faces: there are no encoders."""
-NEEDED_OF_NORMS = ("gravity", "thermometer")
-"""The same for an import of unknown orientations: the norm of gravity does not depend on the poses."""
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 
 
@@ -171,131 +168,3 @@ def _blank(serial: str, **content: Any) -> LedgerEntry:
     return LedgerEntry(
         serial=serial, sequence=0, action="certify", ends=(), who="", where="", when="", previous="", **content
     )
-
-
-def refuse_unsound(run: Run, keys: Mapping[str, Ed25519PublicKey]) -> None:
-    """Refuse a run that ``tumbleline verify RUN`` finds something wrong with: it would lend its findings a certificate.
-
-    Parameters
-    ----------
-    keys : public keys that are trusted; where there are any, each file of the run must be signed by one.
-    """
-    findings = verify(Archive(run.archive.root), [run.id], keys=keys, demanded=bool(keys)).checked.findings
-    if findings:
-        more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
-        raise ArchiveUnusable(
-            f"certify: {findings[0].path} {findings[0].message}{more}; not certified, see 'tumbleline verify {run.id}'"
-        )
-
-
-def refuse_meanwhile(ledger: Ledger, event: LedgerEntry, seen: int) -> None:
-    """Refuse a calibration where another of the unit was written since the ledger was looked at.
-
-    Parameters
-    ----------
-    seen : how many events the unit had then.
-    """
-    known = ledger.calibrations(event.serial)
-    for one in known:
-        again = (one.run, one.start, one.until) == (event.run, event.start, event.until)
-        if one.event.sequence > seen and not again and one.start < event.until and event.start < one.until:
-            raise WrongUse(
-                f"certify: unit {event.serial}: certificate {one.certificate} of run {one.run}, valid from {one.start} until "
-                f"{one.until}, was written by {one.event.who} while this command was at work; nothing was certified: look with "
-                f"'tumbleline show {event.serial}', then give the command again if it is to take its place"
-            )
-
-
-def refuse_overdue(run: Run) -> None:
-    """Refuse a run whose station had a reference standard that was due before it measured."""
-    about = run.about
-    day = str(about.get("measured") or about["when"])[:10]
-    for standard in (about.get("station") or {}).get("reference", []):
-        if str(standard["due"]) <= day:
-            raise WrongUse(
-                f"certify: run {run.id} was measured on {day}, reference standard {standard['id']} (certificate "
-                f"{standard['certificate']}) was due on {standard['due']}; have it calibrated, enter its new certificate in the "
-                "station's file, and measure again"
-            )
-
-
-def refuse_inadequate_import(run: Run) -> None:
-    """Refuse an import whose model is not adequate, or cannot be judged: none of its poses was kept to verify it with."""
-    about = run.about
-    if about.get("capture") or "dwells" not in run.tables():
-        return
-    from pipelines.diagnosis.diagnose import diagnose  # loads scipy.stats, and captured runs do not need it
-
-    past = run.table("history") if "history" in run.tables() else None
-    effects = list((about.get("recipe") or {}).get("effects", ()))
-    verdict = diagnose(run.table("dwells"), past, effects or None)
-    if verdict["adequate"] is not True:
-        why = f"cannot be judged ({verdict['reason']})" if verdict["adequate"] is None else "is not adequate"
-        raise WrongUse(
-            f"certify: run {run.id} was imported and its model {why}, an adequate one is needed; see 'tumbleline diagnose "
-            f"{run.id}'"
-        )
-
-
-def refuse_unstated(run: Run) -> None:
-    """Refuse a run whose figures rest on noise only, on assumed figures, or on no figure over the period of validity.
-
-    A run that is made again from archived data keeps what its station stated when it measured: it states no more than before.
-    """
-    terms, grades = archived_terms(run.about), run.table("grades")
-    if terms is None and not run.about.get("capture"):
-        raise WrongUse(
-            f"certify: run {run.id} was imported without a statement of its references (noise only), a certificate needs the "
-            "whole budget; import the recording again with --references FILE, a TOML with [uncertainty] as in a station's file"
-        )
-    if terms is None or terms.stated is None or "basis" not in grades or set(grades["basis"]) != {BUDGET}:
-        raise WrongUse(
-            f"certify: run {run.id} states no uncertainty of its references (noise only), a certificate needs the whole budget; "
-            "add [uncertainty] to the station's file and measure again"
-        )
-    if terms.stated.grade_source == "assumed":
-        raise WrongUse(
-            f'certify: run {run.id} rests on assumed uncertainties (grade_source = "assumed"), certificates or data sheets are '
-            "needed; state where the figures of [uncertainty] come from and measure again"
-        )
-    needed, again = _needed(run)
-    missing = {name: rules for name, rules in terms.stated.not_stated.items() if name in needed}
-    if missing:
-        listed = ", ".join(f"{name} (dominates {rules})" for name, rules in missing.items())
-        raise WrongUse(f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] and {again}")
-    if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
-        kept = "verification poses" if run.about.get("capture") else "dwells held out by --verify N"
-        raise WrongUse(
-            f"certify: run {run.id} has no error over the period of validity ({terms.certificate.validity_months} months): state "
-            f"[stability] of the device with a horizon_days that reaches so far, and {kept}, and {again}"
-        )
-
-
-def _needed(run: Run) -> tuple[tuple[str, ...], str]:
-    """Entries of [uncertainty] without which a run is not certified, and what is to be done where one is missing."""
-    if run.about.get("capture"):
-        return NEVER_LEFT_OUT, "measure again"
-    columns = set(run.table("dwells").columns)
-    again = "import the recording again"
-    if set(ANGLE_COLUMNS) <= columns:
-        return NEVER_LEFT_OUT, again
-    return NEEDED_OF_FACES if set(FORCE_COLUMNS) <= columns else NEEDED_OF_NORMS, again
-
-
-def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:
-    """Refuse a unit that was measured somewhere else at the same time: two units have one serial."""
-    own = measured_span(run)
-    for one in ledger.calibrations(serial):
-        other = Run(run.archive, one.run)
-        if (
-            other.id == run.id
-            or not (other.path / END).is_file()
-            or other.about.get("capture") == run.about.get("capture")
-        ):
-            continue
-        theirs = measured_span(other)
-        if own and theirs and own[0] < theirs[1] and theirs[0] < own[1]:
-            raise WrongUse(
-                f"certify: unit {serial} was measured in run {run.id} from {own[0]} to {own[1]} and in run {other.id} from "
-                f"{theirs[0]} to {theirs[1]}: two units have one serial; find out which is which, and give one another"
-            )

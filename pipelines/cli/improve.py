@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
+from pipelines.cli.improve_steps import ImprovedTables, Improvement
 from pipelines.cli.options import (
     ArchiveOption,
     ByOption,
@@ -21,12 +20,7 @@ from pipelines.cli.options import (
     LeaveOutOption,
     print_json,
 )
-from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.jobs.model_files import Version
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 215
@@ -35,9 +29,6 @@ EXAMPLES = (
     "tumbleline improve latest",
     "tumbleline improve dwells.csv --model model.toml --fresh fresh.csv --yes",
 )
-
-CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
-UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
 
 
 def command(
@@ -97,10 +88,10 @@ def command(
     target = _target(model, output)
     dwells, temperatures, again, again_temperatures = both_runs(data, history, fresh, fresh_history, archive)
     dwells = without_dwells(dwells, named_dwells(leave_out))
-    tables = _Tables(dwells, temperatures, again, again_temperatures)
+    tables = ImprovedTables(dwells, temperatures, again, again_temperatures)
     beside = history or (history_beside(data) if is_file(data) else "")
     may_measure = True if yes and measure is None else measure
-    improvement = _Improvement(data, tables, model, target, beside, by, as_json, archive, fresh, may_measure)
+    improvement = Improvement(data, tables, model, target, beside, by, as_json, archive, fresh, may_measure)
     document = improvement.run(judged, _names(choose), yes=yes)
     if as_json:
         print_json(document)
@@ -109,196 +100,6 @@ def command(
 
         print_improvement(document)
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
-
-
-@dataclass(frozen=True)
-class _Tables:
-    """Dwells and temperatures of the run, and of the fresh run where there is one."""
-
-    dwells: pd.DataFrame
-    history: pd.DataFrame | None
-    fresh: pd.DataFrame | None
-    fresh_history: pd.DataFrame | None
-
-
-@dataclass(frozen=True)
-class _Improvement:
-    """Diagnosis, choice, new versions of the model, error of each version, diagnosis of the last one.
-
-    model : the file that is judged; None for a list of effects · target : the file to write
-    used_history : file of temperatures against time; empty where there is none · by : author of the change
-    fresh : the fresh run as it was given; empty: it is looked for, or measured as ``measure`` says
-    """
-
-    data: str
-    tables: _Tables
-    model: Path | None
-    target: Path
-    used_history: str
-    by: str
-    quiet: bool
-    archive: str | None
-    fresh: str
-    measure: bool | None
-
-    def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> dict[str, Any]:
-        """The document of the command; the model file is written last, after all checks."""
-        from pipelines.cli.improve_text import next_lines, print_heading
-        from pipelines.cli.next_commands import judged_data
-        from pipelines.jobs.model_files import publish_model
-
-        before = self._diagnosis(judged, full=True)
-        choices = self._choices(before, named, yes=yes)
-        added = [choice["effect"] for choice in choices if choice["added"]]
-        versions, text = self._versions(before["effects"], added, choices)
-        after = before
-        if added:
-            print_heading(f"Diagnosis with {', '.join(added)}", quiet=self.quiet)
-            after = self._diagnosis(list(versions[-1].effects), full=False)
-        tables, fresh = self._with_fresh(bool(added))
-        rows = self._rows(versions, after["error"]["floor_ug"], tables)
-        if text:
-            publish_model(self.target, text)
-        document: dict[str, Any] = {
-            "data": self.data,
-            "file": str(self.target) if added or self.model else None,
-            "diagnosis": before,
-            "choices": choices,
-            "added": added,
-            "effects": list(versions[-1].effects),
-            "after": after if added else None,
-            "adequate": after["adequate"],
-            "ladder": rows,
-            "refuted": [name for row in rows if row["confirmed"] is False for name in row["added"]],
-            "warnings": list(dict.fromkeys(text for row in rows for text in row["warnings"])),
-        }
-        document["fresh"] = fresh or None
-        data = partial(judged_data, self.data, self.used_history, self.archive)
-        document["next"] = next_lines(document, self.target, data, after=after)
-        return document
-
-    def _with_fresh(self, changed: bool) -> tuple[_Tables, str]:
-        """The tables with those of a fresh run, and its name; a changed model is judged by one where there may be one."""
-        from pipelines.cli.improve_fresh import fresh_run
-        from pipelines.cli.inputs import dwells_and_history
-
-        fresh = self.fresh
-        if fresh or not changed:
-            return self.tables, fresh
-        fresh = fresh_run(self.data, self.archive, measure=self.measure)
-        if not fresh:
-            return self.tables, ""
-        again, temperatures = dwells_and_history(fresh, "", self.archive)
-        return replace(self.tables, fresh=again, fresh_history=temperatures), fresh
-
-    def _diagnosis(self, effects: list[str] | None, *, full: bool) -> dict[str, Any]:
-        """The diagnosis of a model, printed with all its tables or as its verdict alone."""
-        from pipelines.cli.diagnose import diagnosed
-        from pipelines.cli.diagnosis_text import print_diagnosis
-        from pipelines.cli.improve_text import print_verdict
-
-        tables = self.tables
-        document, _ = diagnosed(tables.dwells, tables.history, effects, self.data, with_report=False)
-        document["history"] = self.used_history or None
-        if not self.quiet:
-            if full:
-                print_diagnosis(document, data=None, model=self.model)
-            else:
-                print_verdict(document)
-        return document
-
-    def _choices(self, diagnosis: dict[str, Any], named: list[str], *, yes: bool) -> list[dict[str, Any]]:
-        """For each class with a recommended effect: the effect, those that these data do not separate from it, and the answer.
-
-        Raises
-        ------
-        WrongUse
-            An effect of --effect is in no class, two are in one class, or standard input ended before an answer.
-        """
-        classes = [g["effects"] for g in diagnosis["classes"] if set(g["effects"]) & set(diagnosis["recommended"])]
-        known = [name for members in classes for name in members]
-        for name in named:
-            if name not in known:
-                raise WrongUse(
-                    f"improve: --effect {name}: the diagnosis does not name it; {did_you_mean(name, known)}; 'tumbleline "
-                    "extend' adds any effect"
-                    if known
-                    else f"improve: --effect {name}: the diagnosis names no effect; leave --effect out"
-                )
-        answers: list[dict[str, Any]] = []
-        for members in classes:
-            own = [name for name in named if name in members]
-            if len(own) > 1:
-                raise WrongUse(
-                    f"improve: --effect {','.join(own)}: these data cannot separate them, one per class is needed; name one"
-                )
-            first = next(name for name in diagnosis["recommended"] if name in members)
-            effect = own[0] if own else first
-            others = [name for name in members if name != effect]
-            decided, added = self._answer(effect, others, chosen=bool(own), named=bool(named), yes=yes)
-            answers.append({"effect": effect, "not_separated_from": others, "decided_by": decided, "added": added})
-        return answers
-
-    def _answer(self, effect: str, others: list[str], *, chosen: bool, named: bool, yes: bool) -> tuple[str, bool]:
-        """What decided on an effect, and whether it is added."""
-        from pipelines.cli.terminal import agreed
-
-        if named:
-            return "--effect", chosen
-        if yes:
-            return ("undecided", False) if others else ("--yes", True)
-        question = f"Add {effect} to {self.target}?"
-        if others:
-            alike = ", ".join(others)
-            question = f"These data do not separate {effect} from {alike}. Add the first, {effect}, to {self.target}?"
-        return "question", agreed(question, CHOICES, UNATTENDED)
-
-    def _versions(
-        self, effects: list[str], added: list[str], choices: list[dict[str, Any]]
-    ) -> tuple[list[Version], str]:
-        """The model that was judged and one version per added effect; the text of the model file, empty without a change."""
-        from pipelines.cli.extend import model_step
-        from pipelines.jobs.model_files import Version, extended, model_text, new_model, versions
-
-        judged = Version(1, tuple(effects), (), (), None)
-        if not added:
-            return [judged], ""
-        others = {choice["effect"]: choice["not_separated_from"] for choice in choices}
-        steps = [model_step(name, self._reason(others[name]), self.by, self.data) for name in added]
-        text = model_text(self.model) if self.model else self._begun(new_model, effects, steps[0])
-        model = None
-        for step in steps:
-            text, model = extended(text, step, f"model {self.target.name}")
-        return (versions(model)[-len(added) - 1 :] if model else [judged]), text
-
-    def _begun(self, new_model: Any, effects: list[str], step: Any) -> str:
-        """The first version of a new model file."""
-        from inertial import effects as catalogue
-        from inertial.effects.formula import Formula
-
-        formulas = [name for name in effects if isinstance(catalogue.get(name), Formula)]
-        if formulas:
-            raise WrongUse(
-                f"improve: {formulas[0]} is a formula of the model file that run {self.data} was fitted with, a new file would "
-                "be without it; give that file with --model FILE"
-            )
-        return new_model(self.target, effects, step.by, step.at)
-
-    def _reason(self, others: list[str]) -> str:
-        alone = f"; these data do not separate it from {', '.join(others)}" if others else ""
-        return f"a diagnosis of {Path(self.data).name} names it{alone}"
-
-    def _rows(self, versions: list[Version], noise: float | None, given: _Tables) -> list[dict[str, Any]]:
-        """Errors of each version; none where no unit can be judged."""
-        from pipelines.cli.compare import compared
-        from pipelines.diagnosis.model_history import evolution
-
-        if noise is None:
-            return []
-        tables = (given.dwells, given.history, given.fresh, given.fresh_history)
-        rows = evolution(versions, lambda effects, before: compared(effects, *tables, before=before))
-        keys = ("version", "added", "fitted_ug", "heldout_ug", "fresh_ug", "fall_ug", "fall_u_ug", "confirmed", "text")
-        return [{key: row[key] for key in keys} | {"noise_ug": noise, "warnings": row["warnings"]} for row in rows]
 
 
 def _target(model: Path | None, output: Path | None) -> Path:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer.core import TyperGroup
@@ -18,13 +17,14 @@ from pipelines.cli.options import (
     error_console,
     print_json,
 )
+from pipelines.cli.plan_files import save, write_page, write_pictures
+from pipelines.cli.plan_options import DeviceOption, EffectsOption, NoiseOption, PageOption, WanderOption, with_model
 from pipelines.cli.plan_text import print_plan
 from schemas.errors import PART_FAILED
 
 if TYPE_CHECKING:
     from typer._click import Context
 
-    from pipelines.planning.plan import PlanContext
     from schemas.limits import Limits
     from schemas.recipe import Recipe
 
@@ -71,31 +71,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-DeviceOption = Annotated[
-    str,
-    typer.Option(
-        "--device", metavar="PRESET", help="Preset with the noise of the device; the recipe's device by default."
-    ),
-]
-NoiseOption = Annotated[
-    float | None,
-    typer.Option("--noise", min=0.0, help="White noise density of the device, µg/√Hz; the preset's by default."),
-]
-WanderOption = Annotated[
-    float | None,
-    typer.Option(
-        "--wander",
-        min=0.0,
-        help="Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
-    ),
-]
-EffectsOption = Annotated[
-    str, typer.Option("--effects", metavar="a,b,c", help="Effects of the model; the recipe's by default.")
-]
-PageOption = Annotated[
-    Path | None, typer.Option("--page", metavar="FILE.html", help="Also write an HTML page with pictures to this file.")
-]
 
 
 @app.command(RECIPE)
@@ -151,10 +126,10 @@ def command(
     limits = _limits(planned_recipe, folder_of(recipe))
     document = plan(context, planned_terms(planned_recipe, config, limits), limits)
     if page is not None:
-        _write(page, document, context)
+        write_page(page, document, context)
         document["page"] = str(page)
     if pictures is not None:
-        _draw(pictures, document, context)
+        write_pictures(pictures, document, context)
     if as_json:
         print_json(document)
     else:
@@ -276,9 +251,9 @@ def optimise(
     document["file"] = str(target)
     home = folder_of(recipe)
     document["limits_missing"] = missing_limits(base, home)
-    _save(target, written(optimum, target, home, document))
+    save(target, written(optimum, target, home, document))
     if page is not None:
-        _write(page, document["plan"], optimum.planned)
+        write_page(page, document["plan"], optimum.planned)
         document["page"] = str(page)
     if as_json:
         print_json(document)
@@ -295,54 +270,3 @@ def _limits(recipe: Recipe, home: Path) -> Limits | None:
         return load_limits(recipe, home)
     except RecipeInvalid:
         return None
-
-
-def _save(path: Path, text: str) -> None:
-    """Write a file; a folder that does not exist or cannot be written to is wrong use."""
-    from schemas.errors import WrongUse
-
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as problem:
-        raise WrongUse(
-            f"plan: {path} cannot be written ({problem.strerror}); give a file in a folder that exists and is writable"
-        ) from None
-
-
-def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
-    """The recipe, with another model where one is given; the archive is read only for a recipe with the line's model."""
-    from pipelines.jobs.model_files import chosen_effects, use_formulas
-    from pipelines.jobs.recipes import load_recipe
-
-    chosen = chosen_effects(effects, model, "plan")
-
-    def line(device: str) -> dict[str, Any]:
-        from pipelines.archive import Archive
-        from pipelines.jobs.releases import line_model
-
-        if chosen:
-            return {"effects": chosen}
-        keys = line_model(Archive(archive), device, station)
-        use_formulas(keys["formulas"], "the line's model")
-        return keys
-
-    loaded = load_recipe(recipe, line)
-    return loaded.model_copy(update={"effects": list(chosen)}) if chosen else loaded
-
-
-def _write(page: Path, document: dict[str, Any], context: PlanContext) -> None:
-    """Write the page."""
-    from pipelines.report.plan import render_plan
-
-    _save(page, render_plan(document, context))
-
-
-def _draw(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
-    """Write each picture to a file."""
-    from pipelines.report.plan import pictures
-
-    with contextlib.suppress(OSError):  # what is wrong with the folder is said where a picture cannot be written to it
-        folder.mkdir(parents=True, exist_ok=True)
-    for name, text in pictures(document, context).items():
-        if text:
-            _save(folder / f"{document['recipe']}-{name}.svg", text)

@@ -13,7 +13,7 @@ from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
     from schemas.station import StationConfig
     from stations.self_test import CheckResult, SelfTestBench
     from stations.serving import RegisterReading
@@ -85,7 +85,7 @@ def _keep(path: Path, bench: SelfTestBench, keep: Any) -> None:
 
 def _seated(config: StationConfig) -> Lot | None:
     """The units in the slots of hardware, by the serial numbers that they report; None for an empty fixture."""
-    from schemas.recipe import Lot, Unit
+    from schemas.lot import Lot, Unit
     from stations.overview import looked_at
 
     with looked_at(config, made_up("hardware", 1, 1)) as look:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
 
 DeviceOption = Annotated[str, typer.Option("--device", help="Preset of the simulated devices under test.")]
 UnitsOption = Annotated[int, typer.Option("--units", min=1, max=32, help="Number of simulated devices in the slots.")]
@@ -15,7 +15,7 @@ UnitsOption = Annotated[int, typer.Option("--units", min=1, max=32, help="Number
 
 def made_up(device: str, units: int, seed: int, repeat: int = 0) -> Lot:
     """A lot with generated serial numbers, one per slot."""
-    from schemas.recipe import Lot, Unit
+    from schemas.lot import Lot, Unit
 
     sitting = [Unit(serial=f"SIM{i:04d}", slot=i) for i in range(units)]
     return Lot(units=sitting, device=device, seed=seed, repeat=repeat)

@@ -17,9 +17,12 @@ from pipelines.demo.scenes import Scene
 from pipelines.jobs.recipes import load_recipe
 from pipelines.stages.reduce import reduce
 from schemas.errors import WrongUse
+from schemas.lot import Lot, Unit
+from schemas.poses import Pose
 from schemas.progress import silent
-from schemas.recipe import Lot, Pose, Recipe, Unit
-from schemas.station import Hidden, Soak, StationConfig, load_station
+from schemas.recipe import Recipe
+from schemas.simulation import Hidden
+from schemas.station import Soak, StationConfig, load_station
 from stations import open_station
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.criticism.comparison import Estimate
-    from inertial.criticism.model import Term
+    from inertial.criticism.term import Term
 
     Array = NDArray[np.float64]
 

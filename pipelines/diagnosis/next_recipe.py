@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from schemas.recipe import Pose, Recipe, SoakPart
+from schemas.poses import Pose, SoakPart
+from schemas.recipe import Recipe
 from schemas.toml_files import explain
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ PART = "station"
 
 def station_checks(path: Path | None) -> list[Check]:
     """The checks of a station's file and, if it is of hardware, of its devices."""
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
     from schemas.station import load_station
     from stations.overview import looked_at
 

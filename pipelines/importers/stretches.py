@@ -64,7 +64,7 @@ def stretches(
     elif mapping.block_s is not None:
         intervals = _by_blocks(time, edges, mapping.block_s)
     else:
-        intervals = _found(output, time, edges, mapping)
+        intervals = _static_stretches(output, time, edges, mapping)
         _refuse_several_positions(intervals, output, where)
     return _named(intervals, mapping, where)
 
@@ -95,11 +95,12 @@ def _by_positions(output: NDArray[np.float64], count: int, where: str) -> Stretc
     return Stretches(tuple(start.tolist()), tuple(stop.tolist()), names, (remark,))
 
 
-def _found(output: NDArray[np.float64], time: NDArray[np.float64], edges: list[int], mapping: Mapping) -> Stretches:
+def _static_stretches(
+    output: NDArray[np.float64], time: NDArray[np.float64], edges: list[int], mapping: Mapping
+) -> Stretches:
     window, shortest = mapping.window_s or 1.0, mapping.shortest_s or 1.0
     first: list[int] = []
     last: list[int] = []
-    thresholds: list[float] = []
     for a, b in pairwise(edges):
         if b - a < 3 or time[b - 1] <= time[a]:
             continue
@@ -111,7 +112,6 @@ def _found(output: NDArray[np.float64], time: NDArray[np.float64], edges: list[i
         )
         first += (piece.start + a).tolist()
         last += (piece.stop + a).tolist()
-        thresholds.append(piece.threshold_sd)
     return Stretches(tuple(first), tuple(last), tuple(f"dwell {k}" for k in range(len(first))))
 
 

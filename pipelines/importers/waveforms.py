@@ -20,7 +20,7 @@ from pipelines.procedures.base import REFERENCE, Device, FromWaveforms, Procedur
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.units import AXES
 

@@ -13,7 +13,8 @@ from inertial.planning.sequences import SequenceStep, StationPace
 from pipelines.jobs.job import Job
 from pipelines.schedule.steps import Step, steps
 from pipelines.schedule.timing import StationPose, drive_of, lag_of, minutes, rule_of
-from schemas.recipe import Pose, Recipe, SoakPart
+from schemas.poses import Pose, SoakPart
+from schemas.recipe import Recipe
 from stations.profile_files import profile_of
 
 if TYPE_CHECKING:

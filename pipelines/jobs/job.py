@@ -21,8 +21,9 @@ from pipelines.tables.dwell_table import covariates
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import parse_fault
 from schemas.limits import Limits, limits_of
+from schemas.lot import Lot
 from schemas.own_files import contents
-from schemas.recipe import Lot, Recipe
+from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station, with_faults
 from stations.profile_files import recorded_columns
 

@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from pipelines.jobs.recipes import refuse_unusable_poses
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
-from schemas.recipe import Pose, Recipe
+from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.toml_files import explain
 
 if TYPE_CHECKING:

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from tomlkit.items import Item, Table
 
-    from schemas.recipe import Pose, Recipe
+    from schemas.poses import Pose
+    from schemas.recipe import Recipe
 
 WIDTH = 100
 RESOLVED = {"poses", "verification", "static_pose", "model_name", "model_version", "formulas"}

@@ -19,8 +19,10 @@ from pipelines.jobs.model_files import read_model, refuse_unknown_effects
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import is_file, shown
 from schemas.limits import Limits, parse_limits, unknown_limits
+from schemas.lot import Lot, Unit
 from schemas.own_files import own_file, own_names, refuse_built_in_name
-from schemas.recipe import Lot, Pose, Recipe, RecipeFile, Unit, parse_recipe
+from schemas.poses import Pose
+from schemas.recipe import Recipe, RecipeFile, parse_recipe
 from schemas.serials import refuse_unusable_serials
 from schemas.shipped import hint_of_sample
 from schemas.toml_files import explain, read_text

@@ -16,7 +16,7 @@ from schemas.toml_files import parse_toml, read_text
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
     from stations.station import Station
 
 SCAN = "scan"

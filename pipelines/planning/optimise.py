@@ -21,7 +21,7 @@ from pipelines.planning.timed_design import PlanDesign, TimedDesign, spanned
 from pipelines.planning.verification_poses import apart, numbered, turns
 from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
-from schemas.recipe import SoakPart
+from schemas.poses import SoakPart
 
 if TYPE_CHECKING:
     from collections.abc import Callable

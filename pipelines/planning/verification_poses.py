@@ -8,7 +8,7 @@ import numpy as np
 
 from inertial import poses
 from inertial.frames import force_from_angles
-from schemas.recipe import Pose
+from schemas.poses import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure as Drawing
 
-    from schemas.recipe import Pose, Recipe
+    from schemas.poses import Pose
+    from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
 Array = NDArray[np.float64]

@@ -26,7 +26,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import Positive
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:

@@ -35,7 +35,7 @@ from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_ra
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from stations.profile_files import profile_of
 
 if TYPE_CHECKING:

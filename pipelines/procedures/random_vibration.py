@@ -29,7 +29,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.wording import signed
 from schemas.bounds import Positive
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES, MICRO
 from schemas.vibration_profile import load_vibration_profile, vibration_profiles
 

@@ -27,7 +27,7 @@ from pipelines.procedures.noise_columns import noise_columns, pooled_noise
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES, MICRO
 from stations.profile_files import profile_of
 

@@ -34,7 +34,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.shock_bias import STUCK, bias_points, bias_shift
 from schemas.bounds import NotNegative, Positive, Wait
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES
 
 if TYPE_CHECKING:

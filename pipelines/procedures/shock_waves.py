@@ -9,8 +9,9 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from inertial.dynamics.goodness import p_value
-from inertial.dynamics.shock_diagnosis import ShockDiagnosis, ShockRecord, Waves, diagnose_shock
+from inertial.dynamics.shock_diagnosis import ShockDiagnosis, diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS
+from inertial.dynamics.shock_fit import ShockRecord, Waves
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
 from pipelines.procedures.wording import improvement, not_separated, probability, with_uncertainty

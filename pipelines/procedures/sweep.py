@@ -29,7 +29,7 @@ from pipelines.procedures.sweep_points import clocks_of, condition_findings, res
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
 from pipelines.procedures.transfer_plots import draw_bode
 from schemas.errors import RecipeInvalid
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from pipelines.procedures.base import (
 )
 from pipelines.procedures.columns import points
 from schemas.bounds import NotNegative, Positive
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES
 
 if TYPE_CHECKING:

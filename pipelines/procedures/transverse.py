@@ -31,7 +31,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from pipelines.procedures.base import (
 )
 from pipelines.procedures.columns import points
 from schemas.bounds import Positive, Wait
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ from pipelines.export import unit_calibrations
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from pipelines.programming.process import Programmer
 from schemas.errors import WrongUse
-from schemas.recipe import Lot, Recipe
+from schemas.lot import Lot
+from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from stations import open_station
 

@@ -24,7 +24,7 @@ OPTIONAL = (
     *("wander", "budget", "uncertainties", "lot_risks"),
     *("procedure_points", "procedure_figures", "procedure_findings"),
 )
-MODULES = ("schemas.limits", "schemas.tables", "pipelines.report", "pipelines.procedures")
+MODULES = ("schemas.decisions", "schemas.tables", "pipelines.report", "pipelines.procedures")
 
 
 def make_report(run: Run) -> bool:

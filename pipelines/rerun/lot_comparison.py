@@ -12,8 +12,8 @@ from inertial.correction import correct
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.jobs.terms import budget_terms
+from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.selection import entry_of
-from pipelines.rerun.steps import archived_job
 from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.fit import fit_tables

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from pydantic import ValidationError
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Archive, code_hash
-from pipelines.archive.signatures import ENTRY
 from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Tables
 from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
@@ -18,6 +16,7 @@ from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.jobs.terms import archived_terms
+from pipelines.rerun.archived_job import PROVENANCE, ArchivedJob, archived_job, model_keys
 from pipelines.rerun.import_steps import (
     StageCall,
     budget_step,
@@ -28,15 +27,13 @@ from pipelines.rerun.import_steps import (
 )
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
-from pipelines.stages.grade import GradeEvidence, grade, refuse_limits_without_figures
+from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.norm_fit import fit_of_norms
 from pipelines.stages.verify import verify
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
-from schemas.recipe import FormulaSpec, Lot, Recipe
-from schemas.station import StationConfig
-from schemas.toml_files import explain
+from schemas.recipe import FormulaSpec
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -48,7 +45,6 @@ if TYPE_CHECKING:
 CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
 """Stages that read the raw samples."""
-PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
 
 
 @dataclass(frozen=True)
@@ -64,22 +60,6 @@ class Plan:
     decisive: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class ArchivedJob(Job):
-    """The job of an archived run, which opens no station: what the run tells of its capture and station stays as it is.
-
-    run_document : what ``run.json`` holds, without who made it, where and when
-    """
-
-    run_document: dict[str, Any] = field(default_factory=dict[str, Any])
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """What is kept beside the run for readers."""
-        decided = {"recipe": self.recipe.model_dump(mode="json"), "limits": self.limits.model_dump(mode="json")}
-        return {**self.run_document, **decided, "lot": self.lot.model_dump(mode="json")}
-
-
 def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
     """What is to be done to a run, with another model or other limits where they are given.
 
@@ -92,33 +72,6 @@ def plan_of(run: Run, change: ModelChange, left_out: Dwells = ()) -> Plan:
             raise WrongUse(f"run {run.id}: --leave-out is for imports, this run was captured; measure the dwell again")
         return _captured(run, change)
     return _imported(run, change, left_out)
-
-
-def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
-    """The job of a captured run, with another model or other limits where they are given."""
-    about = run.about
-    try:
-        recipe = Recipe.model_validate({**about["recipe"], **_dumped(change)})
-        limits = change.limits or limits_of(about["limits"], UNITS)
-        lot = Lot.model_validate(about["lot"])
-    except ValidationError as problem:
-        raise explain(problem, f"run {run.id}", Recipe) from None
-    if change.limits is not None:
-        recipe = recipe.model_copy(update={"limits": change.limits_name})
-    run_document = {key: value for key, value in about.items() if key not in PROVENANCE}
-    station = StationConfig.model_construct(**about.get("station", {}))
-    capture = about["capture"]
-    job = ArchivedJob(
-        recipe=recipe, limits=limits, lot=lot, station=station, captured=capture, run_document=run_document
-    )
-    refuse_unknown_effects(recipe.effects, f"run {run.id}")
-    refuse_limits_without_figures(limits, recipe)
-    return job
-
-
-def _dumped(change: ModelChange) -> dict[str, Any]:
-    keys = change.of_model()
-    return {**keys, "formulas": [f.model_dump(mode="json") for f in change.formulas]} if keys else {}
 
 
 def _captured(run: Run, change: ModelChange) -> Plan:
@@ -240,7 +193,7 @@ def _fit_for_a_fit(run: Run) -> pd.DataFrame:
 def _model_of(run: Run, dwells: pd.DataFrame, change: ModelChange) -> dict[str, Any]:
     known = run.about.get("recipe", {})
     if change.effects is not None:
-        return _dumped(change)
+        return model_keys(change)
     if known.get("effects"):
         return {key: known[key] for key in ("effects", "formulas", "model_name", "model_version")}
     return {"effects": default_model(dwells), "formulas": [], "model_name": "", "model_version": 0}

@@ -9,7 +9,8 @@ from pipelines.procedures import PROCEDURES, parts_of
 
 if TYPE_CHECKING:
     from pipelines.procedures import ProcedureStep
-    from schemas.recipe import Pose, Recipe
+    from schemas.poses import Pose
+    from schemas.recipe import Recipe
 
 Kind = Literal["dwell", "verification", "allan", "procedure"]
 

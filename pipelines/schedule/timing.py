@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.schedule.steps import Step
-    from schemas.recipe import Pose, Recipe
+    from schemas.poses import Pose
+    from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
 ActivityKind = Literal["soak", "move", "dwell", "verification", "allan", "procedure"]

@@ -14,8 +14,9 @@ from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.lot_risks import lot_risks
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.frames import ByUnit, empty_table
+from schemas.decisions import GRADE_FIGURE, GRADES, PERIOD_FIGURE, Decision, decide, describe_rule, grade_with
 from schemas.errors import RecipeInvalid
-from schemas.limits import GRADE_FIGURE, GRADES, PERIOD_FIGURE, Decision, Limits, decide, describe_rule, grade_with
+from schemas.limits import Limits
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

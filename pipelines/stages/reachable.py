@@ -14,7 +14,7 @@ from inertial.uncertainty.propagation import fit_design, propagated, rms_over
 from pipelines.stages.budget import with_device_temperature
 from pipelines.stages.contributions import DwellConditions, influences
 from pipelines.stages.period import ageing_u
-from schemas.limits import GRADES
+from schemas.decisions import GRADES
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:

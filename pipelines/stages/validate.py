@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from schemas.recipe import Unit
+    from schemas.lot import Unit
 
 FEWEST_TO_JUDGE = 10  # samples: fewer equal values in a row happen by chance where the step is coarse
 CHAMBER_MOVED_K = 5.0

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid
-from schemas.station import Devices
+from schemas.station_devices import Devices
 from stations.links.gate import GatedLines, GatedLink, Permit
 from stations.links.lines import LineLink
 from stations.links.modbus import WireLink

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from schemas.profile import Profile
-    from schemas.station import Device, Devices
+    from schemas.station_devices import Device, Devices
     from stations.plant.line_device import LineDevice
     from stations.plant.world import World
 

@@ -15,7 +15,7 @@ from stations.plant.grid import Grid
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from schemas.station import Simulation
+    from schemas.simulation import Simulation
     from stations.plant.hidden import HiddenEffect
     from stations.plant.moisture import Moisture
 

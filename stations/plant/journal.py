@@ -19,7 +19,7 @@ from schemas.fault import FaultOrder
 from schemas.profile import Space
 
 if TYPE_CHECKING:
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
     from schemas.station import StationConfig
 
 VERSION = 1

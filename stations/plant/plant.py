@@ -8,7 +8,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from schemas.station import Simulation, StationConfig
+from schemas.simulation import Simulation
+from schemas.station import StationConfig
 from stations.plant.banks import build_banks, build_line_devices
 from stations.plant.faults.catalogue import build_fault
 from stations.plant.journal import Injection, Journal, LineOrder, Write, fingerprint
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from schemas.fault import FaultOrder
+    from schemas.lot import Lot
     from schemas.profile import Space
-    from schemas.recipe import Lot
     from stations.plant.faults.base import Fault
     from stations.plant.hidden import HiddenEffect
 

@@ -13,7 +13,7 @@ import numpy as np
 from stations.plant.hidden.base import Untouched
 
 if TYPE_CHECKING:
-    from schemas.station import ReferenceErrors
+    from schemas.simulation import ReferenceErrors
     from stations.plant.hidden.base import Array
 
 REFERENCE_C = 25.0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from schemas.station import Devices
+    from schemas.station_devices import Devices
     from stations.plant.plant import Plant
 
 

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import WrongUse
-from schemas.station import MOST_SLOTS, Simulation, StationConfig
+from schemas.simulation import Simulation
+from schemas.station import StationConfig
+from schemas.station_devices import MOST_SLOTS
 from stations.plant.bench import Bench
 from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
@@ -34,7 +36,7 @@ from stations.profile_files import load_profile
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from schemas.recipe import Lot
+    from schemas.lot import Lot
     from stations.plant.hidden import HiddenEffect
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from schemas.station import Device, Slots
+    from schemas.station_devices import Device, Slots
 
 HERE = "127.0.0.1"
 KERNEL_NAMES = Path("/sys/dev/char")

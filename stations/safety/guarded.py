@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from schemas.errors import LeaseLost, OperatorNeeded
 from stations.safety.folder import log_event, state_folder
-from stations.safety.leases import Leases, addresses, new_holder
+from stations.safety.lease_parts import addresses
+from stations.safety.leases import Leases, new_holder
 from stations.safety.watchdog_client import Watchdog
 
 if TYPE_CHECKING:

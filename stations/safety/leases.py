@@ -12,12 +12,11 @@ import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from schemas.errors import LeaseLost, OperatorNeeded, StationRefused
 from schemas.safety import SAFE_WITHIN_S
 from stations.clock import steady
-from stations.safety.addresses import address_of
 from stations.safety.folder import log_event
 from stations.safety.lease_files import (
     Holder,
@@ -27,42 +26,19 @@ from stations.safety.lease_files import (
     seconds_since_beat,
     write_holder,
 )
+from stations.safety.lease_parts import Part, addresses
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from schemas.station import StationConfig
 
-__all__ = ["PARTS", "Holder", "Leases", "Part", "addresses", "holders", "new_holder"]
+__all__ = ["Holder", "Leases", "holders", "new_holder"]
 
-Part = Literal[
-    "outer", "inner", "chamber", "reader", "exciter", "shock_machine", "centrifuge", "power_supply", "step_generator"
-]
-ROLES: tuple[Part, ...] = ("exciter", "shock_machine", "centrifuge", "power_supply", "step_generator")
-PARTS: tuple[Part, ...] = ("outer", "inner", "chamber", "reader")
 POLL_S = 0.2
 PASSING_S = 5.0  # a lock whose note names no live holder is being taken, released or tested
 HANDED_OVER = "the run has ended and left it to its watchdog"
 BOTH = "two runs must not command one device"
-
-
-def addresses(config: StationConfig, *, every: bool = False) -> dict[Part, str]:
-    """Addresses of table, chamber and reader of a station, in one form however the file writes them.
-
-    Parameters
-    ----------
-    every : include parts that share an address with another; a lease is taken once per address
-    """
-    by_part: dict[Part, str] = {}
-    for part in PARTS:
-        address = address_of(getattr(config.devices, part))
-        if every or address not in by_part.values():
-            by_part[part] = address
-    there = config.equipment.there()
-    for role in ROLES:
-        if role in there and (every or address_of(there[role]) not in by_part.values()):
-            by_part[role] = address_of(there[role])
-    return by_part
 
 
 @dataclass

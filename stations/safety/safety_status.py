@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 from stations.safety.lease_files import lease_file, read_holder
-from stations.safety.leases import addresses
+from stations.safety.lease_parts import addresses
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -31,9 +31,10 @@ from pipelines.report.unit_panels.procedures import picture
 from pipelines.stages.figures import UNITS
 from schemas.errors import RecipeInvalid
 from schemas.limits import limits_of
+from schemas.lot import Lot, Unit
 from schemas.progress import silent
-from schemas.recipe import Lot, Unit
-from schemas.station import Equipment, load_station
+from schemas.station import load_station
+from schemas.station_devices import Equipment
 from stations import open_station
 from stations.plant.bench import Bench, DynamicTruth
 from stations.plant.plant import Plant

@@ -9,7 +9,8 @@ from small_station import lot_of, plant_of
 
 from schemas.errors import RecipeInvalid, StationRefused
 from schemas.profile import parse_profile
-from schemas.station import Device, Equipment, load_station
+from schemas.station import load_station
+from schemas.station_devices import Device, Equipment
 from stations.codec import NotEncodable, encode
 from stations.devices.registers import Registers
 from stations.links.modbus import ModbusLink

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner, Result
 
-from benchmarks.recordings import Recording, make
+from benchmarks.made_recordings import Recording, make
 from pipelines.archive import Archive
 from pipelines.cli import app
 from schemas.errors import DataRejected, RecipeInvalid, WrongUse

@@ -9,7 +9,7 @@ import pytest
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
-from benchmarks.recordings import Recording, make, samples_of
+from benchmarks.made_recordings import Recording, make, samples_of
 from pipelines.cli import app
 from pipelines.cli.documents.models import ImportedFitDocument
 from schemas.errors import WrongUse

@@ -132,11 +132,17 @@ def test_an_operator_who_stops_gets_status_3_and_nothing_is_measured(tmp_path: P
 
 
 def test_a_lot_larger_than_the_fixture_is_measured_filling_by_filling(tmp_path: Path) -> None:
-    serials = [f"S{n}" for n in range(10)]
-    result = run_at_a_terminal(tmp_path, "\n" * 4, "--units", ",".join(serials), "--json")
+    text = (ROOT / "stations" / "simulated.toml").read_text(encoding="utf-8")
+    assert text.count("[devices.slots]\n") == 1
+    (tmp_path / "two.toml").write_text(
+        text.replace("[devices.slots]\n", "[devices.slots]\ncount = 2\n"), encoding="utf-8"
+    )
+    serials = ["S0", "S1", "S2"]
+    options = ("--units", ",".join(serials), "--station", str(tmp_path / "two.toml"), "--json")
+    result = run_at_a_terminal(tmp_path, "\n" * 4, *options)
     assert result.exit_code in (0, 1), result.output
     fillings = json.loads(result.stdout)["fillings"]
-    assert [[unit["unit"] for unit in one["units"]] for one in fillings] == [serials[:8], serials[8:]]
+    assert [[unit["unit"] for unit in one["units"]] for one in fillings] == [serials[:2], serials[2:]]
     assert result.stderr.count("Load") == result.stderr.count("Unload") == 2
 
 

@@ -15,6 +15,8 @@ from pipelines.flows.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules, 
 from pipelines.monitoring.queue_numbers import read_queues
 
 QUEUE, DAILY_QUEUE = "line-7", "line-8"
+MOST_SCHEDULED = 40
+"""Runs of a deployment that the server schedules ahead: a minute apart, twice as far as the tests look."""
 
 
 def deployments(folder: Path) -> str:
@@ -40,7 +42,11 @@ def deployments(folder: Path) -> str:
 def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Orchestrator]:
     """A server with the deployments, without a worker; this process is a client of it."""
     home = tmp_path_factory.mktemp("rules")
-    with served(home) as server, pytest.MonkeyPatch.context() as patch:
+    with (
+        # of a hundred each, most of the time of these tests would be theirs
+        served(home, PREFECT_SERVER_SERVICES_SCHEDULER_MAX_RUNS=str(MOST_SCHEDULED)) as server,
+        pytest.MonkeyPatch.context() as patch,
+    ):
         own = {
             name: server.environment[name] for name in ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING", "PREFECT_HOME")
         }

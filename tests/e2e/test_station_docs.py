@@ -6,7 +6,7 @@ from pathlib import Path
 
 from docs.devices_page import PAGE, page
 from schemas.profile import parse_profile
-from schemas.station import Device
+from schemas.station_devices import Device
 from stations.devices.adapters import adapters, chamber_adapter
 from stations.plant.hidden import HIDDEN
 from stations.plant.preset import load_preset

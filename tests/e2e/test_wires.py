@@ -1,6 +1,5 @@
 """Devices on serial lines and behind TLS, driven by the production adapters through a station's file."""
 
-import time
 from contextlib import contextmanager
 
 import pytest
@@ -10,13 +9,12 @@ from small_station import lot_of, plant_of
 
 from schemas.errors import LinkLost, RecipeInvalid, StationRefused, StationTimeout
 from schemas.station import StationConfig
+from stations.links import serial_wire
 from stations.opening import open_devices
 from stations.profile_files import load_profile, profile_names
 
-TIME_OUT_S = 0.6
-"""Of an impatient station: far above the time of an answer, also on a busy computer."""
-
 CHAMBERS = [n for n in profile_names() if load_profile(n).kind == "chamber" and "rtu" in load_profile(n).links]
+PATIENCE_S = 10.0
 DRIVES = [n for n in profile_names() if load_profile(n).kind == "axis"]
 
 
@@ -31,17 +29,29 @@ def hardware(config, **carried) -> StationConfig:
 
 
 @contextmanager
-def impatient():
-    """A plant, its serial line, and a station on it that asks once and waits for one time-out; the line is known to work."""
+def on_a_serial_line(**link):
+    """A plant, its serial line, and a station on it that asks once and has much patience."""
     config = station_with()
     plant = plant_of(config, lot_of(1))
     with serial_line() as line, SerialPlantServer(plant, line.device):
         real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        once = {"read_attempts": 1, "timeout_s": TIME_OUT_S}
-        real = real.model_copy(update={"link": real.link.model_copy(update=once)})
+        patient = {"read_attempts": 1, "timeout_s": PATIENCE_S, **link}
+        real = real.model_copy(update={"link": real.link.model_copy(update=patient)})
         with open_devices(real, ()) as station:
-            assert station.chamber.set_point() == pytest.approx(23.0)
             yield plant, line, station
+
+
+def wire_of(station):
+    return station.chamber._values._link._link._wire
+
+
+def refuses_to_wait(station):
+    """The set point of the chamber is asked for with little patience, where no answer can come."""
+    wire = wire_of(station)
+    wire.timeout_s = 0.1
+    with pytest.raises(StationTimeout):
+        station.chamber.set_point()
+    wire.timeout_s = PATIENCE_S
 
 
 @pytest.mark.parametrize("name", CHAMBERS)
@@ -95,11 +105,19 @@ def test_a_serial_answer_with_a_wrong_check_is_asked_for_again_and_never_believe
                 station.chamber.temperature()
 
 
-def test_a_serial_answer_that_comes_late_is_heard_out_before_the_next_question():
-    with impatient() as (plant, line, station):
-        line.to_host.append(line.late(1.5 * TIME_OUT_S))
-        with pytest.raises(StationTimeout):
-            station.chamber.set_point()
+def test_a_serial_answer_that_comes_late_is_heard_out_before_the_next_question(monkeypatch):
+    with on_a_serial_line() as (plant, line, station):
+        line.to_host.append(line.hold)
+        refuses_to_wait(station)
+        wire = wire_of(station)
+        opened = wire._opened
+
+        def opened_as_it_arrives():
+            port = opened()
+            line.deliver()
+            return port
+
+        monkeypatch.setattr(wire, "_opened", opened_as_it_arrives)
         plant.fixture.chamber.set_point = 50.0
         assert station.chamber.set_point() == 50.0
 
@@ -112,41 +130,42 @@ def unheard(data):
 @pytest.mark.parametrize("knows_echo", [True, False])
 def test_a_serial_answer_that_comes_after_two_time_outs_is_not_believed(knows_echo):
     """It arrives when the question has been put again, in front of the answer to that: a frame has no number to tell them."""
-    with impatient() as (plant, line, station):
-        late = (2.5 if knows_echo else 4.5) * TIME_OUT_S
-        line.to_host += [line.late(late), *([] if knows_echo else [unheard]), line.late(0.75 * TIME_OUT_S)]
+    with on_a_serial_line() as (plant, line, station):
+        line.to_host += [line.hold, *([] if knows_echo else [unheard]), line.behind_what_is_held]
         for _ in range(1 if knows_echo else 2):
-            with pytest.raises(StationTimeout):
-                station.chamber.set_point()
+            refuses_to_wait(station)
         plant.fixture.chamber.set_point = 50.0
         assert station.chamber.set_point() == 50.0
+        assert not line.held
+        assert not line.to_host
         assert station.chamber.set_point() == 50.0
 
 
 def test_a_serial_answer_with_more_behind_it_is_not_believed():
-    config = station_with()
-    plant = plant_of(config, lot_of(1))
-    with serial_line() as line, SerialPlantServer(plant, line.device):
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        real = real.model_copy(
-            update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": TIME_OUT_S})}
-        )
-        with open_devices(real, ()) as station:
-            line.to_host.append(lambda data: data + data)
-            with pytest.raises(LinkLost, match="bytes after"):
-                station.chamber.set_point()
+    with on_a_serial_line() as (_, line, station):
+        line.to_host.append(lambda data: data + data)
+        with pytest.raises(LinkLost, match="bytes after"):
+            station.chamber.set_point()
 
 
-def test_a_line_that_nobody_answers_on_costs_one_time_out_an_attempt():
-    config = station_with()
+def test_a_line_that_nobody_answers_on_costs_one_time_out_an_attempt(monkeypatch):
+    config, waited, read = station_with(), [], serial_wire.Serial.read
+
+    def noted(port, size=1):
+        waited.append(port.timeout)
+        return read(port, size)
+
+    monkeypatch.setattr(serial_wire.Serial, "read", noted)
     with serial_line() as line:
         real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 1.0})})
-        with open_devices(real, ()) as station:
-            begun = time.monotonic()
-            with pytest.raises(StationTimeout, match=f"{line.host} device 3: no answer"):
-                station.chamber.temperature()
-            assert time.monotonic() - begun < 2.0
+        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 0.2})})
+        with (
+            open_devices(real, ()) as station,
+            pytest.raises(StationTimeout, match=f"{line.host} device 3: no answer"),
+        ):
+            station.chamber.temperature()
+    assert len(waited) == 1
+    assert 0.0 < waited[0] <= 0.2
     assert line.heard
 
 

@@ -110,6 +110,16 @@ def test_every_page_is_drawn_reaches_nothing_outside_and_can_be_read_by_everybod
         assert one.errors == []
 
 
+def test_the_browser_of_these_tests_reaches_nothing_outside_and_notes_what_is_asked_for(
+    bench: Served, browser: Any
+) -> None:
+    with tab(browser, bench.address) as one:
+        for place in ("http://192.0.2.1/", "http://example.org/"):
+            with pytest.raises(Exception, match="ERR_PROXY_CONNECTION_FAILED"):
+                one.page.goto(place)
+        assert one.outside == ["http://192.0.2.1/", "http://example.org/"]
+
+
 def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
     bench: Served, browser: Any, pictures: Path
 ) -> None:

@@ -24,7 +24,7 @@ MOVER = """
 import json, random, sys
 import stations.devices.table
 from schemas.errors import TumblelineError
-from schemas.recipe import Lot
+from schemas.lot import Lot
 from schemas.station import StationConfig
 from stations.opening import open_station
 stations.devices.table.POLL_S = 0.005  # nearly all of its time between readings and orders
@@ -170,7 +170,8 @@ def test_what_a_run_finds_at_a_station_that_it_has_lost_is_not_why_it_ends():
 
 
 def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state):
-    from stations.safety.leases import Leases, addresses, new_holder
+    from stations.safety.lease_parts import addresses
+    from stations.safety.leases import Leases, new_holder
 
     with lost("now belongs to the other"), driven() as (station, plant, _):
         for path in (state / "leases").iterdir():
@@ -187,7 +188,8 @@ def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state
 
 
 def test_leases_that_were_cleared_away_and_not_taken_are_held_on_to(state):
-    from stations.safety.leases import Leases, addresses, new_holder
+    from stations.safety.lease_parts import addresses
+    from stations.safety.leases import Leases, new_holder
 
     with driven() as (station, _, _):
         for path in (state / "leases").iterdir():

@@ -14,9 +14,10 @@ from pipelines.procedures import PROCEDURES, figures_of_recipe, parts_of, refuse
 from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.schedule.steps import steps
 from schemas.errors import OperatorNeeded, RecipeInvalid, StationRefused
+from schemas.lot import Lot, Unit
 from schemas.profile import Profile
 from schemas.progress import silent
-from schemas.recipe import Lot, Recipe, Unit
+from schemas.recipe import Recipe
 from schemas.station import load_station
 from stations import open_station
 from stations.plant.families.acutrol_3000 import Centrifuge, radius_error

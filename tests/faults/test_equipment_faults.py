@@ -17,8 +17,8 @@ from pipelines.stages.figures import UNITS
 from schemas.errors import OperatorNeeded
 from schemas.fault import FaultOrder
 from schemas.limits import limits_of
+from schemas.lot import Lot, Unit
 from schemas.progress import silent
-from schemas.recipe import Lot, Unit
 from schemas.station import load_station, with_faults
 from stations import open_station
 

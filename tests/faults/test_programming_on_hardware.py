@@ -19,7 +19,7 @@ from pipelines.certificates.days import today
 from pipelines.certificates.programmed import unproved
 from pipelines.chain.certify import certify
 from pipelines.export.device_block import unpack
-from schemas.recipe import Lot
+from schemas.lot import Lot
 from stations.profile_files import load_profile
 
 ROOT = Path(__file__).resolve().parents[2]

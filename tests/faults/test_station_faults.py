@@ -22,7 +22,7 @@ from schemas.errors import (
 )
 from schemas.event import MemoryLog
 from schemas.fault import FaultOrder
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.station import load_station
 from stations.links.modbus import ModbusLink
 from stations.opening import make_plant, open_station, serve_plant

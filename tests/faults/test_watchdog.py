@@ -18,7 +18,8 @@ from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.safety import SAFE_WITHIN_S
 from stations.opening import open_devices, open_station
 from stations.safety import folder
-from stations.safety.leases import Leases, addresses, holders, new_holder
+from stations.safety.lease_parts import addresses
+from stations.safety.leases import Leases, holders, new_holder
 
 
 @pytest.fixture(autouse=True)

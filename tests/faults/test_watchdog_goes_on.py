@@ -21,7 +21,8 @@ from stations import watchdog
 from stations.opening import open_station
 from stations.plant.faults.proxy import ChaosProxy, WireAction
 from stations.safety import folder, lease_files, leases, watchdog_client
-from stations.safety.leases import Leases, addresses, holders, new_holder
+from stations.safety.lease_parts import addresses
+from stations.safety.leases import Leases, holders, new_holder
 from stations.safety.safety_status import unsafe_reason
 
 

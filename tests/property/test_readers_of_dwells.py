@@ -13,7 +13,7 @@ from inertial.quantities import BY_ATTRIBUTE, RECORDED
 from inertial.state import History, State
 from pipelines.diagnosis import compare, diagnose
 from pipelines.rerun import lot_comparison
-from pipelines.stages import fit, verify
+from pipelines.stages import fit, noisy_fit, verify
 from pipelines.tables import sound_lot
 from schemas.errors import DataRejected
 
@@ -70,7 +70,7 @@ LENIENT = {"diagnose": by_diagnose, "compare": by_compare}
 def science_that_only_listens():
     """Every reader's first call of the science gives its state away."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit, "profiled", handing(lambda lot, *_: lot.state))
+        patch.setattr(noisy_fit, "profiled", handing(lambda lot, *_: lot.state))
         patch.setattr(verify, "correct", handing(lambda _, state, *__: state))
         patch.setattr(verify, "read_calibration", lambda *_: SimpleNamespace(effects=(), coefficients=(), nonlinear={}))
         patch.setattr(lot_comparison, "correct", handing(lambda _, state, *__: state))

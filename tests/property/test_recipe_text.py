@@ -7,7 +7,8 @@ from inertial.poses import plan
 from pipelines.jobs.recipe_text import recipe_text
 from pipelines.jobs.recipes import resolved
 from schemas.fault import FaultOrder
-from schemas.recipe import Recipe, RecipeFile, SoakPart, parse_recipe
+from schemas.poses import SoakPart
+from schemas.recipe import Recipe, RecipeFile, parse_recipe
 from schemas.uncertainty import Uncertainty
 from schemas.validity import Ageing, CertificateTerms, Stability
 

@@ -7,11 +7,12 @@ import pytest
 from inertial.population.change_points import change_points
 from inertial.population.control_charts import alarms, baseline, false_alarms, signals
 from pipelines.audit.calibrations import Calibrations
-from pipelines.audit.drifts import OWN, kind_drifts, unit_drifts
+from pipelines.audit.drifts import OWN, kind_drifts
 from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.population import Figures, abilities, odd_ones
 from pipelines.audit.rules import load_rules
+from pipelines.audit.unit_drifts import unit_drifts
 
 DEVICE, YEAR_D = "adxl355", 365.25
 # bias µg, scale ppm, square mrad, rotation mrad, bias over temperature µg/K, scale over temperature ppm/K; each thrice

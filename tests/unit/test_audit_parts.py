@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.audit.calibrations import Calibrations, date_of, day_of
-from pipelines.audit.drifts import kind_drifts, unit_drifts
+from pipelines.audit.drifts import kind_drifts
 from pipelines.audit.due import due
 from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.gauge_mounts import studies
@@ -15,6 +15,7 @@ from pipelines.audit.parameters import NAMES, parameters_of
 from pipelines.audit.population import odd_ones, yields
 from pipelines.audit.rules import load_rules
 from pipelines.audit.stations_over_time import charts, slot_series
+from pipelines.audit.unit_drifts import unit_drifts
 
 START = day_of("2022-01-03")
 ERROR = 0.02

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from benchmarks.budget import decisions, one_lot, plan_of
+from benchmarks.budget import decisions, one_lot
+from benchmarks.budget_lots import plan_of
 from stations.plant.preset import load_preset
 
 

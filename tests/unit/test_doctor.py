@@ -33,7 +33,8 @@ from pipelines.doctor.check import PROBE_BYTES, Check, clock_check, offset
 from pipelines.doctor.host import host_checks
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.doctor.station import station_checks
-from stations.safety.leases import Leases, addresses, new_holder
+from stations.safety.lease_parts import addresses
+from stations.safety.leases import Leases, new_holder
 
 NOBODY = 65534
 KEY = "line:" + "k" * 32

@@ -7,7 +7,7 @@ from small_station import lot_of, short_recipe, station_of
 from pipelines.capture.capture import check
 from pipelines.schedule.steps import steps
 from schemas.errors import RecipeInvalid, StationRefused
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from schemas.station import StationConfig
 from stations.opening import open_station, tighter
 from stations.profile_files import load_profile

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from schemas.station import Device
+from schemas.station_devices import Device
 from stations.safety.addresses import address_of
 
 

@@ -6,8 +6,9 @@ from hypothesis import strategies as st
 
 from pipelines.jobs.recipes import sample_names
 from pipelines.stages.figures import UNITS
+from schemas.decisions import GRADES, decide, grade_of
 from schemas.errors import RecipeInvalid
-from schemas.limits import GRADES, Limits, decide, grade_of, parse_limits
+from schemas.limits import Limits, parse_limits
 
 TEXT = """
 name = "test"

@@ -11,7 +11,8 @@ from schemas.fault import FaultOrder
 from schemas.motion import Motion
 from schemas.profile import Profile
 from schemas.safety import Suspenders
-from schemas.station import Device, Equipment, Soak, StationConfig, load_station, with_faults
+from schemas.station import Soak, StationConfig, load_station, with_faults
+from schemas.station_devices import Device, Equipment
 from schemas.vibration_profile import load_vibration_profile
 from stations import open_station
 from stations.plant.families.scpi_generator import Generator

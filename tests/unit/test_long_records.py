@@ -18,7 +18,7 @@ from pipelines.stages import noise as noise_stage
 from pipelines.stages.reduce import reduce
 from pipelines.stages.validate import validate
 from pipelines.tables.samples import by_record
-from schemas.recipe import Unit
+from schemas.lot import Unit
 from schemas.station import load_station
 from stations import open_station
 

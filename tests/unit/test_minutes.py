@@ -14,7 +14,7 @@ from pipelines.inquiry.followup import circumstances, state_after, station_minut
 from pipelines.schedule.planned_state import planned_state
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import StationPose, minutes
-from schemas.recipe import Pose, SoakPart
+from schemas.poses import Pose, SoakPart
 from stations.opening import open_station
 
 

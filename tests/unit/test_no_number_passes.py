@@ -18,7 +18,8 @@ from pipelines.procedures.base import FigureValue, worst
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures
 from pipelines.stages.noise import limits_where_unexplained
-from schemas.limits import decide, parse_limits
+from schemas.decisions import decide
+from schemas.limits import parse_limits
 
 LIMITS = 'name = "t"\nrule = "guarded_acceptance"\n[figures]\nbias_error_ug = { max = 100.0, unit = "µg" }\n'
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.made_recordings import Recording, make
 from benchmarks.recording_intervals import pulls
-from benchmarks.recordings import Recording, make
-from inertial.criticism.covariance import Shares
+from inertial.criticism.noise_shares import Shares
 from inertial.criticism.shares import plausible_shares
 from inertial.norm_noise import SolvedNorms
 from pipelines.stages.norm_fit import bias_uncertainty, norms_fitted

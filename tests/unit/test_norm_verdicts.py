@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.recordings import NOISES, Recording, make
+from benchmarks.made_recordings import NOISES, Recording, make
 from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.norm_fit import fit_norms
 from inertial.probability import passes

@@ -6,7 +6,7 @@ from small_station import QUIET, lot_of, plant_of, station_of, turn_to, write
 
 from inertial.frames import force_from_angles
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.recipe import Lot, Unit
+from schemas.lot import Lot, Unit
 from stations.codec import unpack_samples
 from stations.plant.chamber import Chamber
 from stations.plant.hidden import HIDDEN, hidden_effect

@@ -13,8 +13,9 @@ from inertial.criticism.drivers import drivers_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.wrong_pose import WrongPose
 from inertial.criticism.lot import Lot
-from inertial.criticism.model import Model, Term
+from inertial.criticism.model import Model
 from inertial.criticism.problem import Problem
+from inertial.criticism.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))

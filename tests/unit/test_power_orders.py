@@ -13,7 +13,8 @@ from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.event import MemoryLog
-from schemas.recipe import Recipe, SoakPart
+from schemas.poses import SoakPart
+from schemas.recipe import Recipe
 from stations.opening import make_plant, open_station, serve_plant
 from stations.plant.hidden.age import StressRelaxation
 from stations.plant.hidden.heat import WarmUp

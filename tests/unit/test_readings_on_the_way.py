@@ -4,7 +4,8 @@ import numpy as np
 from small_station import QUIET, MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
 from pipelines.capture.capture import capture
-from schemas.recipe import Recipe, SoakPart
+from schemas.poses import SoakPart
+from schemas.recipe import Recipe
 from stations.opening import make_plant, serve_plant
 
 

@@ -9,7 +9,7 @@ from small_station import MemorySink, lot_of, short_recipe, station_of
 from pipelines.capture.capture import capture
 from pipelines.capture.time_left import Remaining, duration_text
 from pipelines.schedule.steps import steps
-from schemas.recipe import Pose
+from schemas.poses import Pose
 from stations.opening import open_station
 
 LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of station time left(?:, about [^,]+ here)?$")

@@ -11,7 +11,8 @@ from small_station import lot_of
 from inertial.dynamics.sine_fit import fit_tone
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.fault import FaultOrder
-from schemas.station import Device, Equipment, load_station, with_faults
+from schemas.station import load_station, with_faults
+from schemas.station_devices import Device, Equipment
 from stations import open_station
 from stations.devices.families.scpi_supply import ScpiSupply
 from stations.devices.recording import RecordingSpoilt
@@ -108,8 +109,8 @@ def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:
     from pipelines.procedures import PROCEDURES, parts_of
     from pipelines.procedures.recorded import nominal_device, procedure_record
     from pipelines.schedule.steps import steps
+    from schemas.lot import Lot, Unit
     from schemas.progress import silent
-    from schemas.recipe import Lot, Unit
 
     path = tmp_path / "recipe.toml"
     path.write_text(

@@ -6,7 +6,8 @@ import small_station as small
 
 from pipelines.capture.capture import capture
 from pipelines.schedule.steps import steps
-from schemas.recipe import Recipe, SoakPart
+from schemas.poses import SoakPart
+from schemas.recipe import Recipe
 from stations import open_station
 
 

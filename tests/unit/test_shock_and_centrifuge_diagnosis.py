@@ -7,8 +7,9 @@ from scipy import signal
 from inertial.dynamics.centrifuge_diagnosis import diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS as SPIN_EFFECTS
 from inertial.dynamics.centrifuge_effects import Spins
-from inertial.dynamics.shock_diagnosis import Design, ShockRecord, Waves, diagnose_shock, predicted
+from inertial.dynamics.shock_diagnosis import diagnose_shock
 from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
+from inertial.dynamics.shock_fit import Design, ShockRecord, Waves, predicted
 
 FINE = 200e3
 DURATION, RATE, BEFORE, AFTER = 0.011, 40 / 0.011, 0.015, 0.08

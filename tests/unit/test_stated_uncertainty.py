@@ -20,8 +20,9 @@ from pipelines.jobs.terms import budget_terms, refuse_contradictions
 from pipelines.schedule.steps import steps
 from pipelines.stages.contributions import merged, sources
 from pipelines.stages.figures import UNITS
+from schemas.decisions import decide
 from schemas.errors import RecipeInvalid, WrongUse
-from schemas.limits import decide, parse_limits
+from schemas.limits import parse_limits
 from schemas.recipe import parse_recipe
 from schemas.station import StationConfig, load_station
 from schemas.uncertainty import Uncertainty

@@ -21,9 +21,10 @@ from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
 from pipelines.report.unit_panels.figures import _line  # pyright: ignore[reportPrivateUsage]
+from schemas.decisions import decide
 from schemas.errors import DataRejected, RecipeInvalid, WrongUse
 from schemas.key_list import keys_of
-from schemas.limits import decide, parse_limits
+from schemas.limits import parse_limits
 from schemas.reasons import PATTERNS
 from schemas.recipe import FaultOrder
 from schemas.station import StationConfig, load_station

@@ -12,9 +12,10 @@ from pipelines.procedures import PROCEDURES, parts_of, roles_of
 from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.procedures.warm_up import _figure
 from pipelines.schedule.steps import steps
+from schemas.lot import Lot, Unit
 from schemas.progress import silent
-from schemas.recipe import Lot, Unit
-from schemas.station import Hidden, Simulation, load_station
+from schemas.simulation import Hidden, Simulation
+from schemas.station import load_station
 from stations import open_station
 
 SIZE_G, TAU_S, BAND_UG = 1e-2, 120.0, 1000.0

@@ -30,12 +30,12 @@ class Format(Protocol):
         ...
 
 
-def _found() -> dict[str, Format]:
+def _formats_by_name() -> dict[str, Format]:
     modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
     return {module.NAME: cast("Format", module) for module in modules}
 
 
-FORMATS: dict[str, Format] = _found()
+FORMATS: dict[str, Format] = _formats_by_name()
 
 
 def export_files(

@@ -32,7 +32,7 @@ class Writer(Protocol):
         ...
 
 
-def _found() -> dict[str, Writer]:
+def _writers_by_name() -> dict[str, Writer]:
     modules = [
         cast("Writer", import_module(f"{__name__}.{info.name}"))
         for info in iter_modules(__path__)
@@ -41,7 +41,7 @@ def _found() -> dict[str, Writer]:
     return {module.NAME: module for module in modules}
 
 
-WRITERS: dict[str, Writer] = _found()
+WRITERS: dict[str, Writer] = _writers_by_name()
 
 
 def write_waveforms(form: str, channels: Sequence[Channel], path: Path) -> list[Path]:

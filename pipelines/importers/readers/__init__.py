@@ -37,12 +37,12 @@ class FileReader(Protocol):
         ...
 
 
-def _found() -> dict[str, FileReader]:
+def _readers_by_name() -> dict[str, FileReader]:
     modules = [cast("FileReader", import_module(f"{__name__}.{info.name}")) for info in iter_modules(__path__)]
     return {module.NAME: module for module in sorted(modules, key=lambda one: one.ORDER)}
 
 
-READERS: dict[str, FileReader] = _found()
+READERS: dict[str, FileReader] = _readers_by_name()
 """By name, in the order in which they are tried."""
 
 

@@ -45,7 +45,7 @@ def audit(request: Request) -> Response:
 @router.get("/audit/figure/{name}.{ending}")
 def drawn(request: Request, name: str, ending: str) -> Response:
     """A figure of the page."""
-    audited = _found(workbench_of(request), request)
+    audited = _finished_audit(workbench_of(request), request)
     if name == "evidence":
         state, _ = state_of(request, AuditPage)
         chart = audited["evidence"].get(state.finding)
@@ -59,28 +59,28 @@ def drawn(request: Request, name: str, ending: str) -> Response:
 @router.get("/audit/due.csv")
 def due(request: Request) -> Response:
     """The units that are overdue or due soon."""
-    listed = _found(workbench_of(request), request)["document"]["due"]
+    listed = _finished_audit(workbench_of(request), request)["document"]["due"]
     return table_csv([*listed["overdue"], *listed["soon"]], "due")
 
 
 @router.get("/audit/capability.csv")
 def capability(request: Request) -> Response:
     """Capability of every figure with a limit, by kind of device."""
-    rows = _found(workbench_of(request), request)["document"]["population"]["capability"]
+    rows = _finished_audit(workbench_of(request), request)["document"]["population"]["capability"]
     return table_csv([_flat(row) for row in rows], "capability")
 
 
 @router.get("/audit/yield.csv")
 def yields(request: Request) -> Response:
     """The yield of all calibrations, and by station, device, lot and month."""
-    rows = _found(workbench_of(request), request)["document"]["population"]["yield"]
+    rows = _finished_audit(workbench_of(request), request)["document"]["population"]["yield"]
     return table_csv([_flat(row) for row in rows], "yield")
 
 
 @router.get("/audit/differences.csv")
 def differences(request: Request) -> Response:
     """Every figure compared between stations and between slots, by kind of device."""
-    rows = _found(workbench_of(request), request)["document"]["population"]["differences"]
+    rows = _finished_audit(workbench_of(request), request)["document"]["population"]["differences"]
     told = sorted((row for row in rows if row["by"] in COMPARED), key=lambda row: row["p"])
     return table_csv([_flat(row) for row in told], "differences")
 
@@ -88,7 +88,7 @@ def differences(request: Request) -> Response:
 @router.get("/audit/findings.csv")
 def findings(request: Request) -> Response:
     """The findings."""
-    audited = _found(workbench_of(request), request)
+    audited = _finished_audit(workbench_of(request), request)
     keys = ("who", "kind", "subject", "message")
     return table_csv([{key: row[key] for key in keys} for row in audited["document"]["findings"]], "findings")
 
@@ -101,7 +101,7 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
-def _found(bench: Workbench, request: Request) -> dict[str, Any]:
+def _finished_audit(bench: Workbench, request: Request) -> dict[str, Any]:
     state, _ = state_of(request, AuditPage)
     audited: dict[str, Any] | None = bench.jobs.result("audit", requests.audit(bench.settings, state)[1])
     if audited is None:

@@ -12,8 +12,8 @@ from pipelines.report.charts import Chart, Plot, PlotAxis, Trace
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
-    from pipelines.audit.drifts import UnitDrift
     from pipelines.audit.stations_over_time import ControlChart, StationSeries
+    from pipelines.audit.unit_drifts import UnitDrift
 
 MONTHS = 24
 YEAR_D = 365.25

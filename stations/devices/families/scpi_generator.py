@@ -66,7 +66,7 @@ class ScpiGenerator(Equipment):
         self.values.write("frequency", frequency)
         self.values.write("axis", float(axis))
         self.values.write("before", 0.0)
-        volts = self._found_drive(frequency, level, axis, slots)
+        volts = self._drive_volts(frequency, level, axis, slots)
         recording = self._record(volts, frequency, seconds, slots)
         reached = self._level(recording, axis, frequency)
         if not abs(reached / level - 1.0) <= 2.0 * LEVEL_SHARE:
@@ -76,7 +76,7 @@ class ScpiGenerator(Equipment):
             )
         return recording
 
-    def _found_drive(self, frequency: float, level: float, axis: int, slots: Sequence[int]) -> float:
+    def _drive_volts(self, frequency: float, level: float, axis: int, slots: Sequence[int]) -> float:
         """The amplitude in V that gives the level.
 
         A reference whose cable is loose shows too little, so the drive must not be raised for that alone: it rises tenfold at

@@ -1,0 +1,1 @@
+"""The JSON documents of diagnose, compare and history: keys that other programs read."""

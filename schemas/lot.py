@@ -1,0 +1,57 @@
+"""The units that are measured together."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import (
+    Field,
+    model_validator,
+)
+
+from schemas.bounds import (
+    MOST_UNITS,
+    Seed,
+)
+from schemas.serials import LONGEST_SERIAL, SERIAL_PATTERN
+from schemas.strict import Strict
+
+
+class Unit(Strict):
+    """One device under test and the slot of the fixture that it sits in, counted from 0."""
+
+    serial: Annotated[
+        str,
+        Field(min_length=1, max_length=LONGEST_SERIAL, pattern=SERIAL_PATTERN),
+    ]
+    slot: Annotated[int, Field(ge=0, le=MOST_UNITS)]
+
+
+MOST_REPEATS = 2**28
+"""A deployed run takes seven hexadecimal digits of its id as its number: two runs of one lot must not have the same."""
+
+
+class Lot(Strict):
+    """The units measured together, the kind of device they are, and the seed of a simulated station.
+
+    ``repeat`` counts fresh measurements of the same lot: the devices stay, the noise is new.
+    """
+
+    units: Annotated[list[Unit], Field(min_length=1)]
+    device: str
+    seed: Seed = 0
+    repeat: Annotated[int, Field(ge=0, lt=MOST_REPEATS)] = 0
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Lot:
+        for what, values in (
+            ("serial", [u.serial for u in self.units]),
+            ("slot", [u.slot for u in self.units]),
+        ):
+            texts = [str(value) for value in values]
+            twice = sorted({text for text in texts if texts.count(text) > 1})
+            if twice:
+                raise ValueError(
+                    f"{what} {', '.join(twice)} is there twice, each may be there once; correct the list of units"
+                )
+        return self

@@ -1,0 +1,64 @@
+"""How a simulated station is made: spread of its devices, hidden effects, faults, errors of its references."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
+
+from schemas.bounds import Celsius, NotNegative, Number, Seed
+from schemas.fault import FaultOrder
+from schemas.strict import Strict
+
+Bounds = tuple[Number, Number]
+
+
+class Hidden(Strict):
+    """A hidden effect of the simulated station, with figures other than its usual ones."""
+
+    kind: str
+    figures: dict[str, Number] = Field(default_factory=dict[str, float])
+
+
+class ReferenceErrors(Strict):
+    """Standard deviations of the simulated station's own errors; each station draws its errors from its seed, once.
+
+    ``pose_urad`` is drawn at every move, the thermometer's for the station, ``soak_K`` at every soak, ``slot_gradient_K`` of the
+    element against its thermometer for each slot.
+    """
+
+    gravity_ppm: NotNegative = 0.0
+    level_urad: NotNegative = 0.0
+    orthogonality_urad: NotNegative = 0.0
+    outer_offset_urad: NotNegative = 0.0
+    inner_offset_urad: NotNegative = 0.0
+    harmonics_urad: NotNegative = 0.0
+    pose_urad: NotNegative = 0.0
+    thermometer_offset_K: NotNegative = 0.0
+    thermometer_slope_percent: NotNegative = 0.0
+
+
+class Simulation(Strict):
+    """How the simulated station is made."""
+
+    seed: Seed = 1
+    room_C: Celsius = 23.0
+    local_gravity_m_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] = 9.80665
+    slot_rotation_mrad: NotNegative = 1.0
+    slot_lag_s: Bounds = (90.0, 200.0)
+    slot_gradient_K: NotNegative = 0.1
+    supply_spread: NotNegative = 1e-3
+    preset_overrides: dict[str, Number] = Field(default_factory=dict[str, float])
+    hidden: list[Hidden] = Field(default_factory=list[Hidden])
+    faults: list[FaultOrder] = Field(default_factory=list[FaultOrder])
+    reference_errors: ReferenceErrors | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what is not stated: captures of earlier versions keep their names."""
+        content = handler(self)
+        return {name: value for name, value in content.items() if name != "reference_errors" or value is not None}
