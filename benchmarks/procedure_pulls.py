@@ -52,6 +52,10 @@ if TYPE_CHECKING:
 
 STATION = Path(__file__).resolve().parents[1] / "deploy" / "stations" / "simulated-32.toml"
 SCALE = 0.007
+TURN_DEG = float(np.degrees(1e-3))  # phase of a dwell on the simulated exciter, one sigma, which 0.06° round up
+ACROSS_PPM = (
+    2.0  # of an angle: its amplitude, 0.1 %, times a transverse sensitivity of 2 mrad; nothing is mounted again
+)
 PARTS = {
     "tilt": "step_deg = 15.0\ndwell_s = 5.0",
     "bias_stability": f"lasting_s = 3600.0\nscale = {SCALE}",
@@ -59,8 +63,9 @@ PARTS = {
     "turn_on": f"cycles = {CYCLES}\noff_s = 60.0\nwarm_up_s = 1.0\nwindow_s = {WINDOW_S}\nscale = {SCALE}",
     "ratiometry": f'supplies_V = {list(SUPPLIES)}\naxes = ["z"]\ndwell_s = 10.0\nsettle_s = 1.0',
     "sweep": "low_hz = 10.0\nhigh_hz = 6000.0\nper_octave = 4\nlevel_g = 2.0\nrecord_s = 0.1\n"
-    f"nominal_scale = {SCALE}\nflat_to_hz = {FLAT_HZ}",
-    "transverse": f"step_deg = 30.0\nrecord_s = 0.2\nscale = {SCALE}\nscale_percent = 0.2",
+    f"nominal_scale = {SCALE}\nflat_to_hz = {FLAT_HZ}\nrepeatability_deg = {TURN_DEG}",
+    "transverse": f"step_deg = 30.0\nrecord_s = 0.2\nscale = {SCALE}\nscale_percent = 0.2\n"
+    f"repeatability_ppm = {ACROSS_PPM}",
     "random_vibration": f"seconds = 5.0\nlevels_g = [2.0, 3.0, 4.0]\nscale = {SCALE}",
     "step_response": "steps = 16",
     "shock": f"shocks = 2\nwindow_s = 20.0\nsettle_s = 5.0\nduration_ms = {1e3 * PULSE_S}\nreference_percent = 0.25\n"

@@ -109,12 +109,15 @@ def _step(plant: Plant, k: int) -> dict[str, float]:
     t = np.linspace(0.0, 0.012, 240_001)
     parts: Any = signal.residue([1.0], np.polymul(np.polymul(_chain(own), [2e-6, 1.0]), [1.0, 0.0]))
     out: Any = np.real(sum(r * np.exp(p * t) for r, p in zip(parts[0], parts[1], strict=True)))
-    at = {level: float(t[np.flatnonzero(out > level)[0]]) for level in (0.1, 0.9)}
-    settled = float(t[np.flatnonzero(np.abs(out - 1.0) > 0.02)[-1]])
+    rising = out[: int(np.argmax(out)) + 1]
+    ten, ninety = np.interp([0.1, 0.9], rising, t[: rising.size])
+    last = int(np.flatnonzero(np.abs(out - 1.0) > 0.02)[-1])
+    edge = 1.0 + 0.02 * float(np.sign(out[last] - 1.0))
+    settled = float(t[last] + (t[last + 1] - t[last]) * (edge - out[last]) / (out[last + 1] - out[last]))
     return {
         "step_settling_ms": 1e3 * (settled + own.delay_s - 2e-6 * float(np.log(2.0))),  # from 50 % of the drive
         "step_overshoot_percent": 100.0 * float(out.max() - 1.0),
-        "step_rise_ms": 1e3 * (at[0.9] - at[0.1]),
+        "step_rise_ms": 1e3 * float(ninety - ten),
     }
 
 
