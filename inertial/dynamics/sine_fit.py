@@ -28,7 +28,8 @@ class Tone:
     value : (channels,), complex amplitude: the real part belongs to cos ωt, minus the imaginary part to sin ωt
     sigma : (channels,), residual standard deviation of a sample
     amplitude_error : (channels,), σ√(2/N); the phase's in rad is this over the amplitude
-    frequency, frequency_error : Hz on the channel's own time base; the error is 0 where the frequency was given
+    frequency, frequency_error : Hz on the channel's own time base; the error is 0 where the frequency was given, and infinite
+        where no channel moves
     """
 
     value: Complex
@@ -82,6 +83,8 @@ def fit_tone_and_frequency(
         variance = np.sum(left**2, axis=0) / max(1, n - design.shape[1])
         weight = 1.0 / np.maximum(variance, 1e-300)
         information = float(np.sum(weight * np.sum(slope**2, axis=0)))
+        if information == 0.0:  # no channel moves: the frequency stays unknown
+            break
         step = float(np.sum(weight * np.sum(slope * left, axis=0))) / information
         error = information**-0.5
         f += float(np.clip(step, -0.25 / span, 0.25 / span))
