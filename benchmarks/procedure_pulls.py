@@ -168,11 +168,12 @@ def main() -> None:
             left, lot = left - most, lot + 1
         table = pd.DataFrame(rows)
         for figure, own in table.groupby("figure", sort=False):
-            _print(str(figure), own)
+            tell(str(figure), own)
         print(f"  {name}: {lot} stations, processor {time.process_time() - begun:.0f} s", flush=True)
 
 
-def _print(figure: str, own: pd.DataFrame) -> None:
+def tell(figure: str, own: pd.DataFrame) -> None:
+    """Print the pulls of a figure from the rows (units, …) of ``pull``, ``held``, ``known``, ``true`` and ``uncertainty``."""
     known = own[own["known"]]
     n, lost = len(known), len(own) - len(known)
     if not n:
