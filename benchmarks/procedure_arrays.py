@@ -1,4 +1,6 @@
-"""``python -m benchmarks.procedure_arrays [units] [seed]``: pulls of stability, warm-up and bias shift, the plant's noise alone.
+"""``python -m benchmarks.procedure_arrays [units] [seed]``: pulls of four procedures, the plant's noise alone.
+
+Stability, warm-up, bias shift by shock, and supply voltage.
 
 The noise of the simulated devices is drawn without a station, three axes a unit, and goes through the science of the procedures:
 many more records than :mod:`benchmarks.procedure_pulls` can afford. What a station adds (temperature, moves, switching) is not
@@ -12,16 +14,21 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from benchmarks.procedure_truths import BAND_UG, TRUTHS, WARM_G, WARM_S
+from benchmarks.procedure_truths import BAND_UG, SUPPLIES, TRUTHS, WARM_G, WARM_S
+from inertial.dynamics.ratiometry import largest_departure
 from inertial.dynamics.stability import ShortNoise, difference_error, short_noise, stability
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
+from pipelines.procedures.noise_columns import noise_columns
+from pipelines.procedures.ratiometry import RatiometryPart, over_supply
 from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset
 
 HOUR_S, WARM_RECORD_S, WARM_HZ = 3600, 1200, 10
 WINDOW_S, APART_S, WINDOW_HZ = 20.0, 100.0, 100.0
+DWELL_S, MOVE_S, FACE_SIZE = 10.0, 5.5, 1000  # of a face at a voltage; samples at WINDOW_HZ
 NAMES = {"sd_100s": "bias_stability_ug", "drift_h": "bias_drift_ug_h", "allan_100s": "bias_allan_100s_ug"}
 
 
@@ -85,10 +92,44 @@ def shifts(units: int, seed: int) -> None:
     tell("shock_bias_shift_ug", rows, 0.0)
 
 
+def supplies(units: int, seed: int) -> None:
+    """Both faces at five voltages; nothing follows the voltage."""
+    noise = UnitNoise(load_preset("SF1500"), [np.random.default_rng([seed, 4, k]) for k in range(units)])
+    part = RatiometryPart(kind="ratiometry", supplies_V=list(SUPPLIES), axes=["z"])
+    own: list[list[dict[str, float]]] = [[] for _ in range(3 * units)]
+    now = 0.0
+    for volt in SUPPLIES:
+        for side, force in enumerate((1.0, -1.0)):
+            noise.jump(MOVE_S)
+            now += MOVE_S + DWELL_S
+            for rows, record in zip(
+                own, (force + noise.sample(FACE_SIZE, WINDOW_HZ)).reshape(FACE_SIZE, -1).T, strict=True
+            ):
+                face = {"setting": volt, "side": float(side), "value": float(record.mean()), "measured_V": volt}
+                face |= {"uncertainty": float(record.std(ddof=1)) / FACE_SIZE**0.5, "window_s": DWELL_S, "time_s": now}
+                rows.append(face | noise_columns(short_noise(record, WINDOW_HZ)))
+    names = ("supply_sensitivity_percent", "supply_zero_percent_fs", "supply_zero_ug_V")
+    pulls: dict[str, list[tuple[float, float, float, float]]] = {name: [] for name in names}
+    for rows in own:
+        one = over_supply(part, pd.DataFrame(rows))
+        for name, (value, error) in zip(
+            names,
+            (
+                largest_departure(one.supply, one.sensitivity, one.own_error),
+                largest_departure(one.supply, one.zero_g, one.own_zero_error),
+                (one.slope_g_V, one.slope_error_g_V),
+            ),
+            strict=True,
+        ):
+            pulls[name].append((value, error, value - 1.96 * error, value + 1.96 * error))
+    for name, rows in pulls.items():
+        tell(name, rows, 0.0)
+
+
 def main() -> None:
-    """All three."""
+    """All of them."""
     units, seed = (int(sys.argv[k]) if len(sys.argv) > k else other for k, other in ((1, 200), (2, 2026)))
-    for run in (hours, warm_ups, shifts):
+    for run in (hours, warm_ups, shifts, supplies):
         run(units, seed)
 
 

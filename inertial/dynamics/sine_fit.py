@@ -28,7 +28,8 @@ class Tone:
     value : (channels,), complex amplitude: the real part belongs to cos ωt, minus the imaginary part to sin ωt
     sigma : (channels,), residual standard deviation of a sample
     amplitude_error : (channels,), σ√(2/N); the phase's in rad is this over the amplitude
-    frequency, frequency_error : Hz on the channel's own time base; the error is 0 where the frequency was given
+    frequency, frequency_error : Hz on the channel's own time base; the error is 0 where the frequency was given, and infinite
+        where no channel moves
     """
 
     value: Complex
@@ -54,42 +55,42 @@ def fit_tone(record: Array, rate_hz: float, frequency: float, *, first_s: float 
         raise NotIdentified(msg)
     time = first_s + np.arange(n) / rate_hz
     design = np.hstack([_columns(time, frequency), *_harmonics(time, rate_hz, frequency, harmonics)])
-    c = np.linalg.lstsq(design, record, rcond=None)[0]
-    left = record - design @ c
+    c, left = _projected(design, record)
     sigma = np.sqrt(np.sum(left**2, axis=0) / (n - design.shape[1]))
     return Tone(c[0] - 1j * c[1], sigma, sigma * np.sqrt(2.0 / n), frequency)
 
 
-def fit_tone_and_frequency(record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0) -> Tone:
+def fit_tone_and_frequency(
+    record: Array, rate_hz: float, frequency: float, *, first_s: float = 0.0, harmonics: int = 1
+) -> Tone:
     """The tone and its frequency, common to all channels: Gauss–Newton on the fourth parameter.
 
     A device with a clock of its own sees another frequency; 1000 ppm at 1 kHz over 1 s would null a fit at the given one. The
     search begins at the largest value of a fine periodogram within ± 2 % of the given frequency.
-    The phase refers to time 0, so ``first_s`` decides how strongly phase and frequency depend on each other.
+    The phase refers to time 0, so ``first_s`` decides how strongly phase and frequency depend on each other. ``harmonics`` is as
+    for :func:`fit_tone`.
     """
-    n, channels = record.shape
+    n = len(record)
     time = first_s + np.arange(n) / rate_hz
     span = n / rate_hz
     f = _coarse(record, time, frequency, span)
-    value = np.zeros(channels, dtype=np.complex128)
-    sigma, error = np.zeros(channels), np.inf
+    error = np.inf
     for _ in range(ROUNDS):
-        tone = fit_tone(record, rate_hz, f, first_s=first_s)
-        value, sigma = tone.value, tone.sigma
-        spin = np.exp(2j * np.pi * f * time)
-        slope = np.real(1j * 2.0 * np.pi * time[:, None] * spin[:, None] * value)  # derivative by the frequency
-        design = _columns(time, f)
-        q = np.linalg.qr(design)[0]
-        slope = slope - q @ (q.T @ slope)
-        left = record - q @ (q.T @ record)
-        weight = 1.0 / np.maximum(sigma, 1e-300) ** 2
+        design = np.hstack([_columns(time, f), *_harmonics(time, rate_hz, f, harmonics)])
+        c, left = _projected(design, record)
+        turned = design[:, [1]] * c[0] - design[:, [0]] * c[1]
+        slope = _projected(design, -2.0 * np.pi * time[:, None] * turned)[1]  # derivative by the frequency
+        variance = np.sum(left**2, axis=0) / max(1, n - design.shape[1])
+        weight = 1.0 / np.maximum(variance, 1e-300)
         information = float(np.sum(weight * np.sum(slope**2, axis=0)))
+        if information == 0.0:  # no channel moves: the frequency stays unknown
+            break
         step = float(np.sum(weight * np.sum(slope * left, axis=0))) / information
         error = information**-0.5
         f += float(np.clip(step, -0.25 / span, 0.25 / span))
         if abs(step) < 1e-3 * error:
             break
-    tone = fit_tone(record, rate_hz, f, first_s=first_s)
+    tone = fit_tone(record, rate_hz, f, first_s=first_s, harmonics=harmonics)
     return Tone(tone.value, tone.sigma, tone.amplitude_error, f, error)
 
 
@@ -97,7 +98,7 @@ def harmonic_distortion(record: Array, rate_hz: float, frequency: float) -> Arra
     """Total harmonic distortion of every channel, a share: harmonics 2 to 5 below half the rate over the fundamental."""
     time = np.arange(len(record)) / rate_hz
     parts = [_columns(time, frequency), *_harmonics(time, rate_hz, frequency, HARMONICS)]
-    c = np.linalg.lstsq(np.hstack(parts), record, rcond=None)[0]
+    c, _ = _projected(np.hstack(parts), record)
     fundamental = np.hypot(c[0], c[1])
     return np.sqrt(np.sum(c[4:] ** 2, axis=0)) / np.where(fundamental > 0.0, fundamental, np.inf)
 
@@ -105,6 +106,18 @@ def harmonic_distortion(record: Array, rate_hz: float, frequency: float) -> Arra
 def frequency_error_of(sigma: float, amplitude: float, span_s: float, count: int) -> float:
     """Standard uncertainty in Hz of a fitted frequency: √6/π·(σ/A)/(T√N)."""
     return float(np.sqrt(6.0) / np.pi * sigma / amplitude / (span_s * np.sqrt(count)))
+
+
+def _projected(design: Array, record: Array) -> tuple[Array, Array]:
+    """Coefficients (terms, channels) of least squares and residuals (n, channels).
+
+    By the normal equations, with one correction from the residuals: the columns of tones over several periods are nearly
+    orthogonal, and a decomposition of all samples takes ten times as long.
+    """
+    gram = design.T @ design
+    c = np.linalg.lstsq(gram, design.T @ record, rcond=None)[0]
+    c = c + np.linalg.lstsq(gram, design.T @ (record - design @ c), rcond=None)[0]
+    return c, record - design @ c
 
 
 def _columns(time: Array, frequency: float) -> Array:

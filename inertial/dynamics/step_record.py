@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ALIGNMENTS = 3
 FEWEST = 7  # points of a local fit
+CENTRINGS = 3  # fits about a crossing, each about what the last one found
 RISE_POINTS = 6.0  # samples within the rise time that are needed to resolve a tenth of 1/f_n
 
 
@@ -182,17 +183,26 @@ def _local(
 def _crossing(
     time: Array, response: Array, error: Array, level: float, near: float, width: float, blur: float
 ) -> tuple[float, float]:
-    """Time at which the response crosses a level near a time, and its standard uncertainty."""
-    c, covariance, width = _local(time, response, error, near, width, blur)
-    x = 0.0
-    for _ in range(20):  # Newton on the parabola; the slope at a crossing is not zero
-        slope = c[1] + 2.0 * c[2] * x
-        x = float(
-            np.clip(x - (c[0] + c[1] * x + c[2] * x**2 - level) / (slope if abs(slope) > 1e-12 else 1e-12), -1.0, 1.0)
-        )
-    row = np.array([1.0, x, x**2])
-    slope = max(abs(c[1] + 2.0 * c[2] * x), 1e-12)
-    return near + width * x, float(width * np.sqrt(row @ covariance @ row) / slope)
+    """Time at which the response crosses a level near a time, and its standard uncertainty.
+
+    The parabola is laid about the crossing that the last one found: about the first point above the level, which lies behind the
+    crossing, a cubic term of the response would move it, by 0.02 % of a rise time over 17 samples.
+    """
+    slope, square = 1.0, 0.0
+    for _ in range(CENTRINGS):
+        c, covariance, width = _local(time, response, error, near, width, blur)
+        x = 0.0
+        for _ in range(20):  # Newton on the parabola; the slope at a crossing is not zero
+            slope = c[1] + 2.0 * c[2] * x
+            x = float(
+                np.clip(
+                    x - (c[0] + c[1] * x + c[2] * x**2 - level) / (slope if abs(slope) > 1e-12 else 1e-12), -1.0, 1.0
+                )
+            )
+        row = np.array([1.0, x, x**2])
+        slope, square = max(abs(c[1] + 2.0 * c[2] * x), 1e-12), float(row @ covariance @ row)
+        near += width * x
+    return near, float(width * np.sqrt(square) / slope)
 
 
 def _settling(

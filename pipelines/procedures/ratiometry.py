@@ -220,17 +220,24 @@ def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:
             if len(one):
                 means[k, side], errors[k, side] = float(one["value"].iloc[0]), float(one["uncertainty"].iloc[0])
     zero, sensitivity, error = zero_and_sensitivity(means, errors)
-    apart = _time_between(rows)
     noise, window = pooled_noise(rows), float(rows["window_s"].mean())
-    # both faces of a voltage follow each other: slow wander is the same on them, so their mean has it like one longer record
-    zero_error = np.maximum(error, difference_error(noise, 2.0 * window, apart) / np.sqrt(2.0))
-    error = np.maximum(error, 0.5 * difference_error(noise, window, apart))
+    # both faces of a voltage follow each other: slow wander is the same on them, so their mean has it like one longer record,
+    # and their difference has what wanders from one face to the other, however long ago the nominal voltage was
+    zero_error = np.maximum(error, difference_error(noise, 2.0 * window, _time_between_voltages(rows)) / np.sqrt(2.0))
+    error = np.maximum(error, 0.5 * difference_error(noise, window, _time_between_faces(rows)))
     own = 1e-6 * part.repeatability_ug * abs(sensitivity[0]) / np.sqrt(2.0)
     error, zero_error = np.hypot(error, own), np.hypot(zero_error, own)
     return departures(measured, zero, sensitivity, error, follows=part.follows, zero_error=zero_error)
 
 
-def _time_between(rows: pd.DataFrame) -> float:
+def _time_between_faces(rows: pd.DataFrame) -> float:
+    """Mean time between the two faces of a voltage, s; 0 where no times are known."""
+    if "time_s" not in rows:  # points of earlier versions have none
+        return 0.0
+    return float(rows.groupby("setting", sort=False)["time_s"].agg(np.ptp).mean())
+
+
+def _time_between_voltages(rows: pd.DataFrame) -> float:
     """Mean time between a voltage and the first one, s; 0 where no times are known."""
     if "time_s" not in rows:  # points of earlier versions have none
         return 0.0

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.dynamics.sine_fit import fit_tone, fit_tone_and_frequency, harmonic_distortion
+from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency, harmonic_distortion
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points
 from pipelines.procedures.base import REFERENCE, Array, Device, Finding, ProcedureRecord, UnitRecord
@@ -32,7 +32,7 @@ def clocks_of(records: Sequence[ProcedureRecord], axis: int) -> dict[str, tuple[
             y = own.output[:, axis : axis + 1]
             if not np.all(np.isfinite(y)) or float(np.ptp(y)) == 0.0:
                 continue
-            tone = fit_tone_and_frequency(y, own.rate_hz, frequency)
+            tone = fit_tone_and_frequency(y, own.rate_hz, frequency, harmonics=HARMONICS)
             if abs(tone.value[0]) > SILENT * tone.amplitude_error[0]:
                 departures.setdefault(unit, []).append(
                     (frequency / tone.frequency - 1.0, tone.frequency_error / frequency)
@@ -55,11 +55,14 @@ def response_point(
     clock: tuple[float, float],
     device: Device,
 ) -> dict[str, Any]:
-    """One point of one unit: three-parameter fits on both channels, with the device's clock known."""
+    """One point of one unit: fits of tone and harmonics on both channels, with the device's clock known.
+
+    Distortion of the exciter is not noise: it is fitted, and enters neither the uncertainty nor the coherence.
+    """
     reference, own = records
     frequency = setting["frequency_hz"]
-    drive = fit_tone(reference.output, reference.rate_hz, frequency)
-    tone = fit_tone(own.output[:, axis : axis + 1], own.rate_hz, frequency / (1.0 + clock[0]))
+    drive = fit_tone(reference.output, reference.rate_hz, frequency, harmonics=HARMONICS)
+    tone = fit_tone(own.output[:, axis : axis + 1], own.rate_hz, frequency / (1.0 + clock[0]), harmonics=HARMONICS)
     ratio = tone.value[0] / drive.value[axis]
     size, level = abs(tone.value[0]), float(abs(drive.value[axis]))
     across = float(np.linalg.norm(np.abs(np.delete(drive.value, axis)))) / level

@@ -94,6 +94,23 @@ def test_alignment_removes_the_blur_of_a_sampled_edge(rng: np.random.Generator) 
     assert np.max(np.abs(np.concatenate(outs) - blurred)) > 0.03
 
 
+def test_the_rise_time_is_right_where_the_points_lie_unevenly_about_the_crossings(rng: np.random.Generator) -> None:
+    """Means over half a sample interval, as a procedure makes them of sixteen steps: the first above a level lies behind it."""
+    rate, natural, zeta = 51.2e3, 1000.0, 0.7
+    fine = np.linspace(0.0, 1e-3, 1_000_001)
+    ten, ninety = np.interp([0.1, 0.9], settling.step_response(fine, natural, zeta), fine)
+    errors = []
+    for _ in range(24):
+        times = np.concatenate([np.arange(-100, 900) / rate + late for late in rng.uniform(0.0, 1.0, 16) / rate])
+        place = np.floor(times * rate * 2.0).astype(int) + 300
+        count = np.bincount(place)
+        sums = (np.bincount(place, weights=one) for one in (times, settling.step_response(times, natural, zeta)))
+        middle, value = (one[count > 0] / count[count > 0] for one in sums)
+        figures = step_figures(middle, value, np.full(middle.size, 1e-3), band=0.02, bin_s=0.5 / rate)
+        errors.append(figures.rise_s / (ninety - ten) - 1.0)
+    assert abs(np.mean(errors)) < 8e-5, errors
+
+
 def test_a_ratiometric_output_departs_by_its_error_alone() -> None:
     supply, error = np.array([3.0, 2.7, 3.3]), 0.02
     ratio = supply / 3.0
