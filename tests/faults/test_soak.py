@@ -1,8 +1,7 @@
 """Shifts of orders at three stations with random faults (worker, server, disk, clock): nothing is lost, twice or unsafe.
 
 The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (4): some ten minutes on two free cores; 90 is a month of one shift a day.
-Clocks are those of the workers' processes, by libfaketime where it is installed and lets a process sleep (0.9.10 does not with
-the clock of Python's sleep left as it is); the clock of this computer is left alone.
+Clocks are those of the workers' processes, their flows and watchdogs (wrong_clock.py); the clock of this computer is left alone.
 """
 
 import os
@@ -28,6 +27,7 @@ from root_process import ROOT, python
 from served_station import modbus_station, station_file
 from served_station import served as station_served
 from small_station import lot_of
+from wrong_clock import WrongClocks
 
 from pipelines.archive import Archive
 from pipelines.flows.queue_rules import ATTEMPTS
@@ -54,10 +54,8 @@ SAFE_S = 90.0
 SHIFT_S = 900.0
 FULL_S = 5.0
 OUTAGE_S = 75.0  # longer than Prefect's worker tolerates: it ends, or hangs and is ended
-OFF_S = 3600.0  # by how much a clock is wrong
+OFF_S = 3600  # by how much a clock is wrong
 WRONG_S = 25.0
-FAKETIME = Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
-WITH_CLOCK = {"LD_PRELOAD": str(FAKETIME), "FAKETIME_NO_CACHE": "1", "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
 GROWTH_MB = 150.0
 GROWTH_FILES = 30
 
@@ -129,11 +127,11 @@ class Soak:
             "worker": self.worker_dies,
             "server": self.server_dies,
         }
-        self.clocks = self.clocks_can_be_wrong()
-        if self.clocks:
+        self.clocks = WrongClocks(folder / "clocks") if WrongClocks.available() else None
+        if self.clocks is not None:
             self.faults["clock"] = self.clock_jumps
         else:
-            print("without wrong clocks: no libfaketime in which a process can sleep")  # noqa: T201 - part of the figures
+            print("without wrong clocks: no C compiler, or no GNU C library")  # noqa: T201 - part of the figures
         if disk:
             self.faults["disk"] = self.disk_fills
         self.happened: Counter[str] = Counter()
@@ -160,37 +158,20 @@ class Soak:
 
     def start_worker(self, name: str) -> None:
         own = ExitStack()
-        line = replace(self.line, environment={**self.line.environment, **self.clock(name)})
+        clock = {} if self.clocks is None else self.clocks.environment(name)
+        line = replace(self.line, environment={**self.line.environment, **clock})
         process = own.enter_context(worker(line, self.folder / name, name, f"host-of-{name}"))
         self.workers[name] = (own, process)
 
-    def clock(self, name: str, wrong_s: float = 0.0) -> dict[str, str]:
-        """Set the clock of a worker's processes; their environment."""
-        if not self.clocks:
-            return {}
-        place = self.folder / f"{name}.clock"
-        place.write_text(f"{wrong_s:+.0f}", encoding="ascii")
-        return {**WITH_CLOCK, "FAKETIME_TIMESTAMP_FILE": str(place)}
-
-    def clocks_can_be_wrong(self) -> bool:
-        """Whether a process with a wrong clock runs here: its sleep must end."""
-        if not FAKETIME.is_file():
-            return False
-        place = self.folder / "probe.clock"
-        place.write_text("-3600", encoding="ascii")
-        environment = {**os.environ, **WITH_CLOCK, "FAKETIME_TIMESTAMP_FILE": str(place)}
-        code = "import time; time.sleep(0.01)"
-        return not subprocess.run(
-            [sys.executable, "-c", code], env=environment, capture_output=True, check=False
-        ).returncode
-
     def clock_jumps(self, chance: random.Random) -> None:
         """The clock of a station is an hour wrong while it measures, then right again."""
+        assert self.clocks is not None
         name = chance.choice(STATIONS)
         self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
-        self.clock(name, chance.choice((-OFF_S, OFF_S)))
+        self.clocks.set(name, chance.choice((-OFF_S, OFF_S)))
+        assert self.clocks.holds(self.workers[name][1].pid, name) > 1, "the worker and its flow have this clock"
         time.sleep(WRONG_S)
-        self.clock(name)
+        self.clocks.set(name, 0)
 
     def worker_dies(self, chance: random.Random) -> None:
         """The service of a worker is killed, with its flow; its station is safe before the service comes back."""
