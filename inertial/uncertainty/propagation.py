@@ -115,6 +115,10 @@ class Propagated:
     source: Sensitivity
     response: Array
 
+    def _inverse(self) -> Array:
+        """K⁻¹, (..., 3, 3), g per unit of the output."""
+        return np.asarray(np.linalg.inv(self.response), dtype=np.float64)
+
     def covariance(self) -> Array:
         """Covariance of the coefficients of all axes in one vector, (..., 3p, 3p)."""
         flat = self.coefficients.reshape(*self.coefficients.shape[:-3], -1, self.coefficients.shape[-1])
@@ -122,13 +126,13 @@ class Propagated:
 
     def output_errors(self, columns: Array) -> Array:
         """Errors of a corrected output, (..., m, 3, q), g, at m conditions with the columns (..., 3, m, p)."""
-        return _turned(-np.linalg.inv(self.response), columns @ self.coefficients)
+        return _turned(-self._inverse(), columns @ self.coefficients)
 
     def rotation(self) -> Array:
         """The antisymmetric part of K⁻¹·δK at 25 °C, (..., 3, 3, q): a rotation of the whole unit."""
         moved = np.moveaxis(response_matrix(np.moveaxis(self.coefficients, -1, 0), self.names), 0, -1)
         flat = moved.reshape(*moved.shape[:-2], -1)
-        relative = np.matmul(np.linalg.inv(self.response), flat).reshape(moved.shape)
+        relative = np.matmul(self._inverse(), flat).reshape(moved.shape)
         return 0.5 * (relative - np.swapaxes(relative, -3, -2))
 
     def user_errors(self, columns: Array, force: Array, *, intrinsic: bool = False) -> Array:
@@ -147,7 +151,7 @@ class Propagated:
 
     def shown_errors(self, columns: Array, changes: Array) -> Array:
         """What a verification on the same station shows, (..., m, 3, q), g, with its own changes J_v·u (..., m, 3, q)."""
-        return self.output_errors(columns) + _turned(np.linalg.inv(self.response), np.moveaxis(changes, -3, -2))
+        return self.output_errors(columns) + _turned(self._inverse(), np.moveaxis(changes, -3, -2))
 
 
 def propagated(design_: FitDesign, source: Sensitivity, response: Array) -> Propagated:
