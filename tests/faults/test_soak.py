@@ -1,6 +1,7 @@
-"""Shifts of orders at three stations with random faults (worker, server, disk, clock): nothing is lost, twice or unsafe.
+"""Shifts of orders at three stations with random faults of worker, server, database, disk, clock: nothing lost, twice, unsafe.
 
-The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (4): some ten minutes on two free cores; 90 is a month of one shift a day.
+The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (5): some ten minutes on two free cores; 90 is a month of one shift a day.
+The orchestrator's database is PostgreSQL, as several stations need it, and SQLite only where PostgreSQL is not installed.
 Clocks are those of the workers' processes, their flows and watchdogs (wrong_clock.py); the clock of this computer is left alone.
 """
 
@@ -23,6 +24,7 @@ import pytest
 from capture_double import recipe_file
 from lines import deployments, kill_all, order, worker
 from orchestrator import Orchestrator
+from postgres_server import Postgres, installed, postgres
 from root_process import ROOT, python
 from served_station import modbus_station, station_file
 from served_station import served as station_served
@@ -36,7 +38,7 @@ from pipelines.integrity.archive import verify
 from stations.opening import open_devices
 from stations.safety.folder import read_log
 
-SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "4"))
+SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "5"))
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200 + 600 * SHIFTS)]
 
 STATIONS = ("line-1", "line-2", "line-3")
@@ -53,6 +55,7 @@ QUICK = (
 SAFE_S = 90.0
 SHIFT_S = 900.0
 FULL_S = 5.0
+DATABASE_OFF_S = 15.0
 OUTAGE_S = 75.0  # longer than Prefect's worker tolerates: it ends, or hangs and is ended
 OFF_S = 3600  # by how much a clock is wrong
 WRONG_S = 25.0
@@ -66,6 +69,7 @@ class Server:
 
     home: Path
     port: int
+    database: Postgres | None = None
     key: str = field(default_factory=new_key)
     process: subprocess.Popen[bytes] | None = None
 
@@ -75,9 +79,17 @@ class Server:
             **os.environ, "PREFECT_HOME": str(self.home), "PYTHONPATH": str(ROOT), CLIENT_KEY: self.key,
             "PREFECT_API_URL": f"http://127.0.0.1:{self.port}/api", "PREFECT_SERVER_ALLOW_EPHEMERAL_MODE": "false",
             "TUMBLELINE_ARCHIVE": str(self.home.parent / "disk" / "archive"),
-            "TUMBLELINE_STATE": str(self.home.parent / "state"),
+            "TUMBLELINE_STATE": str(self.home.parent / "state"), **self._database(),
         }  # fmt: skip
         return Orchestrator(self.home, self.port, self.key, environment)
+
+    def _database(self) -> dict[str, str]:
+        if self.database is None:
+            return {}
+        address = self.home / "database"
+        address.touch(0o600)
+        address.write_text(self.database.address)
+        return {"TUMBLELINE_ORCHESTRATOR_DATABASE": str(address)}
 
     def start(self) -> None:
         command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(self.port)]
@@ -132,6 +144,10 @@ class Soak:
             self.faults["clock"] = self.clock_jumps
         else:
             print("without wrong clocks: no C compiler, or no GNU C library")  # noqa: T201 - part of the figures
+        if server.database is not None:
+            self.faults["database"] = self.database_dies
+        else:
+            print("without a killed database: PostgreSQL is not installed")  # noqa: T201 - part of the figures
         if disk:
             self.faults["disk"] = self.disk_fills
         self.happened: Counter[str] = Counter()
@@ -190,6 +206,15 @@ class Soak:
         time.sleep(OUTAGE_S if not self.happened["server"] else chance.uniform(0.0, OUTAGE_S))
         self.server.start()
 
+    def database_dies(self, chance: random.Random) -> None:
+        """The database is killed while stations measure, and comes back after some seconds."""
+        database, name = self.server.database, chance.choice(STATIONS)
+        assert database is not None
+        self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
+        database.kill()
+        time.sleep(chance.uniform(1.0, DATABASE_OFF_S))
+        database.start()
+
     def disk_fills(self, chance: random.Random) -> None:
         """The disk of the archive is full for some seconds."""
         del chance
@@ -230,7 +255,7 @@ class Soak:
                     own.close()
                     self.start_worker(name)
                     self.again += 1
-                if not self.under_way(name, number):
+                if not (self.under_way(name, number) or self.complete(name, number)):
                     self.order(name, number)  # it failed (a full disk): a person orders the same again
             time.sleep(2.0)
         for name in STATIONS:
@@ -265,7 +290,7 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
         disk = stack.enter_context(small_disk(tmp_path / "disk"))
         home = tmp_path / "orchestrator"
         home.mkdir(mode=0o700)
-        server = Server(home, free_port())
+        server = Server(home, free_port(), stack.enter_context(postgres()) if installed() else None)
         server.start()
         stack.callback(server.kill)
         soak = Soak(tmp_path, server, stack, disk=disk)
