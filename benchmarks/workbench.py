@@ -1,10 +1,11 @@
 """The workbench on a large lot: time of a page, of a click, of a search, and memory.
 
-    python benchmarks/workbench.py [--units 200] [--dwells 300] [--calibrations 10000] [--archive DIR]
+    python benchmarks/workbench.py [--units 200] [--dwells 300] [--calibrations 10000] [--archive DIR] [--lots 10000]
 
 One run with that many units and dwells is written to an archive in a temporary folder, opened in headless chromium beside its
-own server. The search is timed over runs of eight units each, or over an archive of ``generated_archive.py``. Ten browsers open
-the unit at once. Times are medians, with the worst in brackets; the load of the machine is printed with them.
+own server. The search is timed over runs of eight units each, or over an archive of ``generated_archive.py``, which ``--lots``
+makes. Ten browsers open the unit at once. Times are medians, with the worst in brackets; the load of the machine is printed
+with them.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from browser import Served, chromium, served, tab, until  # noqa: E402
 
+from benchmarks.archive import prepared  # noqa: E402
 from inertial import poses  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from pipelines.archive import Archive  # noqa: E402
@@ -189,7 +191,14 @@ def main() -> None:
     parser.add_argument(
         "--archive", type=Path, default=None, help="an archive to search in; the big run is added to it"
     )
+    parser.add_argument(
+        "--lots", type=int, default=0, help="search in an archive of so many lots of ten units, made in --archive"
+    )
     given = parser.parse_args()
+    if given.lots and not given.archive:
+        parser.error("--lots needs --archive, the folder in which the archive is made or was made before")
+    if given.lots:
+        prepared(given.lots, given.archive, 2)
     with tempfile.TemporaryDirectory() as folder:
         place = given.archive or Path(folder) / "archive"
         archive = Archive(str(place))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from inertial import design
 from inertial.design import Values
+from inertial.effects import SensorEffect
 from inertial.fits.linear import response_matrix
 from inertial.state import State
 
@@ -19,7 +20,10 @@ _STEPS = 12
 
 def predict(effects: Sequence[str], state: State, coefficients: Array, nonlinear: Values) -> Array:
     """Output of the model (..., n, 3), in the output's unit, for coefficients (..., 3, p); station effects left out."""
-    sensor, _ = design.split(effects)
+    return _output(design.split(effects)[0], state, coefficients, nonlinear)
+
+
+def _output(sensor: Sequence[SensorEffect], state: State, coefficients: Array, nonlinear: Values) -> Array:
     columns = design.local_columns(sensor, state, nonlinear)
     return np.swapaxes(np.matmul(columns, coefficients[..., None])[..., 0], -1, -2)
 
@@ -45,8 +49,9 @@ def correct(effects: Sequence[str], state: State, output: Array, coefficients: A
     nonlinear : values of nonlinear parameters and constants by effect id
     """
     force = np.zeros(np.broadcast_shapes(output.shape, state.force.shape))
+    at = _Inverse(effects, coefficients, nonlinear)
     for _ in range(_STEPS):
-        step = remaining_step(effects, state, output, coefficients, nonlinear, force)
+        step = at.step(state, output, force)
         force = force + step
         if float(np.max(np.abs(step), initial=0.0)) < 1e-12:
             break
@@ -62,11 +67,24 @@ def remaining_step(
     ----------
     force : (..., n, 3) in g, as :func:`correct` returns it; the others as there
     """
-    names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in range(3))
-    response = response_matrix(coefficients, names)
-    felt = replace(state, force=force, felt=_felt(response, force), memory={})
-    left = output - predict(effects, felt, coefficients, nonlinear)
-    return np.einsum("...ij,...nj->...ni", np.linalg.inv(response), left)
+    return _Inverse(effects, coefficients, nonlinear).step(state, output, force)
+
+
+class _Inverse:
+    """The inverse of a model's response, which every step uses; its parameters are those of :func:`correct`."""
+
+    def __init__(self, effects: Sequence[str], coefficients: Array, nonlinear: Values) -> None:
+        self._sensor = design.split(effects)[0]
+        names = tuple(design.local_names(self._sensor, axis, nonlinear) for axis in range(3))
+        self._coefficients, self._nonlinear = coefficients, nonlinear
+        self._response = response_matrix(coefficients, names)
+        self._inverse = np.linalg.inv(self._response)
+
+    def step(self, state: State, output: Array, force: Array) -> Array:
+        """Change (..., n, 3) in g of a force (..., n, 3) in g towards the one that explains an output (..., n, 3)."""
+        felt = replace(state, force=force, felt=_felt(self._response, force), memory={})
+        left = output - _output(self._sensor, felt, self._coefficients, self._nonlinear)
+        return np.einsum("...ij,...nj->...ni", self._inverse, left)
 
 
 def output_covariance(

@@ -26,6 +26,11 @@ Result = TypeVar("Result")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
+KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
+"""Variables of the GNU C library by which a process uses memory of arrays of some MB again. Else the system maps every such array
+anew, page by page, which is a quarter of the time of an uncertainty budget."""
+
+
 class Distributor(Protocol):
     """A way to spread work over other machines, such as :func:`pipelines.flows.dask_cluster.on_dask`."""
 
@@ -81,8 +86,8 @@ def processors() -> int:
 
 @contextmanager
 def one_thread_each() -> Generator[None, None, None]:
-    """A block whose child processes begin with one BLAS thread."""
-    with with_environment(ONE_THREAD):
+    """A block whose child processes begin with one BLAS thread, and keep the memory of their arrays."""
+    with with_environment(ONE_THREAD | KEPT_MEMORY):
         yield
 
 

@@ -66,11 +66,17 @@ class Postgres:
         )
 
 
+def installed() -> Path | None:
+    """Folder of the programs of PostgreSQL; None where it is not installed."""
+    programs = next((place for place in PLACES if all((place / name).is_file() for name in PROGRAMS)), None)
+    return programs if shutil.which("psql") else None
+
+
 @contextmanager
 def postgres() -> Iterator[Postgres]:
     """A new cluster with the database of an orchestrator; skips where PostgreSQL is not installed."""
-    programs = next((place for place in PLACES if all((place / name).is_file() for name in PROGRAMS)), None)
-    if programs is None or not shutil.which("psql"):
+    programs = installed()
+    if programs is None:
         pytest.skip("PostgreSQL is not installed")
     folder = Path(tempfile.mkdtemp(prefix="tumbleline-postgres-"))
     try:

@@ -94,10 +94,10 @@ def get(name: str) -> AnyEffect:
     """
     if name.startswith(COVARIATE_PREFIX) and len(name) > len(COVARIATE_PREFIX):
         return Covariate(name.removeprefix(COVARIATE_PREFIX))
-    known = catalogue()
-    if name not in known:
-        raise UnknownEffect(name, known)
-    return known[name]
+    effect = _extra.get(name) or _built_in().get(name)
+    if effect is None:
+        raise UnknownEffect(name, catalogue())
+    return effect
 
 
 def get_all(names: Iterable[str]) -> list[AnyEffect]:

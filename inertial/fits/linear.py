@@ -196,10 +196,19 @@ class _Solution(NamedTuple):
 def felt_force(force: Array, output: Array) -> Array:
     """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of bias and response."""
     x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
-    coefficients = np.linalg.pinv(x, rcond=1e-9) @ output
+    coefficients = pseudo_inverses(x) @ output
     k = np.swapaxes(coefficients[..., 1:, :], -1, -2)
     own = np.diagonal(k, axis1=-2, axis2=-1)
     return np.einsum("...ij,...nj->...ni", k / np.where(own == 0.0, 1.0, own)[..., :, None], force)
+
+
+def pseudo_inverses(columns: Array) -> Array:
+    """Pseudo-inverses (..., p, n) of columns (..., n, p); one serves all units where they have the same columns."""
+    many = columns.reshape(-1, *columns.shape[-2:])
+    if len(many) > 1 and np.array_equal(many, np.broadcast_to(many[0], many.shape)):
+        one = np.asarray(np.linalg.pinv(many[0], rcond=1e-9), dtype=np.float64)
+        return np.broadcast_to(one, (*columns.shape[:-2], *one.shape))
+    return np.asarray(np.linalg.pinv(columns, rcond=1e-9), dtype=np.float64)
 
 
 def _solve_shared(

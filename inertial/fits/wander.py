@@ -99,6 +99,7 @@ def fit_lot_with_wander(
     *,
     nonlinear: Values | None = None,
     used: NDArray[np.bool_] | None = None,
+    plain: LotFit | None = None,
 ) -> WanderFit:
     """Generalised least-squares fit of a model to the dwells of a lot.
 
@@ -110,6 +111,7 @@ def fit_lot_with_wander(
     standard_error : (..., n, 3), sd/√n, output unit; every one finite and positive
     nonlinear : values of nonlinear parameters that were found on the same dwells; their errors enter those of the coefficients
     used : (n,), the dwells that are fitted; the others only have residuals. All where None
+    plain : the fit of these dwells under white noise alone, where it is known
 
     Raises
     ------
@@ -122,7 +124,8 @@ def fit_lot_with_wander(
         )
     error = np.broadcast_to(standard_error, output.shape)
     there = np.ones(output.shape[-2], dtype=bool) if used is None else used
-    plain = fit_lot(effects, state, output, np.where(there[:, None], error, np.inf), nonlinear=nonlinear)
+    if plain is None:
+        plain = fit_lot(effects, state, output, np.where(there[:, None], error, np.inf), nonlinear=nonlinear)
     if np.any(plain.dof <= 0):
         raise NotIdentified(
             f"wander: {int(there.sum())} dwells for {plain.coefficients.shape[-1]} coefficients per axis leave nothing to "
@@ -266,7 +269,7 @@ class _ResidualCovariance:
         """Standard deviations of the residuals of all dwells, (..., 3, n)."""
         with_used = np.matmul(self.solved.gain, self.covariance[self.there])
         square = np.diagonal(self.covariance) - 2.0 * np.einsum("...np,...pn->...n", self.h, with_used)
-        square = square + np.einsum("...np,...pq,...nq->...n", self.h, self.solved.inverse, self.h)
+        square = square + np.sum(np.matmul(self.h, self.solved.inverse) * self.h, axis=-1)
         return np.sqrt(np.maximum(square, 0.0))
 
     def predicted(self) -> Array:

@@ -56,11 +56,22 @@ class FitDesign:
         ----------
         errors : those that :meth:`coefficient_errors` gives of the same changes, where they are known
         """
-        along = np.moveaxis(changes, -2, -3)
-        left = along - self.columns @ (self.coefficient_errors(changes) if errors is None else errors)
-        axes = tuple(range(along.ndim - 1))
-        whole = np.sqrt(np.sum(along**2, axis=axes))
-        return np.sqrt(np.sum(left**2, axis=axes)) / np.where(whole > 0.0, whole, 1.0)
+        explained = self.columns @ (self.coefficient_errors(changes) if errors is None else errors)
+        left = np.subtract(np.moveaxis(changes, -2, -3), explained, out=explained)
+        whole = _sizes(changes)
+        return _sizes(left) / np.where(whole > 0.0, whole, 1.0)
+
+
+def _sizes(columns: Array) -> Array:
+    """Roots of the sums of squares of q columns (..., q), over everything else, (q,)."""
+    flat = columns.reshape(-1, columns.shape[-1])
+    return np.sqrt(np.einsum("nq,nq->q", flat, flat))
+
+
+def _turned(matrix: Array, columns: Array) -> Array:
+    """Products of matrices (..., 3, 3) with the axes of columns (..., 3, m, q), in the order (..., m, 3, q)."""
+    flat = columns.reshape(*columns.shape[:-2], -1)
+    return np.moveaxis(np.matmul(matrix, flat).reshape(*flat.shape[:-1], *columns.shape[-2:]), -3, -2)
 
 
 def fit_design(
@@ -104,6 +115,10 @@ class Propagated:
     source: Sensitivity
     response: Array
 
+    def _inverse(self) -> Array:
+        """K⁻¹, (..., 3, 3), g per unit of the output."""
+        return np.asarray(np.linalg.inv(self.response), dtype=np.float64)
+
     def covariance(self) -> Array:
         """Covariance of the coefficients of all axes in one vector, (..., 3p, 3p)."""
         flat = self.coefficients.reshape(*self.coefficients.shape[:-3], -1, self.coefficients.shape[-1])
@@ -111,13 +126,13 @@ class Propagated:
 
     def output_errors(self, columns: Array) -> Array:
         """Errors of a corrected output, (..., m, 3, q), g, at m conditions with the columns (..., 3, m, p)."""
-        raw = np.moveaxis(columns @ self.coefficients, -3, -2)
-        return -np.einsum("...ij,...mjq->...miq", np.linalg.inv(self.response), raw)
+        return _turned(-self._inverse(), columns @ self.coefficients)
 
     def rotation(self) -> Array:
         """The antisymmetric part of K⁻¹·δK at 25 °C, (..., 3, 3, q): a rotation of the whole unit."""
         moved = np.moveaxis(response_matrix(np.moveaxis(self.coefficients, -1, 0), self.names), 0, -1)
-        relative = np.einsum("...ij,...jkq->...ikq", np.linalg.inv(self.response), moved)
+        flat = moved.reshape(*moved.shape[:-2], -1)
+        relative = np.matmul(self._inverse(), flat).reshape(moved.shape)
         return 0.5 * (relative - np.swapaxes(relative, -3, -2))
 
     def user_errors(self, columns: Array, force: Array, *, intrinsic: bool = False) -> Array:
@@ -130,12 +145,13 @@ class Propagated:
         errors = self.output_errors(columns)
         if not intrinsic:
             return errors
-        return errors + np.einsum("...ijq,...mj->...miq", self.rotation(), force)
+        rotation = np.moveaxis(self.rotation(), -2, -3)  # (..., j, i, q)
+        turned = np.matmul(force, rotation.reshape(*rotation.shape[:-2], -1))
+        return errors + turned.reshape(*turned.shape[:-1], *rotation.shape[-2:])
 
     def shown_errors(self, columns: Array, changes: Array) -> Array:
         """What a verification on the same station shows, (..., m, 3, q), g, with its own changes J_v·u (..., m, 3, q)."""
-        seen = np.einsum("...ij,...mjq->...miq", np.linalg.inv(self.response), changes)
-        return self.output_errors(columns) + seen
+        return self.output_errors(columns) + _turned(self._inverse(), np.moveaxis(changes, -3, -2))
 
 
 def propagated(design_: FitDesign, source: Sensitivity, response: Array) -> Propagated:

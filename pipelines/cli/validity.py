@@ -74,7 +74,7 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
     print_table(["certificate", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []
     if rows:
-        from inertial.uncertainty.degrees import rounded
+        from inertial.uncertainty.rounding import rounded
 
         cells = [
             [r["effect"], r["axis"], r["name"], *rounded(r["value"], r["standard_error"]), r["unit_text"]] for r in rows

@@ -25,6 +25,7 @@ from prefect.states import Crashed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from uuid import UUID
 
     from prefect.client.schemas.objects import FlowRun
 
@@ -34,6 +35,9 @@ STARTED_WITHIN = timedelta(seconds=1)
 
 MANY = 200  # largest page of the server
 WORKING = (StateType.PENDING, StateType.RUNNING, StateType.CANCELLING)
+LOST_S = 60.0
+"""Longest time from the moment at which a worker takes a run to the start of its process, s, with a large margin."""
+
 SUSPENDED = "Suspended"  # such a run has no process and gets a new one when it is resumed
 WORKER = "prefect.worker.name"
 """Label that the worker of Prefect gives to the runs that it takes."""
@@ -58,19 +62,52 @@ def close_dead_runs_of_queue(pool: str, queue: str, worker: str = "") -> list[st
     A run that another worker took is left alone, as its process may live on another computer: the server closes it when its
     heartbeat stops (:mod:`pipelines.flows.heartbeat`).
     """
-    closed: list[str] = []
     with get_client(sync_client=True) as client:
-        for run in runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED)):
-            taken_by = run.labels.get(WORKER)
-            if (
-                (worker and taken_by and taken_by != worker)
-                or (run.state and run.state.name == SUSPENDED)
-                or lives(run)
-            ):
-                continue
+        dead = _without_process(client, pool, queue, worker)
+        for run in dead:
             client.set_flow_run_state(run.id, Crashed(message=GONE), force=True)
-            closed.append(run.name)
-    return closed
+    return [run.name for run in dead]
+
+
+def _without_process(client: SyncPrefectClient, pool: str, queue: str, worker: str) -> list[FlowRun]:
+    """Runs in progress that no other worker took and that have no process on this computer."""
+    return [
+        run
+        for run in runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED))
+        if not (worker and run.labels.get(WORKER, worker) != worker)
+        and not (run.state and run.state.name == SUSPENDED)
+        and not lives(run)
+    ]
+
+
+class LostRuns:
+    """Runs of a station's queue whose process ended while the server could not be told, while their worker goes on.
+
+    Such a run never begins or ends by itself, and the queue gives out no other one: a run that had not begun yet has no heartbeat
+    that could stop. A worker that has just taken a run has no process for it either, so a run is closed when that was so for
+    ``LOST_S`` in one state. The time is that of this computer since its start: whether its clock is right does not matter.
+    """
+
+    def __init__(self, pool: str, queue: str, worker: str) -> None:
+        self._where = (pool, queue, worker)
+        self._since: dict[tuple[UUID, UUID | None], float] = {}
+
+    def close(self, client: SyncPrefectClient, now: float) -> list[str]:
+        """Mark the lost runs as crashed; return their names.
+
+        Parameters
+        ----------
+        now : s, of a clock that only counts on
+        """
+        lost = {(run.id, run.state_id): run for run in _without_process(client, *self._where)}
+        self._since = {key: self._since.get(key, now) for key in lost}
+        closed: list[str] = []
+        for key, run in lost.items():
+            # a process that has ended changes no state after this look
+            if now - self._since[key] >= LOST_S and client.read_flow_run(run.id).state_id == run.state_id:
+                client.set_flow_run_state(run.id, Crashed(message=GONE), force=True)
+                closed.append(run.name)
+        return closed
 
 
 def runs_of_queue(
@@ -91,12 +128,16 @@ def runs_of_queue(
 
 
 def lives(run: FlowRun) -> bool:
-    """Whether a process of this computer still works on a run; its number alone may belong to a newer process."""
+    """Whether a process of this computer still works on a run; its number alone may belong to a newer process.
+
+    Where the number is not known, since the server was away when the process started, every process is looked at.
+    """
     pid = run.infrastructure_pid
-    if not pid or not pid.isdecimal():
+    if pid and not pid.isdecimal():
         return False
-    environment = _environment(PROCESSES / pid)
-    return f"PREFECT__FLOW_RUN_ID={run.id}".encode() in environment.split(b"\0") and int(pid) != os.getpid()
+    places = [PROCESSES / pid] if pid else [place for place in PROCESSES.glob("[0-9]*") if place.name.isdecimal()]
+    mark = f"PREFECT__FLOW_RUN_ID={run.id}".encode()
+    return any(mark in _environment(place).split(b"\0") for place in places if int(place.name) != os.getpid())
 
 
 def _environment(process: Path) -> bytes:

@@ -1,7 +1,8 @@
 """Rules for the runs in a station's queue: missed and skipped runs are cancelled, crashed runs continue where the policy says so.
 
 The queue of a station gives out one run at a time. The rest is the policy of the deployment (:mod:`pipelines.flows.policy`). The
-first process of a worker applies it when it starts and every ``EVERY_S`` seconds, also while its worker is busy or dead.
+first process of a worker applies it when it starts and every ``EVERY_S`` seconds, also while its worker is busy or dead. It also
+closes runs whose process ended while the server was away, which would keep their place in the queue for ever.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import threading
 from collections import defaultdict
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
+from time import monotonic
 from typing import TYPE_CHECKING, Any, cast
 from uuid import UUID
 
@@ -24,12 +26,12 @@ from prefect.client.schemas.objects import StateType
 from prefect.client.schemas.sorting import FlowRunSort
 from prefect.states import Cancelled, Scheduled
 
-from pipelines.flows.dead_runs import WORKING, lives, runs_of_queue
+from pipelines.flows.dead_runs import WORKING, LostRuns, lives, runs_of_queue
 from pipelines.flows.policy import policy_of_tags
 from schemas.log_lines import tell
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Sequence
+    from collections.abc import Generator, Mapping, Sequence
 
     from prefect.client.schemas.objects import FlowRun
 
@@ -67,10 +69,16 @@ def apply_rules(pool: str, queue: str, now: datetime | None = None, settled: tim
 
 
 @contextmanager
-def applied(pool: str, queues: Sequence[str]) -> Generator[None]:
-    """A context in which the rules are applied to the queues every ``EVERY_S`` seconds, in a thread of this process."""
+def applied(pool: str, queues: Sequence[str], worker: str) -> Generator[None]:
+    """A context in which the rules are applied to the queues every ``EVERY_S`` seconds, in a thread of this process.
+
+    Parameters
+    ----------
+    worker : name of the worker of Prefect that takes the runs
+    """
     ended = threading.Event()
-    thread = threading.Thread(target=_repeat, args=(pool, tuple(queues), ended), name="queue rules", daemon=True)
+    lost = {queue: LostRuns(pool, queue, worker) for queue in queues}
+    thread = threading.Thread(target=_repeat, args=(pool, lost, ended), name="queue rules", daemon=True)
     thread.start()
     try:
         yield
@@ -78,12 +86,15 @@ def applied(pool: str, queues: Sequence[str]) -> Generator[None]:
         ended.set()
 
 
-def _repeat(pool: str, queues: Sequence[str], ended: threading.Event) -> None:
+def _repeat(pool: str, lost: Mapping[str, LostRuns], ended: threading.Event) -> None:
     fault = ""
     while not ended.wait(EVERY_S):
         try:
-            for queue in queues:
-                for text in apply_rules(pool, queue):
+            for queue, runs in lost.items():
+                with get_client(sync_client=True) as client:
+                    closed = runs.close(client, monotonic())
+                texts = [f"run {run} is closed as crashed: its process has ended" for run in closed]
+                for text in (*texts, *apply_rules(pool, queue)):
                     tell(f"{queue}: {text}", event="rule_applied", queue=queue)
             if fault:
                 tell("orchestrator: the server answers again, the rules of the queues are applied")

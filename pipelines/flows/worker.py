@@ -92,7 +92,7 @@ def start(
         command += ["--with-healthcheck"] if healthcheck else []
         child: list[subprocess.Popen[bytes]] = []
         health = watched(lambda: heartbeat_of(pool, name), lambda: child[0] if child else None, period_s())
-        with applied(pool, (station, *queues)), nullcontext() if once else health:
+        with applied(pool, (station, *queues), name), nullcontext() if once else health:
             return run_until_orphans_end(command, child.append)
 
 

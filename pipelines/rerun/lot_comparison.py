@@ -13,6 +13,7 @@ from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
 from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.archived_job import archived_job
+from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.selection import entry_of
 from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
@@ -87,7 +88,7 @@ def judged(part: Batch) -> list[LotComparison]:
     archive = Archive(part.archive)
     part.change.use()
     with threadpool_limits(1):
-        return [_judged(Run(archive, run_id), part.change) for run_id in part.runs]
+        return [_judged(BufferedRun(archive, run_id), part.change) for run_id in part.runs]
 
 
 def _judged(run: Run, change: ModelChange) -> LotComparison:
@@ -107,12 +108,16 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     old = {name: run.table(name) for name in names}
     lot = LotTables(run.table("dwells"), run.table("history"))
     new = fit_tables(lot, job.recipe.effects)
-    new |= verify_tables(lot, new["coefficients"], new["covariance"], new["predictions"])
+    own = _calibration(new)
+    new |= verify_tables(lot, new["coefficients"], new["covariance"], new["predictions"], own)
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
     names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
     stated = budget(
-        BudgetTables(lot.dwells, lot.history, *(new[name] for name in names), noise=old["noise"], lot=lot),
+        BudgetTables(
+            lot.dwells, lot.history, *(new[name] for name in names), noise=old["noise"], lot=lot, calibration=own
+        ),
         budget_terms(job),
+        contributions=False,
     )
     evidence = GradeEvidence(
         old["verdicts"],
@@ -120,23 +125,28 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
         noise=old["noise"],
         uncertainties=stated["uncertainties"],
         budget_covariance=stated["budget_covariance"],
+        calibration=own,
     )
     new |= grade(evidence, job.limits, job.recipe.zero_output)
-    return _side(old), _side(new)
+    return _side(old, _calibration(old)), _side(new, own)
 
 
-def _side(tables: Mapping[str, pd.DataFrame]) -> Side:
+def _calibration(tables: Mapping[str, pd.DataFrame]) -> Calibration | None:
+    """The calibration of a lot; None where no unit was fitted."""
+    return read_calibration(tables["coefficients"], tables["covariance"]) if len(tables["coefficients"]) else None
+
+
+def _side(tables: Mapping[str, pd.DataFrame], calibration: Calibration | None) -> Side:
     units, outcome, grades, reasons = (
         tables["grades"][name].tolist() for name in ("unit", "outcome", "grade", "reasons")
     )
-    coefficients = tables["coefficients"]
     return Side(
         outcome=dict(zip(units, outcome, strict=True)),
         grade=dict(zip(units, grades, strict=True)),
         reasons=dict(zip(units, reasons, strict=True)),
         fitted=_sums(tables["residuals"], "residual_ug"),
         verified=_sums(tables["verification"], "error_ug"),
-        calibration=read_calibration(coefficients, tables["covariance"]) if len(coefficients) else None,
+        calibration=calibration,
     )
 
 

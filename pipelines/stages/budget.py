@@ -16,7 +16,7 @@ from pipelines.stages.budget_rows import covariance_rows, empty, rows_of_quantit
 from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.contributions import DwellConditions, influences, sources
 from pipelines.stages.quantities import VarianceParts, quantities_of
-from pipelines.tables.calibration import Calibration, read_calibration
+from pipelines.tables.calibration import Calibration
 from schemas.units import MICRO
 from schemas.validity import Stability
 
@@ -28,11 +28,15 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
+def budget(tables: BudgetTables, terms: BudgetTerms, *, contributions: bool = True) -> dict[str, pd.DataFrame]:
     """Tables ``budget``, ``uncertainties`` and ``budget_covariance``; without rows where no uncertainty is stated.
 
     ``budget`` has one row per unit, quantity and contribution, ``uncertainties`` one per unit and quantity: value, u of type A
     and B, effective degrees of freedom, k and U, and for verification the part that the station's own verification shows.
+
+    Parameters
+    ----------
+    contributions : whether the table ``budget`` is made, which no decision is based on
     """
     if terms.stated is None or tables.coefficients.empty:
         return empty()
@@ -40,12 +44,13 @@ def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     if lot.state.outer is None:  # faces or forces that are known otherwise: as a table would have turned to them
         outer, inner = angles_from_force(lot.state.force)
         lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
-    calibration = read_calibration(tables.coefficients, tables.covariance)
+    calibration = tables.calibrated()
     at = conditions(lot, tables.dwells, calibration.response, terms)
     variances = propagate(lot, calibration, tables.wander, terms, at)
     quantities = list(quantities_of(lot, calibration, tables, terms, variances))
+    known = sources(terms.stated)
     return {
-        **rows_of_quantities(calibration.units, quantities, variances, terms, sources(terms.stated)),
+        **rows_of_quantities(calibration.units, quantities, variances, terms, known, contributions=contributions),
         "budget_covariance": covariance_rows(calibration.units, variances.fit.covariance()),
     }
 

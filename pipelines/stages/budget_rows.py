@@ -93,16 +93,16 @@ def rows_of_quantities(
     variances: VarianceParts,
     terms: BudgetTerms,
     known: Mapping[str, UncertaintySource],
+    *,
+    contributions: bool = True,
 ) -> dict[str, pd.DataFrame]:
-    """Tables ``budget`` and ``uncertainties``, unit by unit; every quantity is computed for all units at once."""
+    """Tables ``budget`` (if its ``contributions`` are asked for) and ``uncertainties``; every quantity for all units at once."""
     names = np.array(variances.fit.source.contributions, dtype=object)
     groups = list(dict.fromkeys(names.tolist()))
     places = {group: np.flatnonzero(names == group) for group in groups}
     parts = [_contributions(one, groups, places, variances, known, terms) for one in quantities]
-    return {
-        "budget": _budget_rows(units, quantities, parts),
-        "uncertainties": _sum_rows(units, quantities, parts, terms),
-    }
+    single = {"budget": _budget_rows(units, quantities, parts)} if contributions else {}
+    return {**single, "uncertainties": _sum_rows(units, quantities, parts, terms)}
 
 
 def _contributions(

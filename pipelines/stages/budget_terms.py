@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipelines.stages.contributions import merged
+from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotTables
 from schemas.validity import CertificateTerms, Stability
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 class BudgetTables:
     """The tables that a budget is computed from.
 
-    lot : the dwells with their history, where other stages have converted them already
+    lot, calibration : dwells with their history, and coefficients, where other stages have converted them already
     """
 
     dwells: pd.DataFrame
@@ -36,10 +37,15 @@ class BudgetTables:
     verification_poses: pd.DataFrame
     noise: pd.DataFrame
     lot: LotTables | None = None
+    calibration: Calibration | None = None
 
     def arrays(self) -> LotArrays:
         """The dwells of fit and verification."""
         return (self.lot or LotTables(self.dwells, self.history)).fitted_kinds
+
+    def calibrated(self) -> Calibration:
+        """The coefficients with their covariance."""
+        return self.calibration or read_calibration(self.coefficients, self.covariance)
 
 
 @dataclass(frozen=True)

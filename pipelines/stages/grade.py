@@ -12,7 +12,7 @@ from pipelines.procedures import PROCEDURES, figures_of_recipe
 from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.lot_risks import lot_risks
-from pipelines.tables.calibration import read_calibration
+from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import ByUnit, empty_table
 from schemas.decisions import GRADE_FIGURE, GRADES, PERIOD_FIGURE, Decision, decide, describe_rule, grade_with
 from schemas.errors import RecipeInvalid
@@ -40,6 +40,7 @@ class GradeEvidence:
 
     uncertainties, budget_covariance : of the uncertainty budget; None, or without rows, where nothing is stated
     full_scale : largest excursion of the output from 0 g by unit, output unit
+    calibration : coefficients with their covariance, where other stages have read them already
     """
 
     verdicts: pd.DataFrame
@@ -53,6 +54,7 @@ class GradeEvidence:
     budget_covariance: pd.DataFrame | None = None
     procedure_figures: pd.DataFrame | None = None
     full_scale: Mapping[str, float] = field(default_factory=dict[str, float])
+    calibration: Calibration | None = None
 
     @property
     def basis(self) -> str:
@@ -187,7 +189,7 @@ def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficien
     """The coefficients of the lot and the place of each unit in them; None where no unit was calibrated."""
     if evidence.coefficients.empty:
         return None, {}
-    calibration = read_calibration(evidence.coefficients, evidence.covariance)
+    calibration = evidence.calibration or read_calibration(evidence.coefficients, evidence.covariance)
     stated = _stated(evidence.budget_covariance, len(calibration.units))
     return LotCoefficients(calibration, zero_g, stated), {unit: place for place, unit in enumerate(calibration.units)}
 

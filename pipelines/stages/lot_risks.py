@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from schemas.limits import Limits
 
 TEXTS, NUMBERS = "figure unit_text", "mean process u limit accept pfa pfr accepted largest_pfa"
+QUANTITIES = {"bias_error_ug": "bias_error", "verification_norm_ug": "verification_norm"}
+"""Figures with a quantity of the budget."""
 FEWEST = 3
 """Units from which the scatter of a production is estimated."""
 
@@ -29,13 +31,14 @@ def lot_risks(figures: pd.DataFrame, limits: Limits, uncertainties: pd.DataFrame
     numbers = {name: figures[name].to_numpy(dtype=float) for name in ("value", "uncertainty", "limit", "accept", "pfa")}
     names, texts = (figures[name].to_numpy(dtype=object) for name in ("figure", "unit_text"))
     limited = np.flatnonzero(np.isfinite(numbers["limit"]))
+    of_noise = _of_noise(uncertainties)
     for name in dict.fromkeys(names[limited].tolist()):
         places = limited[names[limited] == name]
         own = {column: values[places] for column, values in numbers.items()}
         values = own["value"]
         u = float(np.sqrt(np.mean((own["uncertainty"] / limits.coverage_factor) ** 2)))
         limit, accept = float(own["limit"][0]), float(np.nanmean(own["accept"]))
-        process = process_deviation(values.tolist(), _independent(str(name), u, uncertainties))
+        process = process_deviation(values.tolist(), of_noise.get(QUANTITIES.get(str(name), ""), u))
         rows.append(
             {
                 "figure": name,
@@ -53,13 +56,13 @@ def lot_risks(figures: pd.DataFrame, limits: Limits, uncertainties: pd.DataFrame
     return pd.DataFrame(rows) if rows else empty_table(texts=TEXTS, whole="units", numbers=NUMBERS)
 
 
-def _independent(figure: str, u: float, uncertainties: pd.DataFrame | None) -> float:
-    """The part of u that differs between units: that of noise, if the budget separates the two."""
-    quantity = {"bias_error_ug": "bias_error", "verification_norm_ug": "verification_norm"}.get(figure)
-    if uncertainties is None or quantity is None:
-        return u
-    own = uncertainties[uncertainties["quantity"] == quantity]
-    return float(np.sqrt(np.mean(own["u_a"].to_numpy(dtype=float) ** 2))) if len(own) else u
+def _of_noise(uncertainties: pd.DataFrame | None) -> dict[str, float]:
+    """The part of u that differs between units, that of noise, by quantity; only of those that the budget separates."""
+    if uncertainties is None:
+        return {}
+    quantity, u = uncertainties["quantity"].to_numpy(dtype=object), uncertainties["u_a"].to_numpy(dtype=float)
+    parts = {name: u[quantity == name] for name in QUANTITIES.values()}
+    return {name: float(np.sqrt(np.mean(own**2))) for name, own in parts.items() if own.size}
 
 
 def _risks(mean: float, process: float, u: float, limit: float, accept: float, units: int) -> dict[str, float]:

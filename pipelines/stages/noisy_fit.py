@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from inertial import design
-from inertial.fits.linear import LotFit, felt_force, fit_lot
+from inertial.fits.linear import LotFit, felt_force, fit_lot, pseudo_inverses
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
 from pipelines.stages.nonlinear import profiled
 from pipelines.tables.dwells import LotArrays
@@ -67,14 +67,16 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
     spare = int(plain.dof.sum()) - plain.shared.size
     if spare < FEWEST_TO_SPARE or np.any(plain.dof < 1) or not np.all(np.isfinite(known) & (known > 0.0)):
         return _by_birge(lot, plain, used)
-    fitted = fit_lot_with_wander(effects, lot.state, lot.output, lot.standard_error, nonlinear=values, used=used)
+    fitted = fit_lot_with_wander(
+        effects, lot.state, lot.output, lot.standard_error, nonlinear=values, used=used, plain=plain
+    )
     return _by_wander(lot, fitted, used)
 
 
 def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
     """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
     force, own = lot.state.force, lot.state.force[:, used]
-    turn = np.linalg.pinv(own, rcond=1e-9) @ felt_force(own, lot.output[:, used])
+    turn = pseudo_inverses(own) @ felt_force(own, lot.output[:, used])
     return force @ turn
 
 

@@ -134,30 +134,30 @@ def _outputs(
     """Corrected output, worst force and temperature of the certified range."""
     state = certified_range(lot, terms)
     columns = design.local_columns(design.split(calibration.effects)[0], state, calibration.nonlinear)
-    errors = MICRO * variances.fit.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    errors = variances.fit.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
     noise = output_noise(calibration, columns)
     zero = np.zeros(len(lot.units))
     for axis, letter in enumerate(AXES):
         yield _worst("output", letter, errors[..., axis, :], noise[..., axis, axis], zero, dof)
     along = state.force / np.linalg.norm(state.force, axis=-1, keepdims=True)
     of_norm = np.einsum("mi,umij,mj->um", along, noise, along)
-    yield _worst("output", "norm", MICRO * norm_errors(errors / MICRO, state.force), of_norm, zero, dof)
+    yield _worst("output", "norm", norm_errors(errors, state.force), of_norm, zero, dof)
 
 
 def output_noise(calibration: Calibration, columns: Array) -> Array:
     """Covariance of the corrected output by the noise of the fit, (units, m, 3, 3), µg²."""
     inverse = np.linalg.inv(calibration.response)
-    own = np.einsum("...amp,...apq,...amq->...ma", columns, calibration.covariance, columns)
+    own = np.swapaxes(np.sum(np.matmul(columns, calibration.covariance) * columns, axis=-1), -1, -2)
     return MICRO**2 * np.einsum("uij,umj,ukj->umik", inverse, own, inverse)
 
 
 def _worst(name: str, axis: str, errors: Array, variance: Array, value: Array, dof: Array) -> BudgetQuantity:
-    """The quantity at the condition where its variance is largest, by unit; errors (units, m, q), variance (units, m)."""
+    """The quantity at the condition where its variance is largest, by unit; errors (units, m, q), g, variance (units, m), µg²."""
     errors = np.broadcast_to(errors, (value.size, *errors.shape[-2:]))
-    whole = np.sum(errors**2, axis=-1) + variance
+    whole = MICRO**2 * np.einsum("umq,umq->um", errors, errors) + variance
     where = np.argmax(whole, axis=-1)
     rows = np.arange(value.size)
-    return BudgetQuantity(name, axis, "µg", value, np.sqrt(variance[rows, where]), errors[rows, where], dof)
+    return BudgetQuantity(name, axis, "µg", value, np.sqrt(variance[rows, where]), MICRO * errors[rows, where], dof)
 
 
 def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
@@ -225,14 +225,14 @@ def _verification(
             shown=_all(rms_over(shown[..., axis, :]), lot),
             unseen=_all(rms_over(true[..., axis, :][..., hidden]), lot),
         )
-    along = norm_errors(true / MICRO, force) * MICRO
+    along = norm_errors(true / MICRO, force)
     value, noise = _worst_pose(lot, tables)
     worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
     seen = norm_errors(shown / MICRO, force) * MICRO
     yield replace(
         worst,
         shown=_all(np.sqrt(np.max(np.sum(seen**2, axis=-1), axis=-1)), lot),
-        unseen=_all(np.sqrt(np.max(np.sum(along[..., hidden] ** 2, axis=-1), axis=-1)), lot),
+        unseen=_all(MICRO * np.sqrt(np.max(np.sum(along[..., hidden] ** 2, axis=-1), axis=-1)), lot),
     )
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from inertial.correction import correct, station_change
 from pipelines.stages.rms_error import rms_uncertainty
-from pipelines.tables.calibration import read_calibration
+from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.units import AXES, MICRO
@@ -42,12 +42,21 @@ def verify(
 
 
 def verify_tables(
-    tables: LotTables, coefficients: pd.DataFrame, covariance: pd.DataFrame, predictions: pd.DataFrame
+    tables: LotTables,
+    coefficients: pd.DataFrame,
+    covariance: pd.DataFrame,
+    predictions: pd.DataFrame,
+    calibration: Calibration | None = None,
 ) -> dict[str, pd.DataFrame]:
-    """:func:`verify` of tables that other stages read as well."""
+    """:func:`verify` of tables that other stages read as well.
+
+    Parameters
+    ----------
+    calibration : that of the tables, where other stages have read it already
+    """
     if not np.any(tables.dwells["kind"] == "verification") or coefficients.empty:
         return nothing_verified()
-    lot, calibration = tables.all_kinds, read_calibration(coefficients, covariance)
+    lot, calibration = tables.all_kinds, calibration or read_calibration(coefficients, covariance)
     model, unseen = calibration.effects, lot.of_kind("verification")
     corrected = correct(model, lot.state, lot.output, calibration.coefficients, calibration.nonlinear)
     truth = lot.state.force + station_change(model, lot.state, calibration.shared, calibration.nonlinear)

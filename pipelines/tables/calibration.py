@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -71,7 +71,15 @@ class Calibration:
 def column_names(model: Sequence[str], values: Values | None = None) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Per axis, (effect id, coefficient) of a model's columns; all possible columns without values."""
     sensor, _ = design.split(model)
-    return tuple(design.local_names(sensor, axis, values) for axis in range(3))
+    if values:
+        return tuple(design.local_names(sensor, axis, values) for axis in range(3))
+    return _all_names(tuple(sensor))
+
+
+@lru_cache(maxsize=64)
+def _all_names(sensor: tuple[SensorEffect, ...]) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """Per axis, all columns that effects may have; the model of many lots is the same."""
+    return tuple(design.local_names(sensor, axis) for axis in range(3))
 
 
 def coefficient_rows(
@@ -196,7 +204,8 @@ def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np
     return np.array(shared), {name: values for name, values in nonlinear.items() if values}
 
 
-def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:
+@lru_cache(maxsize=256)
+def unit_texts(effect: SensorEffect, out_unit: str) -> tuple[str, ...]:
     """Units of an effect's coefficients, derived from the scaling of its columns with force and temperature.
 
     A column that doubles with the force is per g, one that doubles with θ is per K, and so on; a column that scales
@@ -215,13 +224,13 @@ def unit_texts(effect: SensorEffect, out_unit: str) -> list[str]:
         return effect.columns(state, 0, **values.get(effect.id, {}))
 
     if effect.per:
-        return [_per(out_unit, below) for below in effect.per]
+        return tuple(_per(out_unit, below) for below in effect.per)
     if effect.nonlinear or effect.id.startswith("covariate:"):
-        return [out_unit] * len(effect.names(0))
+        return (out_unit,) * len(effect.names(0))
     base, by_force, by_theta = columns(1.0, 1.0)[0], columns(2.0, 1.0)[0], columns(1.0, 2.0)[0]
-    return [
+    return tuple(
         _unit_text(out_unit, _degree(base[c], by_force[c]), _degree(base[c], by_theta[c])) for c in range(base.size)
-    ]
+    )
 
 
 def _degree(base: float, doubled: float) -> int:

@@ -1,6 +1,10 @@
 """The policies of deployments on a real server: missed, skipped and continued runs, at times that the test chooses."""
 
-from collections.abc import Iterator
+import os
+import subprocess
+import sys
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -9,6 +13,7 @@ import yaml
 from orchestrator import Orchestrator, served
 from root_process import ROOT
 
+from pipelines.flows.dead_runs import LOST_S, WORKER, LostRuns
 from pipelines.flows.deploy import register
 from pipelines.flows.heartbeat import have_automation
 from pipelines.flows.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules, newer_run
@@ -17,6 +22,7 @@ from pipelines.monitoring.queue_numbers import read_queues
 QUEUE, DAILY_QUEUE = "line-7", "line-8"
 MOST_SCHEDULED = 40
 """Runs of a deployment that the server schedules ahead: a minute apart, twice as far as the tests look."""
+OWN, OTHER = "line-8 on host-a", "line-8 on host-b"
 
 
 def deployments(folder: Path) -> str:
@@ -162,6 +168,53 @@ def crashed_runs_continue_or_are_closed(line: Orchestrator) -> None:
     assert (states[unstarted["id"]]["state_type"], states[unstarted["id"]]["run_count"]) == ("SCHEDULED", 0)
     assert states[closed["id"]]["state_type"] == "CRASHED"
     assert states[often["id"]]["state_type"] == "CRASHED"
+
+
+def test_a_run_whose_process_ended_while_the_server_was_away_gives_its_place_back(line: Orchestrator) -> None:
+    from prefect.client.orchestration import get_client
+
+    lost, known, unknown, elsewhere = runs = [taken_run(line) for _ in range(4)]
+    ended = ended_process()
+    with process_of(known) as number, process_of(unknown), get_client(sync_client=True) as client:
+        for run, pid, name in ((lost, ended, OWN), (known, number, OWN), (unknown, "", OWN), (elsewhere, ended, OTHER)):
+            line.ask(f"/api/flow_runs/{run['id']}", {"infrastructure_pid": pid} if pid else {}, method="PATCH")
+            line.ask(f"/api/flow_runs/{run['id']}/labels", {WORKER: name}, method="PATCH")
+        queue = LostRuns("line", DAILY_QUEUE, OWN)
+        assert queue.close(client, 1000.0) == []
+        assert queue.close(client, 1000.0 + LOST_S - 1.0) == [], "its worker may just be starting a process"
+        force(line, lost, "PENDING")
+        assert queue.close(client, 1000.0 + LOST_S) == [], "it was taken again"
+        assert queue.close(client, 1000.0 + 2.0 * LOST_S) == [lost["name"]]
+        assert queue.close(client, 1000.0 + 9.0 * LOST_S) == []
+    states = [line.ask(f"/api/flow_runs/{run['id']}")[1]["state_type"] for run in runs]
+    assert states == ["CRASHED", "PENDING", "PENDING", "PENDING"]
+    for run in runs:  # the other tests count the runs of the line
+        line.ask(f"/api/flow_runs/{run['id']}", method="DELETE")
+
+
+def taken_run(line: Orchestrator) -> dict:
+    """A run that a worker took and that has not begun."""
+    _, deployment = line.ask("/api/deployments/name/calibrate_lot/daily")
+    _, run = line.ask(f"/api/deployments/{deployment['id']}/create_flow_run", {})
+    force(line, run, "PENDING")
+    return run
+
+
+def ended_process() -> str:
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait(60)
+    return str(process.pid)
+
+
+@contextmanager
+def process_of(run: dict) -> Generator[str]:
+    """A process with the environment that Prefect gives to that of a run; its number."""
+    environment = {**os.environ, "PREFECT__FLOW_RUN_ID": run["id"]}
+    with subprocess.Popen([sys.executable, "-c", "input()"], env=environment, stdin=subprocess.PIPE) as process:
+        try:
+            yield str(process.pid)
+        finally:
+            process.kill()
 
 
 def start(run: dict) -> datetime:

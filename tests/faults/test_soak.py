@@ -1,8 +1,8 @@
-"""Shifts of orders at three stations with random faults (worker, server, disk, clock): nothing is lost, twice or unsafe.
+"""Shifts of orders at three stations with random faults of worker, server, database, disk, clock: nothing lost, twice, unsafe.
 
-The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (4): some ten minutes on two free cores; 90 is a month of one shift a day.
-Clocks are those of the workers' processes, by libfaketime where it is installed and lets a process sleep (0.9.10 does not with
-the clock of Python's sleep left as it is); the clock of this computer is left alone.
+The number of shifts is that of TUMBLELINE_SOAK_SHIFTS (5): some ten minutes on two free cores; 90 is a month of one shift a day.
+The orchestrator's database is PostgreSQL, as several stations need it, and SQLite only where PostgreSQL is not installed.
+Clocks are those of the workers' processes, their flows and watchdogs (wrong_clock.py); the clock of this computer is left alone.
 """
 
 import os
@@ -24,10 +24,12 @@ import pytest
 from capture_double import recipe_file
 from lines import deployments, kill_all, order, worker
 from orchestrator import Orchestrator
+from postgres_server import Postgres, installed, postgres
 from root_process import ROOT, python
 from served_station import modbus_station, station_file
 from served_station import served as station_served
 from small_station import lot_of
+from wrong_clock import WrongClocks
 
 from pipelines.archive import Archive
 from pipelines.flows.queue_rules import ATTEMPTS
@@ -36,7 +38,7 @@ from pipelines.integrity.archive import verify
 from stations.opening import open_devices
 from stations.safety.folder import read_log
 
-SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "4"))
+SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "5"))
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200 + 600 * SHIFTS)]
 
 STATIONS = ("line-1", "line-2", "line-3")
@@ -53,11 +55,10 @@ QUICK = (
 SAFE_S = 90.0
 SHIFT_S = 900.0
 FULL_S = 5.0
+DATABASE_OFF_S = 15.0
 OUTAGE_S = 75.0  # longer than Prefect's worker tolerates: it ends, or hangs and is ended
-OFF_S = 3600.0  # by how much a clock is wrong
+OFF_S = 3600  # by how much a clock is wrong
 WRONG_S = 25.0
-FAKETIME = Path("/usr/lib/x86_64-linux-gnu/faketime/libfaketimeMT.so.1")
-WITH_CLOCK = {"LD_PRELOAD": str(FAKETIME), "FAKETIME_NO_CACHE": "1", "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
 GROWTH_MB = 150.0
 GROWTH_FILES = 30
 
@@ -68,6 +69,7 @@ class Server:
 
     home: Path
     port: int
+    database: Postgres | None = None
     key: str = field(default_factory=new_key)
     process: subprocess.Popen[bytes] | None = None
 
@@ -77,9 +79,17 @@ class Server:
             **os.environ, "PREFECT_HOME": str(self.home), "PYTHONPATH": str(ROOT), CLIENT_KEY: self.key,
             "PREFECT_API_URL": f"http://127.0.0.1:{self.port}/api", "PREFECT_SERVER_ALLOW_EPHEMERAL_MODE": "false",
             "TUMBLELINE_ARCHIVE": str(self.home.parent / "disk" / "archive"),
-            "TUMBLELINE_STATE": str(self.home.parent / "state"),
+            "TUMBLELINE_STATE": str(self.home.parent / "state"), **self._database(),
         }  # fmt: skip
         return Orchestrator(self.home, self.port, self.key, environment)
+
+    def _database(self) -> dict[str, str]:
+        if self.database is None:
+            return {}
+        address = self.home / "database"
+        address.touch(0o600)
+        address.write_text(self.database.address)
+        return {"TUMBLELINE_ORCHESTRATOR_DATABASE": str(address)}
 
     def start(self) -> None:
         command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(self.port)]
@@ -129,11 +139,15 @@ class Soak:
             "worker": self.worker_dies,
             "server": self.server_dies,
         }
-        self.clocks = self.clocks_can_be_wrong()
-        if self.clocks:
+        self.clocks = WrongClocks(folder / "clocks") if WrongClocks.available() else None
+        if self.clocks is not None:
             self.faults["clock"] = self.clock_jumps
         else:
-            print("without wrong clocks: no libfaketime in which a process can sleep")  # noqa: T201 - part of the figures
+            print("without wrong clocks: no C compiler, or no GNU C library")  # noqa: T201 - part of the figures
+        if server.database is not None:
+            self.faults["database"] = self.database_dies
+        else:
+            print("without a killed database: PostgreSQL is not installed")  # noqa: T201 - part of the figures
         if disk:
             self.faults["disk"] = self.disk_fills
         self.happened: Counter[str] = Counter()
@@ -160,37 +174,20 @@ class Soak:
 
     def start_worker(self, name: str) -> None:
         own = ExitStack()
-        line = replace(self.line, environment={**self.line.environment, **self.clock(name)})
+        clock = {} if self.clocks is None else self.clocks.environment(name)
+        line = replace(self.line, environment={**self.line.environment, **clock})
         process = own.enter_context(worker(line, self.folder / name, name, f"host-of-{name}"))
         self.workers[name] = (own, process)
 
-    def clock(self, name: str, wrong_s: float = 0.0) -> dict[str, str]:
-        """Set the clock of a worker's processes; their environment."""
-        if not self.clocks:
-            return {}
-        place = self.folder / f"{name}.clock"
-        place.write_text(f"{wrong_s:+.0f}", encoding="ascii")
-        return {**WITH_CLOCK, "FAKETIME_TIMESTAMP_FILE": str(place)}
-
-    def clocks_can_be_wrong(self) -> bool:
-        """Whether a process with a wrong clock runs here: its sleep must end."""
-        if not FAKETIME.is_file():
-            return False
-        place = self.folder / "probe.clock"
-        place.write_text("-3600", encoding="ascii")
-        environment = {**os.environ, **WITH_CLOCK, "FAKETIME_TIMESTAMP_FILE": str(place)}
-        code = "import time; time.sleep(0.01)"
-        return not subprocess.run(
-            [sys.executable, "-c", code], env=environment, capture_output=True, check=False
-        ).returncode
-
     def clock_jumps(self, chance: random.Random) -> None:
         """The clock of a station is an hour wrong while it measures, then right again."""
+        assert self.clocks is not None
         name = chance.choice(STATIONS)
         self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
-        self.clock(name, chance.choice((-OFF_S, OFF_S)))
+        self.clocks.set(name, chance.choice((-OFF_S, OFF_S)))
+        assert self.clocks.holds(self.workers[name][1].pid, name) > 1, "the worker and its flow have this clock"
         time.sleep(WRONG_S)
-        self.clock(name)
+        self.clocks.set(name, 0)
 
     def worker_dies(self, chance: random.Random) -> None:
         """The service of a worker is killed, with its flow; its station is safe before the service comes back."""
@@ -208,6 +205,15 @@ class Soak:
         self.server.kill()
         time.sleep(OUTAGE_S if not self.happened["server"] else chance.uniform(0.0, OUTAGE_S))
         self.server.start()
+
+    def database_dies(self, chance: random.Random) -> None:
+        """The database is killed while stations measure, and comes back after some seconds."""
+        database, name = self.server.database, chance.choice(STATIONS)
+        assert database is not None
+        self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
+        database.kill()
+        time.sleep(chance.uniform(1.0, DATABASE_OFF_S))
+        database.start()
 
     def disk_fills(self, chance: random.Random) -> None:
         """The disk of the archive is full for some seconds."""
@@ -249,7 +255,7 @@ class Soak:
                     own.close()
                     self.start_worker(name)
                     self.again += 1
-                if not self.under_way(name, number):
+                if not (self.under_way(name, number) or self.complete(name, number)):
                     self.order(name, number)  # it failed (a full disk): a person orders the same again
             time.sleep(2.0)
         for name in STATIONS:
@@ -284,7 +290,7 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
         disk = stack.enter_context(small_disk(tmp_path / "disk"))
         home = tmp_path / "orchestrator"
         home.mkdir(mode=0o700)
-        server = Server(home, free_port())
+        server = Server(home, free_port(), stack.enter_context(postgres()) if installed() else None)
         server.start()
         stack.callback(server.kill)
         soak = Soak(tmp_path, server, stack, disk=disk)

@@ -13,7 +13,7 @@ from independent_budget import PRODUCTION, columns, draws, fitted, nominal_force
 from inertial import design, poses
 from inertial.frames import force_from_angles
 from inertial.state import State
-from inertial.uncertainty.degrees import coverage_factor, from_reliability, rounded, welch_satterthwaite
+from inertial.uncertainty.degrees import coverage_factor, from_reliability, welch_satterthwaite
 from inertial.uncertainty.influences import (
     Errors,
     InputQuantity,
@@ -43,6 +43,7 @@ from inertial.uncertainty.risk import (
     posterior,
     process_for,
 )
+from inertial.uncertainty.rounding import rounded
 from schemas.gravity import formula_gravity
 
 BASE = ("bias", "scale", "misalignment")

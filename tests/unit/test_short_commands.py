@@ -32,10 +32,11 @@ def certified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return root, run.about["lot"]["units"][0]["serial"]
 
 
-def test_validity_of_a_serial_is_answered_without_numpy(certified: tuple[Path, str]) -> None:
+@pytest.mark.parametrize("form", [["--json"], []], ids=["json", "text"])
+def test_validity_of_a_serial_is_answered_without_numpy(certified: tuple[Path, str], form: list[str]) -> None:
     root, serial = certified
     day = json.loads(command(["show", serial, "--archive", str(root), "--json"]).stdout)["history"][0]["from"]
-    words = ["show", serial, "--at", day, "--archive", str(root), "--json"]
+    words = ["show", serial, "--at", day, "--archive", str(root), *form]
     alone = subprocess.run([sys.executable, "-c", SHOWN, *words], capture_output=True, text=True, check=True)
     loaded = set(json.loads(alone.stderr.splitlines()[-1]))
     assert "pyarrow.parquet" in loaded
@@ -43,6 +44,9 @@ def test_validity_of_a_serial_is_answered_without_numpy(certified: tuple[Path, s
     here = command(words)  # numpy is loaded here
     assert "numpy" in sys.modules
     assert alone.stdout == here.stdout
+    if not form:
+        assert "standard error" in alone.stdout
+        return
     rows = json.loads(alone.stdout)["calibration"]["coefficients"]
     assert rows
     assert {row["unit"] for row in rows} == {serial}

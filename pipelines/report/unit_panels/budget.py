@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.uncertainty.degrees import rounded
+from inertial.uncertainty.rounding import rounded
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.budget_rows import LABELS

@@ -13,17 +13,18 @@ POINTS = 2001
 def _value(tables: UnitTables) -> Value | None:
     """From the nonlinear coefficients of the model; tumbling covers ±1 g only, and only this part of the range is judged."""
     own, lot = tables.coefficients, tables.coefficients.lot
+    if not any(lot.effect(effect, own.unit)[0].shape[-1] for effect in ORDERS):
+        return None
     force = np.linspace(-1.0, 1.0, POINTS)
-    curve, variance, found = np.zeros((3, POINTS)), np.zeros(3), False
+    curve, variance = np.zeros((3, POINTS)), np.zeros(3)
     scale = np.ones((3, 1))
     for effect, order in ORDERS.items():
         values, errors, scale = lot.effect(effect, own.unit)
         if values.shape[-1]:
-            found = True
             curve += (values / scale)[:, :1] * force**order
             variance += ((errors / scale)[:, 0] * _deviation(force**order)) ** 2
     full_scale = tables.full_scale / scale[:, 0]
-    if not found or not np.all(np.isfinite(full_scale)):
+    if not np.all(np.isfinite(full_scale)):
         return None
     deviations = 100.0 * np.array([_deviation(line) for line in curve]) / full_scale
     spread = 100.0 * np.sqrt(variance) / full_scale

@@ -1,0 +1,39 @@
+"""Rounding of a value and its uncertainty for print (JCGM 100:2008, 7.2.6).
+
+Commands that only print are to start quickly: this module imports no library of arrays.
+"""
+
+import math
+from decimal import ROUND_CEILING, ROUND_HALF_UP, Decimal
+
+
+def rounded(value: float, expanded: float) -> tuple[str, str]:
+    """Value and expanded uncertainty as they are printed: U with two significant digits, the value to U's last digit.
+
+    Half is rounded away from zero; a U that would lose more than 5 % is rounded up (JCGM 100, 7.2.6; ILAC-P14:09/2020).
+    """
+    if not (math.isfinite(value) and math.isfinite(expanded)):
+        return f"{value:g}", f"{expanded:g}"
+    if not expanded > 0.0:
+        return f"{value:.4g}", "0"
+    u = Decimal(repr(float(expanded)))
+    place = u.adjusted() - 1
+    shown = _to(u, place)
+    if shown < u * Decimal("0.95"):
+        shown = u.quantize(Decimal(1).scaleb(place), rounding=ROUND_CEILING)
+    if shown.adjusted() - 1 > place:
+        place = shown.adjusted() - 1
+        shown = _to(shown, place)
+    number = _to(Decimal(repr(float(value))), place)
+    if number == 0:
+        number = abs(number)
+    return _text(number, place), _text(shown, place)
+
+
+def _to(number: Decimal, place: int) -> Decimal:
+    step = Decimal(1).scaleb(place)
+    return (number / step).quantize(Decimal(1), rounding=ROUND_HALF_UP) * step
+
+
+def _text(number: Decimal, place: int) -> str:
+    return f"{number:.{max(-place, 0)}f}"
