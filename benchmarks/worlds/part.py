@@ -29,7 +29,7 @@ MOVE = 20.0
 class Blind:
     """A run with a blind spot.
 
-    directions : "faces", "edges" (18), "corners" (26) or "spiral"; in one order or shuffled in every turn
+    directions : "faces", "edges" (18), "corners" (26) or "spiral"; shuffled in every turn unless ``one_order``
     effect, size : what is hidden, in RMS that the model leaves of it over the noise of a dwell
     """
 
@@ -41,6 +41,7 @@ class Blind:
     soak_s: float = 2400.0
     units: int = 8
     noise: Noise = field(default_factory=lambda: Noise(white=25.0, flicker=5.0))
+    one_order: bool = False
 
 
 THREE, UP, AROUND = (-10.0, 60.0, 25.0), (0.0, 20.0, 40.0, 60.0), (25.0, 60.0, -10.0, 20.0)
@@ -70,6 +71,11 @@ SCENES: dict[str, Blind] = {
     "hysteresis, 7 soaks": Blind("thermal_hysteresis", 2.0, "faces", 1, (25.0, 60.0, 40.0, 10.0, -10.0, 10.0, 30.0)),
     "level on faces": Blind("level_error", 3.0, "faces", 6),
     "misalignment over T": Blind("misalignment_temperature", 1.5, "faces", 1, THREE),
+    "creep on faces": Blind("creep_after_move", 2.0, "faces", 6, one_order=True),
+    "creep on faces, shuffled": Blind("creep_after_move", 2.0, "faces", 6),
+    "creep on 18": Blind("creep_after_move", 2.0, "edges", 3, one_order=True),
+    "hysteresis, soaks up": Blind("thermal_hysteresis", 2.0, "faces", 2, UP),
+    "warm-up, soaks up": Blind("warm_up", 2.0, "faces", 2, UP),
 }
 """Sizes and plans at which a diagnosis has more than one name for what is hidden."""
 
@@ -184,9 +190,10 @@ def _tick(now: float, air: float, body: float, target: float, fine_air: list[flo
 def _plan(blind: Blind, rng: np.random.Generator) -> list[Step]:
     directions = _directions(blind.directions)
     steps: list[Step] = []
+    always = rng.permutation(len(directions)) if blind.one_order else None
     for soak in blind.soaks:
         for _ in range(blind.turns):
-            for place in rng.permutation(len(directions)):
+            for place in rng.permutation(len(directions)) if always is None else always:
                 outer, inner = directions[place]
                 steps.append(Step(outer, inner, soak, soak_s=blind.soak_s, jitter=float(rng.uniform(0.7, 1.3))))
     return steps
@@ -228,6 +235,29 @@ def _remaining(scene: Scene, shape: Floats, *, thermal: bool) -> float:
         x = np.stack(columns, axis=1)
         total += float(np.sum((own - x @ np.linalg.lstsq(x, own, rcond=None)[0]) ** 2))
     return max(float(np.sqrt(total / shape.size)), 1e-12)
+
+
+def first_looks(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
+    """What the first diagnosis of a scene says, beside the truth; nothing is measured on."""
+    from pipelines.diagnosis.diagnose import diagnose
+
+    _, name, seed = task
+    blind, begin = SCENES[name], time.process_time()
+    document = diagnose(*Continued(blind, seed).tables())
+    groups = [set(g["effects"]) for g in document["classes"]]
+    held = [g for g in groups if blind.effect in g]
+    return name, {
+        "seed": seed,
+        "seconds": time.process_time() - begin,
+        "named": [g["effects"] for g in document["classes"]],
+        "held": bool(held),
+        "alone": any(len(g) == 1 for g in held),
+        "beside": [sorted(g) for g in groups if blind.effect not in g],
+        "unexplained": (document["unexplained"] or {}).get("driver"),
+        "unseen": blind.effect in document["unseen"],
+        "adequate": document["adequate"],
+        "blocked": [b["fault"] for b in document["blocked_by"]],
+    }
 
 
 def followed(task: tuple[str, int]) -> tuple[str, dict[str, Any]]:

@@ -7,8 +7,7 @@ from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model, Term
-from inertial.criticism.refinement import refine
-from inertial.criticism.search import judge, ranked, scanned, size_of
+from inertial.criticism.search import judge, judge_refined, ranked, scanned, size_of
 
 __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 
@@ -66,7 +65,7 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR
     near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]
     near = [t for t in near if term.effect.id not in t.effect.after]
-    judged = [judge(field, rest, refine(rest, t, model.noise)) for t in near]
+    judged = [judge_refined(field, rest, t, model.noise) for t in near]
     judged = ranked([judge(field, rest, term), *judged])
     best = judged[0]
     members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + CLASS_WIDTH)
