@@ -2,8 +2,8 @@
 
 Prints for every world how many runs were called inadequate, named physics, and told the fault that was made, each with its 95 %
 Clopper-Pearson interval. `--seeds development` are for setting constants, `judging` (the default) only for measuring.
-`scenes` are plans with a blind spot; `part` goes on measuring there as a diagnosis proposes, and prints what was parted. `--write FOLDER WORLD SEED` writes the tables of one
-run in the exchange format.
+`scenes` are plans with a blind spot; `part` goes on measuring there as a diagnosis proposes, and prints what was parted.
+`--write FOLDER WORLD SEED` writes the tables of one run in the exchange format.
 """
 
 from __future__ import annotations
@@ -112,7 +112,10 @@ def looped(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
     for kind, effects in (("wrong", WRONG), ("right", RIGHT)):
         for effect in effects:
             made = empty if kind == "wrong" else make(replace(LOOP[name], hidden=((effect, 2.0),)), seed)
-            for where, again in (("fresh", (made.fresh, made.fresh_history)), ("left out", (None, None))):
+            ways = {"fresh": (made.fresh, made.fresh_history), "left out": (None, None)}
+            if LOOP[name].fresh_noise is not None:
+                del ways["left out"]
+            for where, again in ways.items():
                 confirmed[f"{kind} {where}"].append((effect, _confirmed(made, effect, again)))
     return name, dict(confirmed)
 
@@ -246,7 +249,10 @@ def _scene_line(name: str, rows: list[dict[str, Any]]) -> str:
     n = len(rows)
     told = Counter("+".join("|".join(e) for e in r["named"]) or "-" for r in rows)
     told.update(f"unexplained {r['unexplained']}" for r in rows if r["unexplained"])
-    parts = [f"{name:26s} in class {interval(sum(r['held'] for r in rows), n)}", f"alone {sum(r['alone'] for r in rows)}"]
+    parts = [
+        f"{name:26s} in class {interval(sum(r['held'] for r in rows), n)}",
+        f"alone {sum(r['alone'] for r in rows)}",
+    ]
     parts.append(f"another effect named {interval(sum(bool(r['beside']) for r in rows), n)}")
     parts.append("; ".join(f"{k} ×{v}" for k, v in told.most_common(6)))
     return " · ".join([*parts, f"{sum(r['seconds'] for r in rows) / n:.1f} s"])

@@ -146,7 +146,7 @@ def creep_after_move(rng: np.random.Generator, units: int, scene: Any) -> Effect
             arrives, end = float(s.start[k] - s.wait[k]), float(s.start[k] + s.duration[k])
             leaves = max(arrives - max(abs(p - a) for p, a in zip(place, at, strict=True)) / SPEED, before)
             strain = _follow(strain, _direction(*at), leaves - before, tau)
-            count = int(round((end - leaves) / _FINE_S)) + 1
+            count = round((end - leaves) / _FINE_S) + 1
             step, inside = (end - leaves) / count, 0
             for middle in leaves + (np.arange(count) + 0.5) * step:
                 part = min((middle - leaves) / max(arrives - leaves, 1e-9), 1.0)

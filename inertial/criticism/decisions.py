@@ -123,7 +123,10 @@ LESS_FLICKER, LESS_WALK = 0.25, 1.0 / 30.0
 """Fractions of 1/f and random walk at which candidates are tested again: a drift hidden in the walk is detected there."""
 
 RIVAL_NEAR = 60.0
-"""Score behind the best, at the noise of the best, above which a rival of a class is not judged with its own noise."""
+"""Score behind the best above which a rival of a class is not judged with its own noise.
+
+It is compared at the noise of the best, and counts there as much more as the best effect's score is larger than at its own.
+"""
 
 AXES_DIFFER = 30.0
 """Chi-square that one value of a nonlinear parameter per axis must reduce beyond one value for all."""
