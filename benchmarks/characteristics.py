@@ -2,9 +2,10 @@
 
 `HOW` says for each number of `inertial/criticism/decisions.py` where its characteristic comes from, and a test holds that none is
 missing. A derived number has its derivation beside it; here its false rate is checked by a simulation of the decision alone. The
-others are measured: at half, at their value and at twice as much in whole diagnoses (`benchmarks/decisions.py`), by the rates of
-the decisions about the noise (`benchmarks/decision_rates.py`), by effects put into models (`benchmarks/worlds loop`), or by what
-effects leave over (`benchmarks/remainders.py`). Rates have 95 % Clopper-Pearson intervals.
+others are measured: at half, at their value and at twice as much, in the part of a diagnosis that decides (`decision_parts.py`,
+`search_parts.py`; whole diagnoses: `benchmarks/decisions.py`); by the rates of the decisions about the noise
+(`benchmarks/decision_rates.py`), by effects put into models (`benchmarks/worlds loop`), or by what effects leave over
+(`benchmarks/remainders.py`). Rates have 95 % Clopper-Pearson intervals.
 """
 
 from __future__ import annotations
@@ -22,20 +23,19 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "worlds"), str(HERE.parent)]
 
 import numpy as np  # noqa: E402
+from decision_parts import BASE, PARTS, lines, run_of  # noqa: E402
 from noise import Noise  # noqa: E402
 from scipy import stats  # noqa: E402
+from search_parts import SEARCH_PARTS  # noqa: E402
 from tables import NULLS  # noqa: E402
-from world import World, make  # noqa: E402
+from world import World  # noqa: E402
 
 from inertial.criticism import decisions  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from inertial.criticism.examination import ExaminedRun
-
 SEED = 66_000_000
-BASE = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 
 
 def rate(hits: int, runs: int) -> str:
@@ -58,21 +58,9 @@ def shares(runs: int, first: int) -> Iterator[str]:
 
 def _walk(world: World, seed: int) -> float:
     """K of the noise that is fitted to a lot without hidden effects, µg/√s."""
-    model = _examined(world, seed).model()
+    model = run_of(world, SEED + seed).model()
     noise, covariance = model.noise, model.problem.covariance
     return 1e6 * float(np.sqrt(noise.shares.walk * covariance.white * np.mean(noise.scale**2) / covariance.span))
-
-
-def _examined(world: World, seed: int) -> ExaminedRun:
-    from inertial.criticism.bad_dwells import bad_dwells
-    from inertial.criticism.examination import ExaminedRun
-    from pipelines.tables.condense import condense
-    from pipelines.tables.dwells import lot_of, measured
-
-    made = make(world, SEED + seed)
-    run = ExaminedRun(lot_of(measured(condense(made.dwells), made.history), square=False), BASE)
-    run.removed = bad_dwells(run.model())
-    return run
 
 
 def prior_grid(runs: int, first: int) -> Iterator[str]:
@@ -113,7 +101,7 @@ def most_bad(runs: int, first: int) -> Iterator[str]:
     """Dwells that are left out, against their limit."""
     worlds = {"normal": World(), "t3": NULLS["t3"], "t3, one unit": NULLS["t3_one_unit"]}
     for name, world in worlds.items():
-        gone = np.array([len(_examined(world, first + seed).removed) for seed in range(runs)])
+        gone = np.array([len(run_of(world, SEED + first + seed).removed) for seed in range(runs)])
         most = int(decisions.MOST_BAD * world.units * world.poses * len(world.soaks)) + 1
         reached = rate(int(np.count_nonzero(gone >= most)), runs)
         yield f"{name}: dwells left out, mean {gone.mean():.2f}, most {gone.max()}; limit {most} reached in {reached}"
@@ -128,7 +116,7 @@ def looks(runs: int, first: int) -> Iterator[str]:
 
     rng, charged = np.random.default_rng(SEED + first), []
     for name in ("B30", "K4", "one_unit"):
-        run = _examined(NULLS[name], first)
+        run = run_of(NULLS[name], SEED + first)
         model = run.model()
         problem, noise = model.problem, model.noise
         field = Candidates(problem, candidates_of(model, run.effects))
@@ -211,7 +199,7 @@ def rises(runs: int, first: int) -> Iterator[str]:
     for seed in range(first, first + runs):
         worlds = [("true", HIDDEN[f"{name}_1"], (name,)) for name in RIGHT if f"{name}_1" in HIDDEN]
         for kind, world, names in [*worlds, ("wrong", World(), WRONG)]:
-            model = _examined(world, seed).model()
+            model = run_of(world, SEED + seed).model()
             before = left_out(model)
             for name in names:
                 terms = terms_of([*catalogue.get_all(BASE), catalogue.get(name)], model.problem)
@@ -264,10 +252,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 
 
 def how() -> dict[str, str]:
-    """For every number where its characteristic comes from: a simulation, a command, or diagnoses at other values."""
-    from decisions import MATTERS
-
-    ways = dict.fromkeys(DERIVED, "simulation") | dict.fromkeys(MATTERS, "diagnoses")
+    """For every number where its characteristic comes from: a simulation, a part of the diagnosis, or a command."""
+    ways = dict.fromkeys(PARTS | SEARCH_PARTS, "part") | dict.fromkeys(DERIVED, "simulation")
     ways |= {name: " ".join(("python", f"benchmarks/{command[0]}", *command[1:])) for name, command in COMMANDS.items()}
     return ways | {name: ways[other] for name, other in SAME.items()}
 
@@ -279,7 +265,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", action="append", default=[], choices=sorted(how()))
     options = parser.parse_args()
-    done = set()
+    done, parts = set(), PARTS | SEARCH_PARTS
     for name in options.only or how():
         own = SAME.get(name, name)
         if own in done:
@@ -289,7 +275,11 @@ def main() -> int:
             for line in DERIVED[own](options.runs, options.first):
                 print(f"{own:16s} {line}", flush=True)
             continue
-        command = COMMANDS.get(own, ("decisions.py", "--only", own))
+        if own in parts:
+            for line in lines(own, parts[own], options.runs, options.first, rate):
+                print(f"{own:16s} {line}", flush=True)
+            continue
+        command = COMMANDS[own]
         further = ["--runs", str(options.runs), "--first", str(options.first)]
         subprocess.run([sys.executable, str(HERE / command[0]), *command[1:], *further], check=True)
     return 0
