@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from inertial import effects, frames
+from inertial import frames
+from inertial.effects.creep_after_move import CreepAfterMove
 from inertial.state import State
 
+CREEP = CreepAfterMove()
 TAU, WAIT, SPEED = 20.0, 4.0, np.radians(25.0)
 
 
@@ -20,10 +22,9 @@ def run_of(outer: np.ndarray, inner: np.ndarray) -> State:
     )
 
 
-def missing(state: State, *, way: bool) -> np.ndarray:
+def missing(state: State, angles: np.ndarray, *, way: bool) -> np.ndarray:
     """What a strain that follows the force with TAU still misses at each dwell, by steps of 5 ms; (n, 3), g."""
     step, fine = 0.005, np.arange(0.0, float(state.time[-1]) + 0.005, 0.005)
-    angles = np.stack([state.outer, state.inner], axis=-1)
     at = np.repeat(angles[:1], fine.size, axis=0)
     for k in range(1, len(angles)):
         ends = float(state.time[k]) - WAIT
@@ -42,21 +43,19 @@ def missing(state: State, *, way: bool) -> np.ndarray:
 @pytest.mark.parametrize("way", [0.0, 1.0])
 def test_a_creep_is_what_a_strain_behind_the_force_misses(way: float) -> None:
     rng = np.random.default_rng(5)
-    state = run_of(rng.uniform(-np.pi, np.pi, 12) / 1.2, rng.uniform(-np.pi, np.pi, 12) / 1.2)
-    creep = effects.get("creep_after_move")
-    columns = np.stack([creep.columns(state, axis, tau=TAU, way=way)[..., 0] for axis in range(3)], axis=-1)
-    true = missing(state, way=bool(way))
+    angles = rng.uniform(-np.pi, np.pi, (12, 2)) / 1.2
+    state = run_of(angles[:, 0], angles[:, 1])
+    columns = np.stack([CREEP.columns(state, axis, tau=TAU, way=way)[..., 0] for axis in range(3)], axis=-1)
+    true = missing(state, angles, way=bool(way))
     assert np.abs(columns - true).max() < 0.01 * np.abs(true).max()
 
 
 def test_coefficients_without_the_way_are_those_of_moves_that_take_no_time() -> None:
     state = run_of(np.radians([0.0, 90.0, 180.0, 90.0]), np.radians([0.0, 90.0, 0.0, -90.0]))
-    creep = effects.get("creep_after_move")
-    assert np.array_equal(creep.columns(state, 1, tau=TAU), creep.columns(state, 1, tau=TAU, way=0.0))
+    assert np.array_equal(CREEP.columns(state, 1, tau=TAU), CREEP.columns(state, 1, tau=TAU, way=0.0))
 
 
 def test_where_the_angles_are_not_recorded_a_move_takes_no_time() -> None:
     state = run_of(np.radians([0.0, 90.0, 180.0]), np.radians([0.0, 90.0, 0.0]))
     bare = State(force=state.force, time=state.time, since_move=state.since_move)
-    creep = effects.get("creep_after_move")
-    assert np.array_equal(creep.columns(bare, 0, tau=TAU, way=1.0), creep.columns(bare, 0, tau=TAU, way=0.0))
+    assert np.array_equal(CREEP.columns(bare, 0, tau=TAU, way=1.0), CREEP.columns(bare, 0, tau=TAU, way=0.0))
