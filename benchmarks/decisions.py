@@ -1,9 +1,9 @@
-"""What each number that decides a diagnosis does: `python benchmarks/decisions.py --runs 5`.
+"""What each number that decides the search of a diagnosis does: `python benchmarks/decisions.py --runs 5`.
 
 Every number of `inertial/criticism/decisions.py` that is listed here is set to half, to its value, and to twice as much, and the
-worlds that it matters in are diagnosed. Printed are the runs whose verdict is right: nothing named and adequate where nothing is
-hidden, the truth in its class and nothing beside it otherwise; a driver called unexplained where the physics is in no catalogue.
-Seeds of their own, apart from those of `benchmarks/worlds --seeds judging`.
+worlds that it matters in are diagnosed. Printed are the runs whose verdict is right, with 95 % Clopper-Pearson intervals: nothing
+named and adequate where nothing is hidden, the truth in its class and nothing beside it otherwise; a driver called unexplained
+where the physics is in no catalogue. Seeds of their own, apart from those of `benchmarks/worlds --seeds judging`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "worlds"), str(HERE.parent)]
 
 import physics  # noqa: E402
+from scipy import stats  # noqa: E402
 from tables import FAULTS, HIDDEN, NULLS  # noqa: E402
 from world import World, make  # noqa: E402
 
@@ -72,7 +73,9 @@ MATTERS: dict[str, tuple[str, ...]] = {
     "AXES_DIFFER": ("warm_up_1", "null"),
     "UNITS_TOGETHER": ("third_order_2",),
     "UNEXPLAINED": ("band", "null_K4"),
+    "MATERIAL": ("null_K4", "aging_linear_1", "converter_fine"),
     "DECISIVE": ("two_effects", "band"),
+    "DOUBT": ("third_order_2", "two_effects", "band"),
     "OTHERS": ("band_and_cubic", "band"),
     "DOUBT_MEMORY": ("warm_up_1", "band"),
     "DOUBT_SHARE": ("third_order_2", "band"),
@@ -93,9 +96,10 @@ def changed(name: str, factor: float) -> Generator[None, None, None]:
     from inertial.criticism import decisions
 
     value = getattr(decisions, name)
+    other = {k: v * factor for k, v in value.items()} if isinstance(value, dict) else value * factor
     held = [m for k, m in sys.modules.items() if k.startswith("inertial.criticism") and getattr(m, name, None) is value]
     for module in held:
-        setattr(module, name, value * factor)
+        setattr(module, name, other)
     try:
         yield
     finally:
@@ -129,6 +133,7 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(prog="python benchmarks/decisions.py", description=__doc__)
     parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", action="append", default=[])
     options = parser.parse_args()
     known: dict[tuple[str, int], bool] = {}
@@ -139,7 +144,7 @@ def main() -> None:
             cells = []
             for factor in (0.5, 1.0, 2.0):
                 hits = 0
-                for seed in range(SEED, SEED + options.runs):
+                for seed in range(SEED + options.first, SEED + options.first + options.runs):
                     key = (world, seed)
                     if factor == 1.0 and key in known:
                         hits += known[key]
@@ -150,7 +155,8 @@ def main() -> None:
                     hits += good
                     if factor == 1.0:
                         known[key] = good
-                cells.append(f"×{factor:g}: {hits}/{options.runs}")
+                limits = stats.binomtest(hits, options.runs).proportion_ci(0.95, "exact")
+                cells.append(f"×{factor:g}: {hits}/{options.runs} [{limits.low:.2f}, {limits.high:.2f}]")
             print(f"{name:16s} {world:30s} right {'  '.join(cells)}", flush=True)
 
 

@@ -1,9 +1,9 @@
-"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults small hidden loop part --runs 10`.
+"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults small hidden loop scenes part --runs 10`.
 
 Prints for every world how many runs were called inadequate, named physics, and told the fault that was made, each with its 95 %
 Clopper-Pearson interval. `--seeds development` are for setting constants, `judging` (the default) only for measuring.
-`part` goes on measuring as a diagnosis proposes, and prints what was parted. `--write FOLDER WORLD SEED` writes the tables of one
-run in the exchange format.
+`scenes` are plans with a blind spot; `part` goes on measuring there as a diagnosis proposes, and prints what was parted.
+`--write FOLDER WORLD SEED` writes the tables of one run in the exchange format.
 """
 
 from __future__ import annotations
@@ -112,7 +112,10 @@ def looped(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
     for kind, effects in (("wrong", WRONG), ("right", RIGHT)):
         for effect in effects:
             made = empty if kind == "wrong" else make(replace(LOOP[name], hidden=((effect, 2.0),)), seed)
-            for where, again in (("fresh", (made.fresh, made.fresh_history)), ("left out", (None, None))):
+            ways = {"fresh": (made.fresh, made.fresh_history), "left out": (None, None)}
+            if LOOP[name].fresh_noise is not None:
+                del ways["left out"]
+            for where, again in ways.items():
                 confirmed[f"{kind} {where}"].append((effect, _confirmed(made, effect, again)))
     return name, dict(confirmed)
 
@@ -140,7 +143,7 @@ def _pooled(work: Callable[..., Any], tasks: list[Any], jobs: int) -> Iterator[A
 def main() -> int:
     """Run tables and print them."""
     parser = argparse.ArgumentParser(prog="python benchmarks/worlds", description=__doc__)
-    parser.add_argument("tables", nargs="*", default=["nulls", "faults"], choices=[*TABLES, "loop", "part"])
+    parser.add_argument("tables", nargs="*", default=["nulls", "faults"], choices=[*TABLES, "loop", "scenes", "part"])
     parser.add_argument("--world", action="append", default=[])
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--jobs", type=int, default=1)
@@ -153,7 +156,7 @@ def main() -> int:
         return _write(*options.write)
     seeds = range(SEEDS[options.seeds] + options.first, SEEDS[options.seeds] + options.first + options.runs)
     for table in options.tables:
-        worlds = {"loop": LOOP, "part": part.SCENES}.get(table) or TABLES[table]
+        worlds = {"loop": LOOP, "part": part.SCENES, "scenes": part.SCENES}.get(table) or TABLES[table]
         names = [n for n in worlds if not options.world or n in options.world]
         # seeds of its own for each world: the same draw in all of them would count as many
         places = {name: 1000 * k for k, name in enumerate(worlds)}
@@ -242,8 +245,21 @@ def _part_line(name: str, rows: list[dict[str, Any]]) -> str:
     return " · ".join(line)
 
 
-WORK = {"loop": looped, "part": part.followed}
-LINES = {"loop": _loop_line, "part": _part_line}
+def _scene_line(name: str, rows: list[dict[str, Any]]) -> str:
+    n = len(rows)
+    told = Counter("+".join("|".join(e) for e in r["named"]) or "-" for r in rows)
+    told.update(f"unexplained {r['unexplained']}" for r in rows if r["unexplained"])
+    parts = [
+        f"{name:26s} in class {interval(sum(r['held'] for r in rows), n)}",
+        f"alone {sum(r['alone'] for r in rows)}",
+    ]
+    parts.append(f"another effect named {interval(sum(bool(r['beside']) for r in rows), n)}")
+    parts.append("; ".join(f"{k} ×{v}" for k, v in told.most_common(6)))
+    return " · ".join([*parts, f"{sum(r['seconds'] for r in rows) / n:.1f} s"])
+
+
+WORK = {"loop": looped, "part": part.followed, "scenes": part.first_looks}
+LINES = {"loop": _loop_line, "part": _part_line, "scenes": _scene_line}
 
 
 def _write(folder: str, name: str, seed: str) -> int:

@@ -24,7 +24,7 @@ MOVE = 20.0
 class Blind:
     """A run with a blind spot.
 
-    directions : "faces", "edges" (18), "corners" (26) or "spiral"; in one order or shuffled in every turn
+    directions : "faces", "edges" (18), "corners" (26) or "spiral"; shuffled in every turn unless ``one_order``
     effect, size : what is hidden, in RMS that the model leaves of it over the noise of a dwell
     """
 
@@ -36,6 +36,7 @@ class Blind:
     soak_s: float = 2400.0
     units: int = 8
     noise: Noise = field(default_factory=lambda: Noise(white=25.0, flicker=5.0))
+    one_order: bool = False
 
 
 THREE, UP, AROUND = (-10.0, 60.0, 25.0), (0.0, 20.0, 40.0, 60.0), (25.0, 60.0, -10.0, 20.0)
@@ -65,6 +66,11 @@ SCENES: dict[str, Blind] = {
     "hysteresis, 7 soaks": Blind("thermal_hysteresis", 2.0, "faces", 1, (25.0, 60.0, 40.0, 10.0, -10.0, 10.0, 30.0)),
     "level on faces": Blind("level_error", 3.0, "faces", 6),
     "misalignment over T": Blind("misalignment_temperature", 1.5, "faces", 1, THREE),
+    "creep on faces": Blind("creep_after_move", 2.0, "faces", 6, one_order=True),
+    "creep on faces, shuffled": Blind("creep_after_move", 2.0, "faces", 6),
+    "creep on 18": Blind("creep_after_move", 2.0, "edges", 3, one_order=True),
+    "hysteresis, soaks up": Blind("thermal_hysteresis", 2.0, "faces", 2, UP),
+    "warm-up, soaks up": Blind("warm_up", 2.0, "faces", 2, UP),
 }
 """Sizes and plans at which a diagnosis has more than one name for what is hidden."""
 
@@ -179,9 +185,10 @@ def _tick(now: float, air: float, body: float, target: float, fine_air: list[flo
 def _plan(blind: Blind, rng: np.random.Generator) -> list[Step]:
     directions = _directions(blind.directions)
     steps: list[Step] = []
+    always = rng.permutation(len(directions)) if blind.one_order else None
     for soak in blind.soaks:
         for _ in range(blind.turns):
-            for place in rng.permutation(len(directions)):
+            for place in rng.permutation(len(directions)) if always is None else always:
                 outer, inner = directions[place]
                 steps.append(Step(outer, inner, soak, soak_s=blind.soak_s, jitter=float(rng.uniform(0.7, 1.3))))
     return steps

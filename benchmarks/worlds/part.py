@@ -13,6 +13,29 @@ import numpy as np
 from continued_run import LAG, MOVE, RAMP, SCENES, SETTLED, Blind, Continued, Step
 
 
+def first_looks(task: tuple[str, str, int]) -> tuple[str, dict[str, Any]]:
+    """What the first diagnosis of a scene says, beside the truth; nothing is measured on."""
+    from pipelines.diagnosis.diagnose import diagnose
+
+    _, name, seed = task
+    blind, begin = SCENES[name], time.process_time()
+    document = diagnose(*Continued(blind, seed).tables())
+    groups = [set(g["effects"]) for g in document["classes"]]
+    held = [g for g in groups if blind.effect in g]
+    return name, {
+        "seed": seed,
+        "seconds": time.process_time() - begin,
+        "named": [g["effects"] for g in document["classes"]],
+        "held": bool(held),
+        "alone": any(len(g) == 1 for g in held),
+        "beside": [sorted(g) for g in groups if blind.effect not in g],
+        "unexplained": (document["unexplained"] or {}).get("driver"),
+        "unseen": blind.effect in document["unseen"],
+        "adequate": document["adequate"],
+        "blocked": [b["fault"] for b in document["blocked_by"]],
+    }
+
+
 def followed(task: tuple[str, int]) -> tuple[str, dict[str, Any]]:
     """One run: the proposals of its diagnosis, measured, and what they parted."""
     name, seed = task

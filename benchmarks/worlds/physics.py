@@ -128,6 +128,54 @@ def level_error(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     return effect
 
 
+def creep_after_move(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """A suspension of which a part follows the force late: what is still missing of its deflection, over each dwell.
+
+    The table turns both axes at once and is at rest for the wait before a dwell. Time constants are of the design, within 3 %
+    from unit to unit.
+    """
+    del scene
+    size = _sizes(rng, units)[..., 0]
+    tau = float(np.exp(rng.uniform(np.log(15.0), np.log(60.0)))) * (1.0 + 0.03 * rng.standard_normal(units))
+
+    def effect(s: Any) -> Floats:
+        strain = np.broadcast_to([0.0, 0.0, 1.0], (units, 3)).copy()
+        missing = np.zeros((units, s.outer.size, 3))
+        before, at = float(s.start[0]) - 60.0, (0.0, 0.0)
+        for k, place in enumerate(zip(s.outer.tolist(), s.inner.tolist(), strict=True)):
+            arrives, end = float(s.start[k] - s.wait[k]), float(s.start[k] + s.duration[k])
+            leaves = max(arrives - max(abs(p - a) for p, a in zip(place, at, strict=True)) / SPEED, before)
+            strain = _follow(strain, _direction(*at), leaves - before, tau)
+            count = round((end - leaves) / _FINE_S) + 1
+            step, inside = (end - leaves) / count, 0
+            for middle in leaves + (np.arange(count) + 0.5) * step:
+                part = min((middle - leaves) / max(arrives - leaves, 1e-9), 1.0)
+                force = _direction(*(a + part * (p - a) for p, a in zip(place, at, strict=True)))
+                strain = _follow(strain, force, step, tau)
+                if middle > s.start[k]:
+                    missing[:, k] -= force - strain
+                    inside += 1
+            missing[:, k] /= max(inside, 1)
+            before, at = end, place
+        return size[:, None] * missing
+
+    return effect
+
+
+_FINE_S = 0.5
+SPEED = float(np.radians(20.0))
+"""Of the table, rad/s."""
+
+
+def _direction(outer: float, inner: float) -> Floats:
+    return np.array([np.sin(outer) * np.sin(inner), np.sin(outer) * np.cos(inner), np.cos(outer)])
+
+
+def _follow(strain: Floats, force: Floats, seconds: float, tau: Floats) -> Floats:
+    """Strains (units, 3) some time later, under a force (3,) that stays."""
+    return strain + (force - strain) * -np.expm1(-seconds / tau)[:, None]
+
+
 def converter(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """Integral nonlinearity of a converter of equal segments: a period of the design, a phase of each part.
 
@@ -153,6 +201,7 @@ PHYSICS: dict[str, Callable[..., Effect]] = {
     "step_change": step_change,
     "thermal_kink": thermal_kink,
     "thermal_hysteresis": thermal_hysteresis,
+    "creep_after_move": creep_after_move,
     "level_error": level_error,
     "adc_nonlinearity": converter,
 }

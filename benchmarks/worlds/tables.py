@@ -98,4 +98,9 @@ LOOP: dict[str, World] = {
     "one_unit": World(units=1),
     "one_unit_K4": World(units=1, noise=Noise(walk=4.0)),
     "turn_on_300": World(turn_on=300.0),
+    "B30_then_K4": World(fresh_noise=Noise(walk=4.0)),
+    "B30_then_K8": World(fresh_noise=Noise(walk=8.0)),
+    "K4_then_B30": World(noise=Noise(walk=4.0), fresh_noise=Noise()),
+    "one_unit_B30_then_K4": World(units=1, fresh_noise=Noise(walk=4.0)),
+    "one_unit_K4_then_B30": World(units=1, noise=Noise(walk=4.0), fresh_noise=Noise()),
 }

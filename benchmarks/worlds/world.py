@@ -20,8 +20,9 @@ NDArray = np.ndarray
 class World:
     """A run to be made.
 
-    durations : shortest and longest dwell, s; hidden : (effect, size), size = RMS that the plain model leaves of it over the
-    noise of a dwell; fault, amount : what goes wrong and by how much
+    durations : shortest and longest dwell, s; fresh_noise : of the fresh run, where its day has another noise
+    hidden : (effect, size), size = RMS that the plain model leaves of it over the noise of a dwell
+    fault, amount : what goes wrong and by how much
     floors : the amount in place of ``amount``, over the RMS noise of a dwell about the mean of its record, for faults in mg
     beside : further faults and their amounts
     rest : RMS of the table's rest position, µrad, alike for all; lsb : resolution over the noise of a dwell's samples
@@ -33,6 +34,7 @@ class World:
     soaks: tuple[float, ...] = (-10.0, 25.0, 60.0)
     durations: tuple[float, float] = (10.0, 10.0)
     noise: Noise = field(default_factory=Noise)
+    fresh_noise: Noise | None = None
     hidden: tuple[tuple[str, float], ...] = ()
     fault: str = ""
     amount: float = 0.0
@@ -103,8 +105,8 @@ def make(world: World, seed: int) -> Made:
     lot = Lot.drawn(device, world.units)
     scene, again = (replace(s, output=lot.output(s)) for s in (scene, _with_heat(scene, world, second)))
     noises = [
-        1e-6 * dwell_noise(world.noise, s.start, s.duration, world.units, g)
-        for s, g in ((scene, first), (again, second))
+        1e-6 * dwell_noise(noise, s.start, s.duration, world.units, g)
+        for noise, s, g in ((world.noise, scene, first), (world.fresh_noise or world.noise, again, second))
     ]
     floor = float(np.sqrt(np.mean((noises[0] - noises[0].mean(axis=1, keepdims=True)) ** 2)))
     extra = _hidden(world, scene, again, floor, third)

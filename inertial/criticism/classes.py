@@ -1,5 +1,6 @@
 """Classes of effects that the data cannot separate."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from inertial.criticism import decisions
@@ -7,8 +8,7 @@ from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model
-from inertial.criticism.refinement import refine
-from inertial.criticism.search import judge, ranked, scanned, size_of
+from inertial.criticism.search import Rival, judge, judge_refined, ranked, scanned, size_of
 from inertial.criticism.term import Term
 
 __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
@@ -64,11 +64,22 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     rest = model.without_term(term)
     leave = {t.effect.id for t in rest.terms if not isinstance(t.effect, Handling)}
     looked = scanned(field, rest.at(model.noise), leave)
-    least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR
+    own = judge(field, rest, term)
+    least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR * _stretch(term, looked, own)
     near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]
     near = [t for t in near if term.effect.id not in t.effect.after]
-    judged = [judge(field, rest, refine(rest, t, model.noise)) for t in near]
-    judged = ranked([judge(field, rest, term), *judged])
+    judged = [judge_refined(field, rest, t, model.noise) for t in near]
+    judged = ranked([own, *judged])
     best = judged[0]
     members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + CLASS_WIDTH)
     return EffectClass(members, best.log_p, size_of(rest, best.term))
+
+
+def _stretch(term: Term, looked: Sequence[tuple[Term, float]], own: Rival) -> float:
+    """Factor by which scores at the noise of the best differ more than those of rivals each at its own noise; one at least.
+
+    What wander could take up of a slow effect counts in full at a noise without it: with four soaks in one direction a cubic of
+    the temperature has a score of a thousand there, and of forty at the noise that is estimated again.
+    """
+    at_this_noise = next((score for other, score in looked if other.effect.id == term.effect.id), 0.0)
+    return max(at_this_noise / max(-own.cost, 1.0), 1.0)

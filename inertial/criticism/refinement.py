@@ -105,10 +105,12 @@ def around(parameter: Nonlinear, centre: float, width: float) -> Array:
 
 
 def _varied(problem: Problem, term: Term, parameter: Nonlinear, values: Array) -> Candidate:
-    """A term's columns at several values of one parameter."""
+    """A term's columns at several values of one parameter, with those of an unknown state of its memory."""
     sets = [{**term.keywords, parameter.name: float(v)} for v in values]
-    columns = np.stack([problem.columns(term.effect, s) for s in sets], axis=2)
-    return Candidate(columns[..., : term.first], term.shared)
+    columns = np.stack([problem.columns(term.effect, s) for s in sets], axis=2)[..., : term.first]
+    if not term.rest and term.memory:
+        columns = np.concatenate([columns, np.stack([problem.start(term.effect, s) for s in sets], axis=2)], axis=-1)
+    return Candidate(columns, term.shared)
 
 
 def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:

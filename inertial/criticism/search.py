@@ -12,7 +12,7 @@ from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.likelihood import Ratio, likelihood_ratio, weighed
 from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Shares
+from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import cost_of_model, fall
 from inertial.criticism.refinement import refine
 from inertial.criticism.space import Gain, Space
@@ -186,12 +186,26 @@ def _best_of(field: Candidates, space: Space, name: str, gain: Gain) -> tuple[fl
 
 def _exact(field: Candidates, model: Model, term: Term) -> Rival:
     """A finalist with refined nonlinear parameters, and the noise estimated with it in the model."""
+    if isinstance(term.effect, Handling):
+        return judge(field, model, refine(model, term, model.with_term(term).noise))
+    return min((_refined(field, model, begun) for begun in _begun(model, term)), key=lambda r: r.cost)
+
+
+def _refined(field: Candidates, model: Model, term: Term) -> Rival:
     for _ in range(_REFINED if term.effect.nonlinear else 1):
         before = term
         term = refine(model, term, model.with_term(term).noise)
         if not _moved(before, term):
             break
-    return judge(field, model, term)
+    return _judged(field, model, term)
+
+
+def judge_refined(field: Candidates, model: Model, term: Term, noise: Noise) -> Rival:
+    """A term added to a model, with its nonlinear parameters refined at a noise for each beginning of its memory."""
+    if isinstance(term.effect, Handling):
+        return judge(field, model, refine(model, term, noise))
+    begun = (refine(model, each, noise) for each in _begun(model, term))
+    return min((_judged(field, model, each) for each in begun), key=lambda r: r.cost)
 
 
 def _moved(before: Term, after: Term) -> bool:
@@ -204,8 +218,11 @@ def judge(field: Candidates, model: Model, term: Term) -> Rival:
     """A term added to a model, with the noise estimated again; no gain if a handling error cannot have its size."""
     if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
         return Rival(term, 0.0, 0, 0.0, 0.0)
-    places = field.places(term.effect.id)
-    return min((_rival(t, likelihood_ratio(model, t, places)) for t in _begun(model, term)), key=lambda r: r.cost)
+    return min((_judged(field, model, each) for each in _begun(model, term)), key=lambda r: r.cost)
+
+
+def _judged(field: Candidates, model: Model, term: Term) -> Rival:
+    return _rival(term, likelihood_ratio(model, term, field.places(term.effect.id)))
 
 
 def _begun(model: Model, term: Term) -> tuple[Term, ...]:
@@ -214,7 +231,7 @@ def _begun(model: Model, term: Term) -> tuple[Term, ...]:
     Devices are at rest when a run begins, as a rule. A coefficient for the state of every series would be paid for else, and an
     effect without memory that leaves as little stands alone: a step between two soaks in place of hysteresis.
     """
-    if isinstance(term.effect, Handling) or not term.effect.memory:
+    if not term.memory:
         return (term,)
     term = replace(term, rest=False)
     if not model.problem.start(term.effect, term.keywords).shape[-1]:

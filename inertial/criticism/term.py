@@ -28,6 +28,11 @@ class Term:
         return self.effect.scope in SHARED
 
     @property
+    def memory(self) -> bool:
+        """Whether the effect depends on what was before the first dwell."""
+        return not isinstance(self.effect, Handling) and self.effect.memory
+
+    @property
     def keywords(self) -> dict[str, float | tuple[float, ...]]:
         """Values as keywords of the effect's columns."""
         return dict(self.values)

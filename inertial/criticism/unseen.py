@@ -60,8 +60,8 @@ def _memories(field: Candidates, base: Model, without: set[str]) -> Mapping[str,
     plain, still = (Model(Problem(each), terms) for each in (lot, replace(lot, state=without_scatter(lot.state))))
     visible: dict[str, list[bool]] = {}
     for effect in field.effects:
-        parameters = effect.parameters(lot.state)
-        if not effect.memory or effect.id in without or len(parameters) != 1 or parameters[0].choices:
+        continuous = [p for p in effect.parameters(lot.state) if not p.choices]
+        if not effect.memory or effect.id in without or len(continuous) != 1:
             continue
         grid = grid_of(effect, lot.state)
         alone = still if _follows_order_only(effect, lot.state, grid[0]) else plain
