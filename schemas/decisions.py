@@ -89,30 +89,19 @@ def decide(limits: Limits, figure: str, value: float, standard_uncertainty: floa
     guard = limits.guard_factor * standard_uncertainty
     expanded = limits.coverage_factor * standard_uncertainty
     own = limits.figures[figure]
-    if own.min is not None:
-        return Decision(
-            figure=figure,
-            value=value,
-            uncertainty=expanded,
-            limit=own.min,
-            unit=own.unit,
-            rule=describe_rule(limits),
-            outcome=_outcome(-value, -own.min, guard),
-            risk=below(value, standard_uncertainty, own.min),
-            accept=own.min + guard,
-            least=True,
-        )
-    limit = own.max or 0.0  # a limit has one of both
+    least = own.min is not None
+    limit = own.min or own.max or 0.0  # a limit has one of both
     return Decision(
         figure=figure,
         value=value,
         uncertainty=expanded,
         limit=limit,
-        unit=limits.figures[figure].unit,
+        unit=own.unit,
         rule=describe_rule(limits),
-        outcome=_outcome(abs(value), limit, guard),
-        risk=outside(value, standard_uncertainty, limit),
-        accept=limit - guard,
+        outcome=_outcome(-value, -limit, guard) if least else _outcome(abs(value), limit, guard),
+        risk=(below if least else outside)(value, standard_uncertainty, limit),
+        accept=limit + guard if least else limit - guard,
+        least=least,
     )
 
 

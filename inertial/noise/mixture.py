@@ -122,10 +122,13 @@ class MixtureFit:
 
     def _gauss_newton(self, free: NDArray[np.bool_], strengths: Array) -> Array:
         expected = self.model @ strengths
-        expected = np.where(expected > 0.0, expected, np.exp(self.target))
+        if not expected.min() > 0.0:
+            expected = np.where(expected > 0.0, expected, np.exp(self.target))
         rows = self.whiten @ (self.model / expected[:, None])
         right_side = self.whiten @ (self.target - np.log(expected) + 1.0)
-        right_side = right_side - rows[:, ~free] @ strengths[~free]
+        held = strengths[~free]
+        if held.any():
+            right_side = right_side - rows[:, ~free] @ held
         own = rows[:, free]
         size = np.sqrt(np.sum(own * own, axis=0))
         trial = strengths.copy()

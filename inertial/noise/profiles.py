@@ -98,6 +98,7 @@ class _Curve:
 
     def __init__(self, variance: Array, moments: Sums) -> None:
         self.variance, self.moments = variance, moments
+        self._worth: dict[int, float] = {}
         ceiling = np.log(variance)[:, None] - np.log(mixture.basis(moments.m))
         self._ceiling = np.exp(np.min(ceiling, axis=0))
         everything = np.ones(len(mixture.TERMS), dtype=np.bool_)
@@ -123,8 +124,10 @@ class _Curve:
         return mixture.deviance(self.variance, self.moments, free, start)[0]
 
     def worth(self, j: int) -> float:
-        """Chi-square that the curve is worse without term j."""
-        return self.at(j, 0.0)
+        """Chi-square that the curve is worse without term j; computed once, whichever other terms are allowed meanwhile."""
+        if j not in self._worth:
+            self._worth[j] = self.at(j, 0.0)
+        return self._worth[j]
 
     def low_end(self, j: int, start: float, threshold: float) -> float:
         """Strength below ``start`` at which the deviance has risen by ``threshold``, for a term that is worth more than that."""

@@ -52,7 +52,7 @@ def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
         raise explain(problem, f"run {run.id}", Recipe) from None
     if change.limits is not None:
         recipe = recipe.model_copy(update={"limits": change.limits_name})
-    run_document = {key: value for key, value in about.items() if key not in PROVENANCE}
+    run_document = without_provenance(about)
     station = StationConfig.model_construct(**about.get("station", {}))
     capture = about["capture"]
     job = ArchivedJob(
@@ -61,6 +61,11 @@ def archived_job(run: Run, change: ModelChange) -> ArchivedJob:
     refuse_unknown_effects(recipe.effects, f"run {run.id}")
     refuse_limits_without_figures(limits, recipe)
     return job
+
+
+def without_provenance(about: dict[str, Any]) -> dict[str, Any]:
+    """What ``run.json`` holds, without who made it, where and when."""
+    return {key: value for key, value in about.items() if key not in PROVENANCE}
 
 
 def model_keys(change: ModelChange) -> dict[str, Any]:

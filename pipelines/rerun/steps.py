@@ -9,14 +9,14 @@ import pandas as pd
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Archive, code_hash
-from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Tables
+from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Stage, Tables
 from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
 from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.jobs.terms import archived_terms
-from pipelines.rerun.archived_job import PROVENANCE, ArchivedJob, archived_job, model_keys
+from pipelines.rerun.archived_job import ArchivedJob, archived_job, model_keys, without_provenance
 from pipelines.rerun.import_steps import (
     StageCall,
     budget_step,
@@ -125,14 +125,12 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     steps += [_grade_step(limits, zero, budgeted=terms is not None)] if limits else []
     recipe = {**about.get("recipe", {}), "name": "import", **model}
     recipe |= {"limits": change.limits_name} if change.limits else {}
-    kept = {key: value for key, value in about.items() if key not in PROVENANCE}
+    kept = without_provenance(about)
     new = {**kept, "recipe": recipe, "limits": limits.model_dump(mode="json") if limits else None}
     data = {name: run.manifest(name)["sha256"] for name in ("dwells", "history") if name != "history" or history}
     code = {step.name: step.code for step in steps}
     decisive = {"data": data, "model": model, "limits": new["limits"], "code": code}
-    if left_out:
-        named = [f"{unit}:{dwell}" for unit, dwell in left_out]
-        decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
+    _note_left_out(about, left_out, new, decisive)
     return Plan("import", tuple(steps), new, decisive)
 
 
@@ -147,17 +145,22 @@ def _in_a_plane(run: Run, change: ModelChange, left_out: Dwells, across: int) ->
     history = "history" in run.tables()
     gravity = gravity_of_import(about)
     steps = (_import_step(history, left_out, run), plane_step(across, gravity))
-    kept = {key: value for key, value in about.items() if key not in PROVENANCE}
+    kept = without_provenance(about)
     new: dict[str, Any] = {**kept, "recipe": {**about.get("recipe", {}), "name": "import"}, "plane_across": axis}
     decisive: dict[str, Any] = {
         "data": {"dwells": run.manifest("dwells")["sha256"]},
         "plane": axis,
         "code": steps[1].code,
     }
+    _note_left_out(about, left_out, new, decisive)
+    return Plan("import", steps, new, decisive)
+
+
+def _note_left_out(about: dict[str, Any], left_out: Dwells, new: dict[str, Any], decisive: dict[str, Any]) -> None:
+    """Adds the dwells that are left out to what a run is kept with and to what its result depends on."""
     if left_out:
         named = [f"{unit}:{dwell}" for unit, dwell in left_out]
         decisive["left_out"] = new["left_out"] = [*about.get("left_out", []), *named]
-    return Plan("import", steps, new, decisive)
 
 
 def has_poses(dwells: pd.DataFrame) -> bool:
@@ -218,11 +221,16 @@ def _import_step(history: bool, left_out: Dwells, old: Run) -> StageCall:  # noq
     return StageCall("import", (), names, {}, "", lambda run: {name: run.table(name) for name in names})
 
 
+def _inputs(stage: Stage, *, history: bool) -> tuple[str, ...]:
+    """Tables that a stage reads of an import, which may have no temperatures between its dwells."""
+    return stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
+
+
 def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> StageCall:  # noqa: FBT001
     """The fit of the chain; by the norm of gravity alone where its size is given."""
     stage = BY_NAME["fit"]
     parameters = {"effects": model["effects"], "formulas": model["formulas"]}
-    inputs = stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
+    inputs = _inputs(stage, history=history)
 
     if gravity is not None:
 
@@ -241,7 +249,7 @@ def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> St
 
 def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
     stage = BY_NAME["verify"]
-    inputs = stage.inputs if history else tuple(name for name in stage.inputs if name != "history")
+    inputs = _inputs(stage, history=history)
 
     def call(run: Run) -> Tables:
         names = ("coefficients", "covariance", "predictions")
