@@ -78,14 +78,13 @@ def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most:
     units = model.problem.lot.state.time.shape[0]
     pick = np.unique(np.linspace(0, units - 1, min(units, most)).round().astype(int)).tolist()
     blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
-    # handling errors are of single units, and no step to come changes them
-    others = [replace(t, rest=False) for t in others if not isinstance(t.effect, Handling)]
-    as_found = [Model(model.problem, [t, *others], near=model.noise) for t in terms]
-    # beside a state that is not known the size of a play narrower than half a step is not determined: it could be any
-    predicted = tuple(_coefficients(m, t, blocks) for m, t in zip(as_found, terms, strict=True))
-    # what memories held before the run is not known to a wrong rival, whatever explains the run at the least price
-    terms = [replace(t, rest=False) for t in terms]
+    # what memories held before the run is not known, whatever explains the run at the least price
+    terms, others = ([replace(t, rest=False) for t in each] for each in (terms, others))
+    others = [
+        t for t in others if not isinstance(t.effect, Handling)
+    ]  # of single units, and no step to come changes them
     fitted = [Model(model.problem, [t, *others], near=model.noise) for t in terms]
+    predicted = tuple(_coefficients(m, t, blocks) for m, t in zip(fitted, terms, strict=True))
     squares = np.array([m.at(model.noise).rss for m in fitted])
     widened_by = shared_factor(Model(model.problem, [terms[0], *others], near=model.noise), terms[0]) if terms else 1.0
     variance = model.space.variance * widened_by
