@@ -219,7 +219,7 @@ def main() -> None:
                 f"{given.units} units × {given.dwells} dwells among {count} calibrations; load {os.getloadavg()[0]:.1f}"
             )
             print(f"first search, with index    {first:.1f} s")
-            measure(server, units, run, lambda number: f"N000{number}" if given.archive else f"SN00001{number}")
+            measure(server, units, run, lambda number: f"P0001{number}" if given.archive else f"SN00001{number}")
             print(f"load at the end             {os.getloadavg()[0]:.1f}")
 
 

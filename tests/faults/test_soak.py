@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -42,7 +42,7 @@ SHIFTS = int(os.environ.get("TUMBLELINE_SOAK_SHIFTS", "5"))
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200 + 600 * SHIFTS)]
 
 STATIONS = ("line-1", "line-2", "line-3")
-FAST = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
+FAST: dict[str, object] = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
 QUICK = (
     ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'),
     ("temperatures_C = [0.0, 50.0]", "temperatures_C = [23.0]\nsoak_min_s = 1.0\nallow_short_soak = true"),
@@ -111,7 +111,7 @@ class Server:
 
 
 @contextmanager
-def small_disk(place: Path) -> Iterator[bool]:
+def small_disk(place: Path) -> Generator[bool]:
     """A folder on a file system of its own of 256 MB; whether it is one (only root may mount)."""
     place.mkdir()
     mounted = (
