@@ -115,7 +115,8 @@ class Space:
         self._local = local
         blocks, n, p = local.shape
         t = 1 + shared.shape[-1]
-        self.q, self.targets = np.empty(local.shape), np.empty((blocks, n, t))
+        self.q: Array = np.empty((blocks, n, p))
+        self.targets: Array = np.empty((blocks, n, t))
         self.ranks, self._log_determinant = np.empty(blocks, dtype=np.intp), 0.0
         # some blocks at a time: every step makes several arrays of the size of their columns
         few = max(_PIECE // (n * (p + t)), 1)
