@@ -24,6 +24,8 @@ BENCHMARKS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("archive.py", ("--lots", "50", "--lots", "200"), ("--lots", "100", "--lots", "1000", "--lots", "10000")),
     ("compaction.py", ("--lots", "50"), ("--lots", "1000")),
     ("refit.py", ("--units", "200"), ("--units", "1000", "--units", "10000")),
+    ("diagnosis.py", (), ("--lot", "null_8", "--lot", "cubic_8", "--lot", "hysteresis_8", "--lot", "null_60",
+                          "--lot", "null_200")),
     ("investigate.py", ("--scene", "cubic on 18", "--scene", "pendulum on faces"), ("--seeds", "3", "--first", "31")),
     ("blind.py", ("--runs", "40"), ("--runs", "400", "--method", "tumbleline", "--method", "bic", "--method", "bonferroni",
                                     "--method", "stlsq", "--method", "lasso")),

@@ -66,8 +66,9 @@ def coarse_steps(world: World, seed: int) -> Counts:
 def together(world: World, seed: int) -> Counts:
     """Lots whose units are taken to share noise where two rivals are compared."""
     from inertial import effects as catalogue
-    from inertial.criticism.model import Model, Term
+    from inertial.criticism.model import Model
     from inertial.criticism.shared_noise import shared_factor
+    from inertial.criticism.term import Term
 
     model = run_of(world, seed).model()
     terms = [*model.terms, Term(catalogue.get("second_order"))]
@@ -89,8 +90,8 @@ def folds(world: World, seed: int) -> Counts:
 def axes(world: World, seed: int) -> Counts:
     """Effects with one value of their parameter for all axes that get one for each axis."""
     from inertial import effects as catalogue
-    from inertial.criticism.model import Term
     from inertial.criticism.refinement import refine
+    from inertial.criticism.term import Term
     from inertial.design import grid_of
 
     model = run_of(world, seed).model()

@@ -23,7 +23,7 @@ from pipelines.procedures import PROCEDURES, step_response
 from pipelines.procedures.base import REFERENCE, Device, ProcedureRecord, UnitRecord
 from pipelines.procedures.sweep_points import transfer_points
 from pipelines.procedures.transfer_figures import figures_of_transfer
-from schemas.recipe import Lot, Unit
+from schemas.lot import Lot, Unit
 from schemas.toml_files import parse_toml
 from stations.plant.plant import Plant
 

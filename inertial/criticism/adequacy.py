@@ -14,7 +14,7 @@ from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.shares import place_of, shares_at
-from inertial.criticism.space import SEEN, Candidate, Space
+from inertial.criticism.space import SEEN, Candidate, Space, eigen, times_rows
 from inertial.criticism.tail_areas import log_f_tail
 from inertial.criticism.tails import heavy
 
@@ -74,7 +74,7 @@ def _own_part(space: Space, candidate: Candidate, place: int, common: float) -> 
     if candidate.shared:
         return 1.0 / common
     units = space.targets.shape[0] // 3
-    columns = space.project(space.whiten(candidate.columns[:, :, place, :]))
+    columns = space.project(space.whiten(candidate.of_blocks[:, :, place, :]))
     inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=1e-4, hermitian=True)
     fitted = columns @ (inverse @ (np.swapaxes(columns, -1, -2) @ space.residual[..., None]))
     fitted = fitted[..., 0].reshape(units, 3, -1)
@@ -103,14 +103,16 @@ class _Draws:
         shape = (self.model.problem.blocks, self.model.problem.n, count)
         # a few draws at a time: each step makes several arrays of their size
         series = self._white(shape)
-        for some in self._pieces(count):
+        for some in _pieces(series, count):
             series[..., some] = covariance.coloured(self.model.noise, series[..., some])
         chosen = self._estimated(series)
-        spaces = {k: _At(self.model, self._shares(k), series[:, :, chosen == k]) for k in np.unique(chosen).tolist()}
+        places = {k: np.flatnonzero(chosen == k) for k in np.unique(chosen).tolist()}
+        spaces = {k: _At(self.model, self._shares(k), series, draws) for k, draws in places.items()}
+        del series
         worst = np.zeros(count)
         for candidate in looks:
             for k, space in spaces.items():
-                own = chosen == k
+                own = places[k]
                 worst[own] = np.minimum(worst[own], space.worst(candidate))
         return worst
 
@@ -119,11 +121,6 @@ class _Draws:
         if self.heavy:
             return self._values[self.rng.integers(self._values.size, size=shape)]
         return self.rng.standard_normal(shape)
-
-    def _pieces(self, count: int) -> list[slice]:
-        """Draws that are worked on together."""
-        few = max(_PIECE // (self.model.problem.blocks * self.model.problem.n), 1)
-        return [slice(start, min(start + few, count)) for start in range(0, count, few)]
 
     def _shares(self, place: int) -> Shares:
         flicker, walk = self.lattice
@@ -148,17 +145,18 @@ class _Draws:
             if not wanted.any():
                 return best
             for place in np.flatnonzero(wanted.any(axis=1)).tolist():
-                deviances[place, wanted[place]] = self._deviances(self._shares(place), series[..., wanted[place]])
+                draws = np.flatnonzero(wanted[place])
+                deviances[place, draws] = self._deviances(self._shares(place), series, draws)
             done |= wanted
             best = np.argmin(deviances, axis=0)
 
-    def _deviances(self, shares: Shares, series: Array) -> Array:
-        """Restricted deviance of each draw at some shares, (draws,)."""
+    def _deviances(self, shares: Shares, series: Array, draws: NDArray[np.intp]) -> Array:
+        """Restricted deviance of some draws at some shares, (draws,)."""
         space = self._space(shares)
         dof = space.by_block[:, None]
-        log_squares = np.empty(series.shape[-1])
-        for some in self._pieces(series.shape[-1]):
-            left = space.project(space.whiten(series[..., some]))
+        log_squares = np.empty(draws.size)
+        for some in _pieces(series, draws.size):
+            left = space.project(space.whiten(series[..., draws[some]]))
             squares = np.einsum("bnd,bnd->bd", left, left)
             log_squares[some] = np.sum(dof * np.log(np.maximum(squares, 1e-300)), axis=0)
         return space.logdet + space.information + log_squares
@@ -168,30 +166,46 @@ class _Draws:
 
 
 class _At:
-    """Draws with equal estimated shares."""
+    """Draws with equal estimated shares.
 
-    def __init__(self, model: Model, shares: Shares, series: Array) -> None:
+    Parameters
+    ----------
+    series : (blocks, n, all draws), g; draws : those with these shares
+    """
+
+    def __init__(self, model: Model, shares: Shares, series: Array, draws: NDArray[np.intp]) -> None:
         self.space = model.at(Noise(shares, model.noise.scale))
-        left = self.space.project(self.space.whiten(series))
-        squares, dof = np.einsum("bnd,bnd->bd", left, left), self.space.by_block[:, None]
-        prior = model.noise.prior
-        if np.isfinite(prior):
-            variance = (squares + prior) / (dof + prior)  # the centre of the prior is one in units of the fitted scale
-        else:
-            variance = np.broadcast_to(squares.sum(axis=0) / max(float(dof.sum()), 1.0), squares.shape)
-        left /= np.sqrt(variance)[:, None, :]
-        self.left = left
-        self.total = np.einsum("bnd,bnd->d", self.left, self.left)
+        self.total = np.empty(draws.size)
+        self.rows = np.empty((series.shape[0], draws.size, series.shape[1]))
+        prior, dof = model.noise.prior, self.space.by_block[:, None]
+        for some in _pieces(series, draws.size):
+            left = self.space.project(self.space.whiten(series[..., draws[some]]))
+            squares = np.einsum("bnd,bnd->bd", left, left)
+            if np.isfinite(prior):
+                variance = (squares + prior) / (
+                    dof + prior
+                )  # the centre of the prior is one in units of the fitted scale
+            else:
+                variance = np.broadcast_to(squares.sum(axis=0) / max(float(dof.sum()), 1.0), squares.shape)
+            left /= np.sqrt(variance)[:, None, :]
+            self.total[some] = np.einsum("bnd,bnd->d", left, left)
+            self.rows[:, some] = self.space.backed(left)
 
     def worst(self, candidate: Candidate) -> Array:
         """Smallest log p of a candidate over its grid, for each draw."""
-        log_p = np.zeros(self.left.shape[-1])
-        for drop, rank in _drops(candidate, self.space, self.left):
+        log_p = np.zeros(self.total.size)
+        for drop, rank in _drops(candidate, self.space, self.rows):
             after = self.space.dof - rank
             if rank and after > 0:
                 ratio = (drop / rank) / (np.maximum(self.total - drop, 1e-300) / after)
                 log_p = np.minimum(log_p, log_f_tail(ratio, rank, after))
         return log_p
+
+
+def _pieces(series: Array, count: int) -> list[slice]:
+    """Of so many draws of series (blocks, n, ...) those that are worked on together."""
+    few = max(_PIECE // (series.shape[0] * series.shape[1]), 1)
+    return [slice(start, min(start + few, count)) for start in range(0, count, few)]
 
 
 def _lattice(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]], int]:
@@ -207,58 +221,24 @@ def _about(k: int | None) -> list[int | None]:
     return [None, *sorted(near)]
 
 
-def _drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array, int]]:
-    """For every value of the nonlinear parameters: the reduction of each draw by the candidate, and its rank."""
-    if candidate.shared:
-        return _shared_drops(candidate, space, noise)
-    if candidate.key is not None or candidate.columns.size <= _PIECE:
-        white = candidate.whitened(space.covariance, space.noise)
-        parts = [_local_drops(white, space.project(white.reshape(*white.shape[:2], -1)), noise)]
-    else:
-        few = max(_PIECE // max(candidate.columns[0].size, 1), 1)
-        whole = np.arange(len(candidate.columns))
-        parts = [
-            _local_drops(*space.whitened(candidate.columns[b], b), noise[b]) for b in np.split(whole, whole[few::few])
-        ]
-    drops, ranks = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
-    return [(drop, int(rank)) for drop, rank in zip(drops, ranks.tolist(), strict=True)]
-
-
-def _shared_drops(candidate: Candidate, space: Space, noise: Array) -> list[tuple[Array, int]]:
-    white = candidate.whitened(space.covariance, space.noise)
-    blocks, n, grid, p = white.shape
-    flat = white.reshape(blocks, n, grid * p)
-    size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
-    left = space.project(flat).reshape(blocks * n, grid, p) / np.maximum(
-        np.sqrt(np.sum(size.reshape(blocks, grid, p) ** 2, axis=0)), 1e-300
-    )
-    noise_flat = noise.reshape(blocks * n, -1)
-    drops: list[tuple[Array, int]] = []
-    for g in range(grid):
-        u, s, _ = np.linalg.svd(left[:, g], full_matrices=False)
-        along = u[:, s > SEEN].T @ noise_flat
-        drops.append((np.sum(along**2, axis=0), int(np.count_nonzero(s > SEEN))))
-    return drops
-
-
-def _local_drops(white: Array, left: Array, noise: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Reductions (grid, draws) by columns of some blocks, and ranks (grid,).
+def _drops(candidate: Candidate, space: Space, rows: Array) -> list[tuple[Array, int]]:
+    """For every value of the nonlinear parameters: the reduction of each draw by the candidate, and its rank.
 
     Parameters
     ----------
-    white, left : (b, n, grid, p) whitened, and (b, n, grid·p) after the local columns
+    rows : (blocks, d, n), of the whitened draws after the local columns, for columns in g
     """
-    blocks, n, grid, p = white.shape
-    flat = white.reshape(blocks, n, grid * p)
-    size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
-    unit = left / np.where(size > 0.0, size, 1.0)[:, None, :]
-    along = (np.swapaxes(unit, -1, -2) @ noise).reshape(blocks, grid, p, -1)
-    each = unit.reshape(blocks, n, grid, p).transpose(0, 2, 3, 1)
-    values, vectors = np.linalg.eigh(each @ np.swapaxes(each, -1, -2))
+    found = space.products(candidate)
+    own, squares, along = found.left, found.squares, times_rows(rows, candidate)
+    if candidate.shared:
+        own, squares, along = (each.sum(axis=0, keepdims=True) for each in (own, squares, along))
+    size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
+    values, vectors = eigen(own / (size[..., :, None] * size[..., None, :]))
     seen = values > SEEN**2
     # what each draw has along the directions of every value's columns: those columns themselves are not made
-    turned = (
-        np.swapaxes(vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None, :], -1, -2)
-        @ along
+    turned = np.swapaxes(
+        vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None, :], -1, -2
     )
-    return np.einsum("bgpd,bgpd->gd", turned, turned), seen.sum(axis=(0, 2))
+    turned = turned @ (along / size[..., None])
+    drops, ranks = np.einsum("bgpd,bgpd->gd", turned, turned), seen.sum(axis=(0, 2))
+    return [(drop, int(rank)) for drop, rank in zip(drops, ranks.tolist(), strict=True)]

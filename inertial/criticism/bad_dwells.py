@@ -102,24 +102,13 @@ class _Deletion:
         self.there = space.covariance.there.copy()
         self.units, self.n = blocks // axes, n
         scaled = space.noise.scale[:, None]
-        self.left, self.size = np.empty((blocks, n)), np.empty((blocks, n))
-        for block in range(blocks):
-            roots = self._roots(block)
-            self.left[block] = roots.T @ space.residual[block]
-            self.size[block] = np.einsum("tn,tn->n", roots, roots)
         # in units of the white variance of each block: its own variance is estimated again after each deletion
-        self.left, self.size = self.left * scaled**2, self.size * scaled**2
+        self.left, self.size = (each * scaled**2 for each in space.deleted)
         self.squares, self.dof = space.squares.copy(), space.by_block.copy()
         if np.isfinite(space.noise.prior):
             # the prior's part of each block's variance
             self.centre = np.maximum(space.noise.scale**2 * (self.dof + space.noise.prior) - self.squares, 0.0)
         self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
-
-    def _roots(self, block: int) -> Array:
-        """M (n, n) with MᵀM = P, in whitened units."""
-        space = self.space
-        eye = space.covariance.whiten(np.eye(self.n)[None], space.noise.shares, np.array([block]))
-        return space.project(eye / space.noise.scale[block], np.array([block]))[0]
 
     def worst(self) -> tuple[int, int, Array] | None:
         """Unit and dwell that stand out most, with their deviations (axes,); None where none does by more than chance."""
@@ -156,8 +145,7 @@ class _Deletion:
         for place, b in enumerate(blocks):
             self.squares[b] -= self.left[b, dwell] ** 2 / self.size[b, dwell]
             self.dof[b] -= 1.0
-            roots = self._roots(b)
-            column = roots.T @ roots[:, dwell] * self.space.noise.scale[b] ** 2
+            column = self.space.projector_at(b, dwell) * self.space.noise.scale[b] ** 2
             for other in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]):
                 column = column - self._held(b, int(other), dwell)
             self.left[b] -= column * off[place]
@@ -167,9 +155,7 @@ class _Deletion:
 
     def _held(self, block: int, gone: int, dwell: int) -> Array:
         """The change of a column of P by earlier deletions."""
-        roots = self._roots(block)
-        scale = self.space.noise.scale[block] ** 2
-        first = roots.T @ roots[:, gone] * scale
+        first = self.space.projector_at(block, gone) * self.space.noise.scale[block] ** 2
         return first * float(first[dwell] / max(first[gone], 1e-300))
 
 

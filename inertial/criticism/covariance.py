@@ -11,6 +11,7 @@ that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directi
 from collections import OrderedDict
 from collections.abc import Iterator
 from functools import cached_property, lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from scipy.linalg import solve_triangular
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, walk_kernel
 from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.whitener import EVEN, DwellProfile, applied, whitener_of
+from inertial.criticism.whitener import EVEN, DwellProfile, applied, applied_back, whitener_of
 from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
@@ -30,8 +31,11 @@ _FEW = 16
 _WHITENERS = 12_000_000
 """Largest number of stored whiteners."""
 
-_COLUMNS = 6_000_000
-"""Largest number of whitened columns stored between passes; more are computed again."""
+_PRODUCTS = 2_000_000
+"""Largest number of products of columns that are kept."""
+
+_PIECE = 1_000_000
+"""Largest number of columns' values that are whitened at a time for their products."""
 
 
 LARGE = 15_000
@@ -43,6 +47,38 @@ that a pass goes through in turn, and each would be gone before it is used again
 def _lattice(shares: Shares) -> tuple[int | None, ...]:
     """The steps of the lattice at which shares stand; None for none."""
     return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in shares)
+
+
+class Columns(Protocol):
+    """Columns whose products are wanted: :class:`inertial.criticism.space.Candidate`."""
+
+    @property
+    def columns(self) -> Array:
+        """(rows, n, grid, p), g per unit of the coefficient."""
+        ...
+
+    @property
+    def rows(self) -> NDArray[np.intp] | None:
+        """The row of each block; None where each has its own."""
+        ...
+
+    @property
+    def blocks(self) -> NDArray[np.intp] | None:
+        """The blocks that the columns are of; None for all."""
+        ...
+
+    @property
+    def key(self) -> object:
+        """Under which the products are kept; not kept if None."""
+        ...
+
+
+def _squares(columns: Array, whitener: Array | None, white: Array) -> Array:
+    """Products (rows, grid, p, p) of columns (rows, n, grid, p) with each other after a whitener (n, n), or one by dwell (n,)."""
+    rows, n, grid, p = columns.shape
+    own = columns.transpose(0, 2, 3, 1).reshape(rows * grid, p, n)
+    white = own * white if whitener is None else applied(whitener, own)
+    return (white @ np.swapaxes(white, -1, -2)).reshape(rows, grid, p, p)
 
 
 class Covariance:
@@ -102,6 +138,19 @@ class Covariance:
             flicker, walk = flicker * along, walk * along
         return flicker, walk
 
+    def forget(self) -> None:
+        """Drop the products that are kept."""
+        self._kept.clear()
+        self._used = 0
+
+    def like(self, whole: "Covariance") -> None:
+        """Take the whiteners of another covariance, of more blocks, where the blocks of each have one in common."""
+        kernels, whiteners = whole._kernels, whole._whiteners  # noqa: SLF001  # of its own kind
+        one, other = self._kernels[0], kernels[0]
+        same = len(self._kernels) == len(kernels) == 1 and other.fits(one.time, one.there, one.profile)
+        if same and np.array_equal(one.time, other.time):
+            self._whiteners = whiteners
+
     def about_mean(self, shares: Shares) -> Array:
         """Mean variance of the wander of each block about its record's own mean, over its white variance, (blocks,)."""
         variance = np.zeros(len(self.level))
@@ -160,8 +209,13 @@ class Covariance:
                     white = np.matmul(whitener[0], columns)
                     white /= level[:, None, None]
                     return white
-                own = columns / level[:, None, None]
-                return np.swapaxes(applied(whitener[0], np.swapaxes(own, -1, -2)), -1, -2)
+                b, n, m = columns.shape
+                white = np.empty((b, m, n))
+                few = max(_PIECE // max(n * m, 1), 1)
+                for some in (slice(start, start + few) for start in range(0, b, few)):
+                    own = columns[some] / level[some, None, None]
+                    white[some] = applied(whitener[0], np.swapaxes(own, -1, -2))
+                return np.swapaxes(white, -1, -2)
         place_of = np.arange(len(self.level)) if blocks is None else blocks
         where = np.full(len(self.level), -1)
         where[place_of] = np.arange(place_of.size)
@@ -181,27 +235,26 @@ class Covariance:
                     out[rows] = flat.reshape(n, rows.size, m).transpose(1, 0, 2)
         return out
 
-    def _repeated(self, columns: Array, shares: Shares, distinct: int) -> Array | None:
-        """Columns of which only so many blocks differ, whitened once; None where blocks have whiteners of their own."""
-        if len(self._groups) > 1:
-            return None
-        place, steps, _ = self._groups[0]
-        whitener = self._whitener(place, steps, shares)
-        if whitener is None:
-            return None
-        few = np.matmul(whitener[0], columns[:distinct])
-        whole = few[np.newaxis] / self.level.reshape(-1, distinct, 1, 1)
-        return whole.reshape(columns.shape)
-
     def whiteners(self, shares: Shares) -> Iterator[tuple[NDArray[np.intp], Array]]:
         """Blocks that share a whitener, and the whitener (n, n), lower triangle, for white noise of variance one."""
+        for members, whitener, white in self._by_whitener(shares):
+            yield members, np.diag(white) if whitener is None else whitener
+
+    def _by_whitener(
+        self, shares: Shares, blocks: NDArray[np.intp] | None = None
+    ) -> Iterator[tuple[NDArray[np.intp], Array | None, Array]]:
+        """Places, among all or some blocks, of those that share a whitener, and it: (n, n), or if that is None by dwell (n,)."""
+        where = np.arange(len(self.level))
+        if blocks is not None:
+            where = np.full(len(self.level), -1)
+            where[blocks] = np.arange(blocks.size)
         for place, steps, members in self._groups:
-            whitener = self._whitener(place, steps, shares)
-            kernel = self._kernels[place]
-            yield (
-                members,
-                np.diag(np.where(kernel.there, 1.0 / kernel.profile, 0.0)) if whitener is None else whitener[0],
-            )
+            own = where[members]
+            own = own[own >= 0]
+            if own.size:
+                whitener = self._whitener(place, steps, shares)
+                kernel = self._kernels[place]
+                yield own, None if whitener is None else whitener[0], np.where(kernel.there, 1.0 / kernel.profile, 0.0)
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, n, m), g, with this noise, from independent normal numbers; zero where a dwell is missing."""
@@ -221,35 +274,72 @@ class Covariance:
             out[members] = own * (self.level * noise.scale)[members, None, None]
         return out
 
-    def whitened(
-        self,
-        key: object,
-        columns: Array,
-        shares: Shares,
-        blocks: NDArray[np.intp] | None = None,
-        *,
-        distinct: int | None = None,
-    ) -> Array:
-        """The same, kept under a key for the next time.
+    def back(self, rows: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
+        """Rows (blocks, k, n) of whitened series of all or some blocks times the whiteners, for white noise of variance one."""
+        out = np.empty(rows.shape)
+        for own, whitener, white in self._by_whitener(shares, blocks):
+            if whitener is None:
+                out[own] = rows[own] * white
+                continue
+            few = max(_PIECE // max(rows[0].size, 1), 1)
+            for some in np.split(own, range(few, own.size, few)):
+                out[some] = applied_back(whitener, rows[some])
+        return out
+
+    def solved(
+        self, columns: Array, places: NDArray[np.intp], shares: Shares
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], Array]]:
+        """V⁻¹ times columns, for white noise of variance one: blocks that share a whitener, their columns, and rows (k, n).
 
         Parameters
         ----------
-        distinct : how many blocks, the first, have columns of their own, which the others repeat in turn; all where None
+        columns : (rows, n); places : (blocks, p), the columns of each block
         """
-        name = (key, shares)
-        white = self._kept.get(name)
-        if white is None:
-            white = self._repeated(columns, shares, distinct) if distinct and blocks is None else None
-            white = self.whiten(columns, shares, blocks) if white is None else white
-            if self.there.size > LARGE:
-                return white
-            self._kept[name] = white
-            self._used += white.size
-            while self._used > _COLUMNS and self._kept:
-                self._used -= self._kept.popitem(last=False)[1].size
+        for members, whitener, white in self._by_whitener(shares):
+            own = np.unique(places[members])
+            if whitener is None:
+                yield members, own, columns[own] * white**2
+            else:
+                yield members, own, applied_back(whitener, applied(whitener, columns[own]))
+
+    def precision(self, noise: Noise) -> Array:
+        """Diagonal of V⁻¹ of every block, (blocks, n), 1/g²; zero where a dwell is missing."""
+        out = np.empty(self.there.shape)
+        for members, whitener, white in self._by_whitener(noise.shares):
+            out[members] = white**2 if whitener is None else np.einsum("mn,mn->n", whitener, whitener)
+        return out / (self.level * noise.scale)[:, None] ** 2
+
+    def products(self, candidate: "Columns", shares: Shares) -> Array:
+        """Products cᵀV⁻¹c of columns with each other, for each value of their nonlinear parameters, (b, grid, p, p).
+
+        They depend on the columns and the shares alone, and are kept for the models that are tried at the same shares. Rows that
+        blocks share are whitened once.
+        """
+        name = (candidate.key, shares)
+        kept = None if candidate.key is None else self._kept.get(name)
+        if kept is None:
+            kept = self._products(candidate, shares)
+            if candidate.key is not None:
+                self._kept[name] = kept
+                self._used += kept.size
+                while self._used > _PRODUCTS and self._kept:
+                    self._used -= self._kept.popitem(last=False)[1].size
         else:
             self._kept.move_to_end(name)
-        return white
+        return kept
+
+    def _products(self, candidate: "Columns", shares: Shares) -> Array:
+        columns, blocks = candidate.columns, candidate.blocks
+        count, _, grid, p = columns.shape
+        level = self.level if blocks is None else self.level[blocks]
+        row_of = np.arange(count) if candidate.rows is None else candidate.rows
+        out = np.empty((level.size, grid, p, p))
+        for own, whitener, white in self._by_whitener(shares, blocks):
+            rows, back = np.unique(row_of[own], return_inverse=True)
+            few = max(_PIECE // columns[0].size, 1)
+            parts = np.split(rows, range(few, rows.size, few))
+            out[own] = np.concatenate([_squares(columns[some], whitener, white) for some in parts])[back]
+        return out / level[:, None, None, None] ** 2
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""

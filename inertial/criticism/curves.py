@@ -32,20 +32,20 @@ class CurveFit:
 def fit_curve(model: Model, driver: str, candidate: Candidate) -> CurveFit:
     """The best common curve of a driver added to a model, with the noise estimated again."""
     if candidate.shared:
-        fitted = model.with_shared_curves(candidate.columns[:, :, 0, :])
+        fitted = model.with_shared_curves(candidate.of_blocks[:, :, 0, :])
         return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
     noise, fitted, rank = model.noise, model, 0
     for _ in range(2):
         column, rank = _curve(model.at(noise), candidate)
         fitted = model.with_curves(column)
         noise = fitted.noise
-    shape = rank - candidate.columns.shape[0]
+    shape = rank - model.problem.blocks
     return CurveFit(driver, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
 
 
 def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
     """Column (blocks, n, 1) of the common curve that reduces the residual most, and its number of coefficients."""
-    whole = candidate.columns[:, :, 0, :]
+    whole = candidate.of_blocks[:, :, 0, :]
     white = space.whiten(whole)
     free = space.project(white)
     even = _evened(np.einsum("bnp,bnr->pr", free, free), np.sqrt(np.einsum("bnp,bnp->p", white, white)))

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 _KNOTS = 5
 _TIME_KNOTS = 8
+_DIGITS = 6
+"""Decimals to which logarithms of probabilities and shares are compared."""
+
 _CERTAIN = -600.0
 """Logarithm of a probability below which drivers are ranked by the share that they explain."""
 
@@ -121,9 +124,9 @@ def _pose_columns(state: State, most: int) -> Array:
 
 def _by_block(problem: Problem, columns: Array) -> Candidate:
     """Columns (units, n, d), the same for every axis, as a candidate."""
-    each = columns if problem.lot.radial else np.repeat(columns, 3, axis=0)
-    whole = np.broadcast_to(each, (problem.blocks, problem.n, columns.shape[-1]))
-    return Candidate(whole[:, :, None, :], shared=False)
+    axes = problem.blocks // len(problem.lot.state.time)
+    rows = np.arange(problem.blocks) // axes if len(columns) > 1 else np.zeros(problem.blocks, dtype=np.intp)
+    return Candidate(columns[:, :, None, :], shared=False, rows=rows)
 
 
 def _by_axis(problem: Problem, values: Array) -> Candidate:
@@ -150,7 +153,8 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
             misfits.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
-    return sorted(misfits, key=lambda p: (max(p.log_p, _CERTAIN), -p.share))
+    # two clocks of a run explain the same: their order is not that of rounding errors
+    return sorted(misfits, key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
 
 
 def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tuple[str, ...]:

@@ -119,36 +119,27 @@ def _by_dwell(model: Model) -> tuple[float | None, float | None, tuple[int, int]
     if not columns:
         return None, None, None
     space, axes = model.space, 1 if model.problem.lot.radial else 3
-    worst: tuple[float, float, tuple[int, int]] = (0.0, 0.0, (0, 0))
-    for block in range(space.local.shape[0]):
-        white, off, _ = _deleted(model, block)
-        local = space.local[block]
-        size = np.linalg.norm(local, axis=0)
-        size = np.where(size > 0.0, size, 1.0)
-        gain = (np.linalg.pinv(local / size, rcond=1e-5) / size[:, None]) @ white
-        moved = gain[columns] * off
-        count = max(int(np.count_nonzero(off)), 2)
-        spread = float(np.sqrt((count - 1.0) / count * np.sum(moved**2, axis=1)).max())
-        each = np.abs(moved).max(axis=0)
-        if spread > worst[0]:
-            worst = (spread, float(each.max()), (block // axes, int(np.argmax(each))))
-    return worst
+    size = np.sqrt(np.einsum("bnp,bnp->bp", space.local, space.local))
+    size = np.where(size > 0.0, size, 1.0)
+    inverse = (np.linalg.pinv(space.local / size[:, None], rcond=1e-5) / size[..., None])[:, columns]
+    off = _deleted(model)[0]
+    moved = space.backed(np.swapaxes(inverse, -1, -2)) * off[:, None]
+    count = np.maximum(np.count_nonzero(off, axis=1), 2)
+    spread = np.sqrt((count - 1.0) / count * np.sum(moved**2, axis=2).max(axis=1))
+    each = np.abs(moved).max(axis=1)
+    block = int(np.argmax(spread))
+    if spread[block] <= 0.0:
+        return 0.0, 0.0, (0, 0)
+    return float(spread[block]), float(each[block].max()), (block // axes, int(np.argmax(each[block])))
 
 
-def _deleted(model: Model, block: int) -> tuple[Array, Array, Array]:
-    """Of one block: the whitener (n, n), deviation of each dwell when it is deleted (n,), g, and that over its error (n,).
-
-    With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deviates by (Py)_i/P_ii, with variance 1/P_ii.
-    """
+def _deleted(model: Model) -> tuple[Array, Array]:
+    """Deviation of each dwell when it is deleted, (blocks, n), g, and that over its error."""
     space = model.space
-    eye = np.eye(space.local.shape[1])[None]
-    white = space.covariance.whiten(eye, space.noise.shares, np.array([block])) / space.noise.scale[block]
-    roots = space.project(white, np.array([block]))[0]
-    size = np.sum(roots**2, axis=0)
-    known = space.covariance.there[block] & (size > 1e-9 * size.max())
-    left = roots.T @ space.residual[block]
-    off = np.where(known, left / np.where(known, size, 1.0), 0.0)
-    return white[0], off, np.where(known, left / np.sqrt(np.where(known, size, 1.0)), 0.0)
+    left, size = space.deleted
+    known = space.covariance.there & (size > 1e-9 * size.max(axis=1, keepdims=True))
+    size = np.where(known, size, 1.0)
+    return np.where(known, left / size, 0.0), np.where(known, left / np.sqrt(size), 0.0)
 
 
 def _bias_columns(model: Model) -> list[int]:
@@ -166,7 +157,7 @@ def _largest(model: Model) -> tuple[float, int, int] | None:
     """The dwell that deviates most from its prediction by all others: externally studentised residual, unit, dwell."""
     space, axes = model.space, 1 if model.problem.lot.radial else 3
     blocks = space.local.shape[0]
-    each = np.stack([_deleted(model, block)[2] for block in range(blocks)])
+    each = _deleted(model)[1]
     squares = (each**2).reshape(blocks // axes, axes, -1).sum(axis=1)
     unit, dwell = np.unravel_index(int(np.argmax(squares)), squares.shape)
     rest = space.dof - axes
@@ -182,7 +173,7 @@ def _cubic(model: Model, field: Candidates) -> float | None:
         return None
     effect = catalogue.get("third_order")
     space, term = model.space, Term(effect)
-    columns = model.problem.candidate(effect, [dict(term.values)]).columns[:, :, 0, :]
+    columns = model.problem.candidate(effect, [dict(term.values)]).of_blocks[:, :, 0, :]
     after = space.project(space.whiten(columns))
     rank = int(space.gain(term.candidate(model.problem)).rank[0])
     left = space.dof - rank

@@ -134,7 +134,11 @@ def mended(run: ExaminedRun) -> EffectSearch:
         part = _part(fields, base)
         searched = search(part.field, part.base, stop=part.imitates)
         if searched.handling is None and part.field is not fields:
+            part.base.problem.forget()
+            part.base.forget()
             searched = replace(search(fields, base, stop=part.imitates, start=searched.added), ladder=searched.ladder)
+        if part.field is not fields:
+            base.forget()
         if searched.handling is None or len(run.handled) >= _MENDED:
             return EffectSearch(base, fields, part, searched)
         _mend(run, part.field, searched, searched.handling)
@@ -234,6 +238,7 @@ def _part(field: Candidates, base: Model) -> LotPart:
     pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
     slope = field.problem.slope
     problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])
+    problem.covariance.like(field.problem.covariance)
     terms = [t for t in base.terms if not isinstance(t.effect, Handling)]
     return LotPart(
         Candidates(problem, field.effects, [a for a in field.handling if a.fewest_units > 1]), Model(problem, terms)

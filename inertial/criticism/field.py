@@ -34,7 +34,7 @@ class Candidates:
         for effect in effects:
             try:
                 grid = grid_of(effect, problem.lot.state)
-                problem.columns(effect, grid[0])
+                problem.one.columns(effect, grid[0])
             except MissingInput as reason:
                 self.lacking[effect.id] = reason.quantity
                 continue

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from inertial.criticism import decisions
 from inertial.criticism.decisions import BLOCKS
@@ -18,11 +19,18 @@ from inertial.criticism.heldout import residuals
 from inertial.criticism.model import Model
 from inertial.criticism.noise import LONGEST
 from inertial.criticism.problem import Problem
+from inertial.criticism.space import orthonormal
 
 Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "blocks of time"]
 
 _POSES = 6
+
+_UNDETERMINED = 1e-7
+"""Smallest eigenvalue of P of the dwells left out, over the largest, at which the other dwells do not determine the model."""
+
+_SURELY = 1e-4
+"""Lower bound of the same ratio above which the eigenvalues of no block need be looked at."""
 
 
 @dataclass(frozen=True)
@@ -74,57 +82,59 @@ def _without_wander(model: Model) -> LeftOut:
 
 
 class _Parts:
-    """The matrix P of every block, and its change by columns that all blocks share."""
+    """The matrix P of every block, by the blocks that share a whitener, and its change by columns that all blocks share."""
 
     def __init__(self, model: Model) -> None:
         space = model.space
-        blocks, n = space.residual.shape
-        self.there, self.level = space.covariance.there, space.covariance.level * space.noise.scale
-        self.p, self.precision = np.empty((blocks, n, n)), np.empty((blocks, n))
-        for members, whitener in space.covariance.whiteners(space.noise.shares):
-            inverse = whitener.T @ whitener
-            for b in members.tolist():
-                along = space.q[b].T @ whitener
-                self.p[b] = (inverse - along.T @ along) / self.level[b] ** 2
-                self.precision[b] = np.diagonal(inverse) / self.level[b] ** 2
-        self.py = np.einsum("bij,bj->bi", self.p, model.problem.y)
+        self.blocks = space.targets.shape[0]
         z = model.shared
         size = np.sqrt(np.einsum("bnq,bnq->q", z, z))
-        z = z / np.where(size > 0.0, size, 1.0)
-        self.pz = np.einsum("bij,bjq->biq", self.p, z)
-        self.inner = np.einsum("bnq,bnr->qr", z, self.pz)
+        white = space.targets / np.concatenate([np.ones(1), np.where(size > 0.0, size, 1.0)])
+        rows = space.backed(white)
+        py, pz = rows[:, 0], np.swapaxes(rows[:, 1:], -1, -2)
+        self.inner = np.einsum("bnq,bnr->qr", white[..., 1:], white[..., 1:])
         if z.shape[-1]:
-            beta = np.linalg.lstsq(self.inner, np.einsum("bnq,bn->q", z, self.py), rcond=1e-10)[0]
-            self.py = self.py - self.pz @ beta
-        self.typical = [self._spread(b) for b in range(blocks)]
+            py = (
+                py
+                - pz
+                @ np.linalg.lstsq(self.inner, np.einsum("bnq,bn->q", white[..., 1:], white[..., 0]), rcond=1e-10)[0]
+            )
+        level = space.covariance.level * space.noise.scale
+        along = space.backed(space.q) * level[:, None, None]
+        self.groups = [
+            _Group(
+                members,
+                space.covariance.there[members[0]],
+                whitener,
+                along[members],
+                level[members],
+                py[members],
+                pz[members],
+                model.local[members],
+            )
+            for members, whitener in space.covariance.whiteners(space.noise.shares)
+        ]
 
     def predicted(self, out: NDArray[np.bool_]) -> tuple[Array, float] | None:
         """Deviations (blocks, k) of the dwells ``out`` (n,) from their prediction, and their log density; None if undefined."""
-        missed = np.full((len(self.p), int(out.sum())), np.nan)
+        missed = np.full((self.blocks, int(out.sum())), np.nan)
         density = 0.0
         inner = self.inner.copy()
         right = np.zeros(inner.shape[0])
-        held: list[tuple[int, NDArray[np.intp], Array, Array]] = []
-        for b, there in enumerate(self.there):
-            places = np.flatnonzero(out & there)
+        held: list[tuple[_Group, NDArray[np.intp], Array, Array]] = []
+        for group in self.groups:
+            places = np.flatnonzero(out & group.there)
             if not places.size:
                 continue
-            own = self.p[b][np.ix_(places, places)]
-            values, vectors = np.linalg.eigh(own * self.level[b] ** 2)
-            if values[0] <= 1e-7 * values[-1]:
+            own = group.left_out(places)
+            if own is None:
                 return None
-            inverse = (vectors / values) @ vectors.T * self.level[b] ** 2
-            if not self._known(b, places, inverse):
-                return None
-            off = inverse @ self.py[b, places]
-            density += 0.5 * float(np.sum(np.log(values / self.level[b] ** 2))) - 0.5 * places.size * np.log(
-                2.0 * np.pi
-            )
-            density -= 0.5 * float(self.py[b, places] @ off)
-            shared = self.pz[b, places]
-            inner -= shared.T @ inverse @ shared
-            right += shared.T @ off
-            held.append((b, places, inverse @ shared, off))
+            off, across, log_det = own
+            py, pz = group.py[:, places], group.pz[:, places]
+            density += 0.5 * log_det - 0.5 * off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * off))
+            inner -= np.einsum("bkq,bkr->qr", pz, across)
+            right += np.einsum("bkq,bk->q", pz, off)
+            held.append((group, places, across, off))
         turn = np.zeros(right.shape)
         if right.size:
             values = np.linalg.eigvalsh(inner)
@@ -134,23 +144,71 @@ class _Parts:
             density += 0.5 * float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(self.inner)[1])
             density -= 0.5 * float(right @ turn)
         where = np.cumsum(out) - 1
-        for b, places, across, off in held:
-            missed[b, where[places]] = off + across @ turn
+        for group, places, across, off in held:
+            missed[np.ix_(group.members, where[places])] = off + across @ turn
         return missed, density
 
-    def _known(self, block: int, places: NDArray[np.intp], inverse: Array) -> bool:
-        """Whether the other dwells determine the model at these dwells: not much worse than with wander alone."""
-        expected = np.sqrt(np.mean(np.diagonal(inverse)))
-        alone = np.sqrt(np.mean(1.0 / self.precision[block, places]))
-        wander = np.sqrt(self.typical[block])
-        return bool(expected < decisions.FOLD_BLIND * max(float(alone), float(wander)))
 
-    def _spread(self, block: int) -> float:
-        """Variance of what the model leaves of a block: nothing that it predicts should be much worse."""
-        there = self.there[block]
-        values = np.linalg.eigvalsh(self.p[block][np.ix_(there, there)])
-        seen = values[values > 1e-9 * values[-1]]
-        return float(np.mean(1.0 / seen))
+class _Group:
+    """P of blocks that share a whitener, in whose units P is S − AᵀA with S = V⁻¹ of all and the few rows A of each.
+
+    Parameters
+    ----------
+    there : (n,), dwells; whitener : (n, n)
+    along : (b, r, n), A; level : (b,), g; py : (b, n), pz : (b, n, q), P times the measurements and shared columns, 1/g
+    local : (b, n, p), columns with coefficients by block
+    """
+
+    def __init__(
+        self,
+        members: NDArray[np.intp],
+        there: NDArray[np.bool_],
+        whitener: Array,
+        along: Array,
+        level: Array,
+        py: Array,
+        pz: Array,
+        local: Array,
+    ) -> None:
+        self.members, self.there, self.along = members, there, along
+        self.level, self.py, self.pz = level, py, pz
+        self.inverse = whitener.T @ whitener
+        own = np.flatnonzero(there)
+        root = solve_triangular(whitener[np.ix_(own, own)], np.eye(own.size), lower=True)
+        # P⁺ = (I − UUᵀ)V(I − UUᵀ) with an orthonormal basis U of the columns
+        basis, rank = orthonormal(local[:, own])
+        inside = np.einsum("bnp,bnp->b", root.T @ basis, root.T @ basis)
+        self.typical = level**2 * (np.sum(root**2) - inside) / np.maximum(own.size - rank, 1)
+        """Variance of what the model leaves of each block, (b,): nothing that it predicts should be much worse."""
+
+    def left_out(self, places: NDArray[np.intp]) -> tuple[Array, Array, float] | None:
+        """(P_BB)⁻¹(Py)_B (b, k), (P_BB)⁻¹(Pz)_B (b, k, q) and the sum of log|P_BB|; None if the others determine too little.
+
+        (S − AᵀA)⁻¹ = S⁻¹ + S⁻¹Aᵀ(I − AS⁻¹Aᵀ)⁻¹AS⁻¹: one inverse for all blocks, and a small one for each.
+        """
+        whole = self.inverse[np.ix_(places, places)]
+        values, vectors = np.linalg.eigh(whole)
+        inverse = (vectors / values) @ vectors.T
+        rows = self.along[:, :, places]
+        turned = rows @ inverse
+        small = np.eye(rows.shape[1]) - turned @ np.swapaxes(rows, -1, -2)
+        remains, directions = np.linalg.eigh(small)
+        least = remains.min(initial=1.0)
+        if least * values[0] <= _SURELY * values[-1]:
+            exact = np.linalg.eigvalsh(whole - np.swapaxes(rows, -1, -2) @ rows)
+            if bool(np.any(exact[:, 0] <= _UNDETERMINED * exact[:, -1])):
+                return None
+        half = np.swapaxes(directions, -1, -2) @ turned / np.sqrt(remains)[..., None]
+        expected = (np.trace(inverse) + np.einsum("brk,brk->b", half, half)) * self.level**2 / places.size
+        alone = np.mean(1.0 / np.diagonal(whole)) * self.level**2
+        if not bool(np.all(expected < decisions.FOLD_BLIND**2 * np.maximum(alone, self.typical))):
+            return None
+        right = np.concatenate([self.py[:, places, None], self.pz[:, places]], axis=-1)
+        solved = inverse @ right + np.swapaxes(half, -1, -2) @ (half @ right)
+        solved *= self.level[:, None, None] ** 2
+        log_det = float(np.sum(np.log(remains)) + len(rows) * np.sum(np.log(values)))
+        log_det -= 2.0 * places.size * float(np.sum(np.log(self.level)))
+        return solved[..., 0], solved[..., 1:], log_det
 
 
 def _folds(problem: Problem) -> dict[Kind, NDArray[np.intp]]:

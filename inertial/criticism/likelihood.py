@@ -166,7 +166,7 @@ def along_mean(model: Model, noise: Noise, term: Term) -> float:
     if term.shared:
         return 1.0
     space = model.at(noise)
-    columns = space.project(space.whiten(term.candidate(model.problem).columns[:, :, 0, :]))
+    columns = space.project(space.whiten(term.candidate(model.problem).of_blocks[:, :, 0, :]))
     size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
     unit = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
     inverse = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=1e-4, hermitian=True)

@@ -10,10 +10,10 @@ from inertial.criticism import variance
 from inertial.criticism.covariance import LARGE
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.problem import Problem
+from inertial.criticism.share_statistics import ShareStatistics
 from inertial.criticism.shares import best_shares, plausible_shares
 from inertial.criticism.space import Candidate, Space
 from inertial.criticism.term import Term
-from inertial.criticism.whitened_columns import WhitenedColumns
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class Model:
     ----------
     near : noise at which the search for this model's noise starts
     curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, sized by block or for all blocks
-    simpler : the model without the last term, whose whitened columns serve this one, too; None where there is none
+    simpler : the model without the last term or without the curves, whose products serve this one, too; None where there is none
     """
 
     def __init__(
@@ -58,8 +58,10 @@ class Model:
     ) -> None:
         self.problem, self.terms, self._near = problem, tuple(terms), near
         self._curves, self._shared_curves = curves, shared_curves
-        self._simpler = simpler
+        self._simpler, self._noises = simpler, dict[tuple[object, ...], Noise]()
+        self._added = None if simpler is None or len(simpler.terms) == len(self.terms) else self.terms[-1]
         self._spaces: dict[Shares, Space] = {}
+        self._last: Space | None = None
         self._richer: dict[tuple[object, ...], Model] = {}
 
     @cached_property
@@ -95,14 +97,37 @@ class Model:
         return self.problem.start(term.effect, term.keywords)
 
     def at(self, noise: Noise) -> Space:
-        """The residuals of the model, whitened for a noise."""
+        """The residuals of the model, whitened for a noise; those for its own noise and for the last other one are kept."""
+        if noise is self.__dict__.get("noise"):
+            return self.space
+        if self._last is None or self._last.noise is not noise:
+            self._last = self._space(noise)
+        return self._last
+
+    def _space(self, noise: Noise) -> Space:
         return Space(self.problem.covariance, noise, self.problem.y, self.local, self.shared)
 
     @cached_property
     def noise(self) -> Noise:
         """Shares of wander by restricted likelihood, pooled over the blocks, and variances of the blocks."""
-        near = None if self._near is None else self._near.shares
-        return self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
+        # a model with one more term is made again, where it is too large to be kept: its noise is not
+        noises = {} if self._simpler is None else self._simpler._noises  # noqa: SLF001  # of its own kind
+        known = None if self._added is None else noises.get(self._added.key)
+        if known is None:
+            near = None if self._near is None else self._near.shares
+            known = self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
+            self._spaces.clear()
+            if self._added is not None:
+                noises[self._added.key] = known
+        return known
+
+    def forget(self) -> None:
+        """Drop what is kept for models that follow: of a large lot it takes much memory."""
+        self._richer.clear()
+        self._spaces.clear()
+        self._last = None
+        for name in ("space", "statistics", "_even"):
+            self.__dict__.pop(name, None)
 
     def plausible_shares(self) -> list[tuple[Shares, float]]:
         """Shares that the residuals do not rule out, with weights that add up to one."""
@@ -124,7 +149,7 @@ class Model:
         lot = self.problem.lot
         if not (lot.radial and lot.recorded):
             return np.zeros(self.problem.blocks)
-        space = self.at(self.problem.covariance.white_noise())
+        space = self._space(self.problem.covariance.white_noise())
         scatter = space.squares / np.maximum(space.by_block, 1.0)
         return _SHARE_OF_WHITE * np.minimum(scatter, 1.0)
 
@@ -137,24 +162,24 @@ class Model:
             most = max(2 if self.problem.y.size <= LARGE else 1, _SPACES // max(self.local.size, 1))
             while len(self._spaces) >= most:  # the oldest first: a search for shares seldom goes back
                 del self._spaces[next(iter(self._spaces))]
-            self._spaces[shares] = self.at(Noise(shares, scale))
+            self._spaces[shares] = self._space(Noise(shares, scale))
         return self._spaces[shares]
 
     @cached_property
     def _own_scale(self) -> Array:
         """Standard deviations of the blocks under white noise: weights for columns that all share."""
-        space = self.at(self.problem.covariance.white_noise())
+        space = self._space(self.problem.covariance.white_noise())
         return np.sqrt(variance.moderated(space.squares, space.by_block)[0])
 
     def _restricted(self, shares: Shares) -> float:
         """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
-        quick = None if self.shared.shape[-1] else self.own_columns.at_once(shares)
+        quick = None if self.shared.shape[-1] else self.statistics.at(shares)
         if quick is None:
             space = self._rough(shares)
             information, squares, dof = space.information, space.squares, space.by_block
         else:
             information, squares = quick
-            dof = self.problem.covariance.count - float(self.own_columns.rank)
+            dof = self.problem.covariance.count - float(self.statistics.rank)
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
         if self._least.any():
             known = dof > 0
@@ -167,18 +192,20 @@ class Model:
         return logdet + information + float(np.sum(own))
 
     @cached_property
-    def own_columns(self) -> WhitenedColumns:
-        """The columns with coefficients by block, and the measurements behind them, at any shares."""
+    def statistics(self) -> ShareStatistics:
+        """Products of the columns with coefficients by block, and of the measurements, at any shares."""
         further = None
-        if self._simpler is not None and not self.terms[-1].shared:
-            further = np.concatenate([self._of(self.terms[-1]), self._start(self.terms[-1])], axis=-1)
-        before = None if self._simpler is None or further is None else self._simpler.own_columns
-        return WhitenedColumns(self.problem, self.local, before, further)
+        if self._added is not None and not self._added.shared:
+            further = self._added.with_start(self.problem)
+        elif self._simpler is not None and self._added is None and self._curves is not None:
+            further = Candidate(self._curves[:, :, None], shared=False)
+        before = None if self._simpler is None or further is None else self._simpler.statistics
+        return ShareStatistics(self.problem, self.local, before, further)
 
     @cached_property
     def space(self) -> Space:
         """The residuals of the model, whitened for its own noise."""
-        return self.at(self.noise)
+        return self._space(self.noise)
 
     def floor(self) -> float:
         """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
@@ -214,6 +241,8 @@ class Model:
         """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""
         covariance = self.problem.covariance
         gain = self._even.gain(candidate)
+        if self.problem.y.size > LARGE:
+            del self._even
         beyond = float(gain.drop[0]) * covariance.white - floor**2 * float(gain.rank[0])
         return float(np.sqrt(max(beyond, 0.0) / self.problem.count))
 
@@ -221,7 +250,7 @@ class Model:
     def _even(self) -> Space:
         """The space in which all blocks have equal weight: of the lot's white noise."""
         covariance = self.problem.covariance
-        return self.at(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))
+        return self._space(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))
 
     def _variant(
         self,
@@ -242,7 +271,7 @@ class Model:
 
     def with_term(self, term: Term) -> "Model":
         """The model with one more term; the last few are kept, as a term is fitted, judged and sized one after the other."""
-        key = (term.effect.id, term.values, term.first, term.rest)
+        key = term.key
         richer = self._richer.get(key)
         if richer is None:
             richer = self._variant([*self.terms, term], simpler=self)
@@ -254,7 +283,7 @@ class Model:
 
     def with_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, sized by block."""
-        return self._variant(self.terms, curves=columns)
+        return self._variant(self.terms, curves=columns, simpler=self if self._curves is None else None)
 
     def with_shared_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, whose coefficients all blocks share."""

@@ -1,13 +1,14 @@
 """A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.covariance import LARGE, Covariance
+from inertial.criticism.covariance import Covariance
 from inertial.criticism.handling.base import Handling, by_block
 from inertial.criticism.lot import Lot
 from inertial.criticism.space import Candidate
@@ -22,10 +23,16 @@ SHARED = ("station", "data")
 _PIECE = 1_000_000
 """Number of columns processed at a time."""
 
+_MOST = 40
+"""Values of a grid at a time, where blocks have equal columns."""
+
+_PART = 4
+"""Part of the room, one over this, that the columns of one effect may take."""
+
 _WIDEST = 3
 """Usual largest number of columns of an effect per axis."""
 
-_CACHE = 8_000_000
+_CACHE = 5_000_000
 """Number of columns stored between passes; more are computed again, to limit the memory for large lots."""
 
 
@@ -55,8 +62,7 @@ class Problem:
         self.y = self._series()
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
-        # a model's own columns are stored, whatever the size of the lot
-        self._room = _CACHE if self.y.size <= LARGE else _CACHE // 4
+        self._room = _CACHE
 
     @property
     def series(self) -> Array:
@@ -68,6 +74,14 @@ class Problem:
         """The covariances of the blocks, at any noise."""
         time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
         return Covariance(time, self.error, self._direction if self.lot.radial else None)
+
+    def forget(self) -> None:
+        """Drop the columns and products that are kept: they are made again where they are needed."""
+        self._kept.clear()
+        self._terms.clear()
+        self._room = _CACHE
+        self.covariance.forget()
+        self.lot.state.memory.clear()
 
     def _series(self) -> Array:
         """Measurements (blocks, n), g: outputs, or the norm of the corrected output less 1 g."""
@@ -85,6 +99,11 @@ class Problem:
     @cached_property
     def _direction(self) -> Array:
         return self.lot.state.force / np.linalg.norm(self.lot.state.force, axis=-1, keepdims=True)
+
+    @cached_property
+    def one(self) -> "Problem":
+        """The first unit."""
+        return Problem(self.lot.units([0]))
 
     @property
     def count(self) -> int:
@@ -145,30 +164,96 @@ class Problem:
             return np.einsum("uni,uinq->unq", self._direction, seen)
         return seen.reshape(self.blocks, self.n, -1)
 
-    def candidate(self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None) -> Candidate:
-        """Columns of an effect over values of its nonlinear parameters; ``first`` keeps only so many columns an axis."""
+    def candidate(
+        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, of: int = 1
+    ) -> Candidate:
+        """Columns of an effect over values of its nonlinear parameters.
+
+        Parameters
+        ----------
+        first : how many columns an axis; all if None
+        of : number of values of the whole grid, of which these are a part
+        """
         key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
         kept = self._kept.get(key)
         if kept is None:
-            stacked = np.stack([self._columns(effect, values) for values in grid], axis=2)
-            stacked = stacked if first is None else np.ascontiguousarray(stacked[..., :first])
-            shared = effect.scope in SHARED
-            distinct = None if shared else self._distinct(stacked)
-            kept = Candidate(stacked, shared, key=key if len(grid) > 1 or not grid[0] else None, distinct=distinct)
-            if stacked.size < self._room:
-                self._room -= stacked.size
+            kept = self._made(effect, grid, first, key)
+            # columns of many values, which differ from block to block, are made again: they would take the room of all others
+            if kept.columns.size / len(grid) * max(of, len(grid)) < self._room / (_PART if len(grid) < of else 1):
+                self._room -= kept.columns.size
                 self._kept[key] = kept
         return kept
 
-    def _distinct(self, columns: Array) -> int | None:
-        """How many blocks, the first, columns (blocks, ...) are repeated from: one, or one per axis; None where they are not."""
-        for count in (1, 3):
-            if not self.blocks % count and self.blocks > count:
-                many = columns.reshape(-1, count, *columns.shape[1:])
-                # most candidates differ in a few values already
-                if np.array_equal(many[-1, :, -1], many[0, :, -1]) and bool(np.all(many == many[:1])):
-                    return count
-        return None
+    @property
+    def at_a_time(self) -> int:
+        """Values of an effect's parameters whose columns are worked on together: few of a large lot, to limit the memory."""
+        return max(1, _PIECE // (1 + self.blocks * self.n * _WIDEST))
+
+    def varied(
+        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, start: bool = False
+    ) -> Candidate:
+        """The same for values that are tried once: nothing of them is kept.
+
+        Parameters
+        ----------
+        start : whether columns of the unknown state of a memory follow
+        """
+        return self._made(effect, grid, first, None, start=start)
+
+    def _made(
+        self,
+        effect: AnyEffect | Handling,
+        grid: Sequence[Values],
+        first: int | None,
+        key: object,
+        *,
+        start: bool = False,
+    ) -> Candidate:
+        """Columns over values, those of one value after another: rows that blocks share are stored once."""
+        shared = effect.scope in SHARED
+        every: list[Array] = []
+        rows_of: list[NDArray[np.intp] | None] = []
+        for values in grid:
+            known = self._terms.get((effect.id, *values.items()))
+            own = (self._columns(effect, values) if known is None else known)[..., :first]
+            if start:
+                own = np.concatenate([own, self.start(effect, values)], axis=-1)
+            rows = None if shared else self.rows_of(own)
+            every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
+            rows_of.append(rows)
+        rows = self._finest(rows_of)
+        count = self.blocks if rows is None else int(rows.max()) + 1
+        columns = np.empty((count, len(grid), every[0].shape[-1], self.n))
+        for place, (own, of_own) in enumerate(zip(every, rows_of, strict=True)):
+            if len(own) < count and of_own is not None:
+                own = own[of_own if rows is None else of_own[np.unique(rows, return_index=True)[1]]]  # noqa: PLW2901
+            columns[:, place] = np.swapaxes(own, -1, -2)
+        return Candidate(columns.transpose(0, 3, 1, 2), shared, rows=rows, key=key)
+
+    def _finest(self, rows_of: Sequence[NDArray[np.intp] | None]) -> NDArray[np.intp] | None:
+        """The rows of blocks for the columns of several values: where they differ at one, they differ."""
+        known = [rows for rows in rows_of if rows is not None]
+        if len(known) < len(rows_of):
+            return None
+        finest = max(known, key=lambda rows: int(rows.max()))
+        by_unit = self.blocks > 3 and not self.lot.radial and any(rows[0] != rows[3] for rows in known)
+        by_axis = not self.lot.radial and any(rows[0] != rows[1] for rows in known)
+        return None if by_unit and by_axis else finest
+
+    def rows_of(self, columns: Array) -> NDArray[np.intp] | None:
+        """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None."""
+        if self.lot.radial:
+            return np.zeros(self.blocks, dtype=np.intp) if np.all(columns == columns[:1]) else None
+        by_unit = columns.reshape(-1, 3, *columns.shape[1:])
+        # most candidates differ in a few values already
+        axes = np.array_equal(by_unit[-1, 0, -1], by_unit[-1, 2, -1]) and bool(np.all(by_unit == by_unit[:, :1]))
+        units = len(by_unit) > 1 and np.array_equal(by_unit[-1, :, -1], by_unit[0, :, -1])
+        units = units and bool(np.all(by_unit == by_unit[:1]))
+        if not axes and not units:
+            return None
+        place = np.arange(self.blocks)
+        unit, axis = (0 if units else place // 3), (0 if axes else place % 3)
+        return unit * (1 if axes else 3) + axis + np.zeros(self.blocks, dtype=np.intp)
 
     def pieces(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
@@ -177,32 +262,68 @@ class Problem:
         if isinstance(effect, Handling):
             yield from self._places(effect, grid)
             return
-        width = 1 + self.blocks * self.n * _WIDEST
-        size = max(1, _PIECE // width)
-        for start in range(0, len(grid), size):
-            yield self.candidate(effect, grid[start : start + size], first=first)
+        size, begin = self.at_a_time, 0
+        while begin < len(grid):
+            made = self.candidate(effect, grid[begin : begin + size], first=first, of=len(grid))
+            yield made
+            begin += size
+            if made.rows is not None:
+                size = max(1, min(_MOST, _PIECE // made.columns[:, :, 0].size))
 
     def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
-        """The places of an alternative, those of one unit together, no more at a time than a piece has room for."""
-        units = self.lot.state.time.shape[0]
-        for unit, places in groupby(grid, key=lambda values: values.get("unit")):
-            every = list(places)
-            size = max(1, _PIECE // (self.blocks * self.n * _WIDEST)) if unit is None else len(every)
-            for start in range(0, len(every), size):
-                each = every[start : start + size]
-                key = (effect.id, unit, len(each), *each[0].items(), *each[-1].items())
-                kept = self._kept.get(key)
-                if kept is None:
-                    changes = [effect.change(self.lot, self.slope, **on_axis(p, 0)) for p in each]
-                    blocks = None
-                    if unit is None:
-                        changes = [np.broadcast_to(f, (units, *f.shape[1:])) for f in changes]
-                    else:
-                        blocks = 3 * int(on_axis({"unit": unit}, 0)["unit"]) + np.arange(3)
-                    kept = Candidate(
-                        np.stack([by_block(f) for f in changes], axis=2), shared=True, blocks=blocks, key=key
-                    )
-                    if kept.columns.size < self._room:
-                        self._room -= kept.columns.size
-                        self._kept[key] = kept
-                yield kept
+        """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""
+        if grid and "unit" not in grid[0]:
+            alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
+            size = max(1, _PIECE // ((3 if alike else self.blocks) * self.n * _WIDEST))
+            for start in range(0, len(grid), size):
+                yield self._together(effect, grid[start : start + size])
+            return
+        by_unit = [list(places) for _, places in groupby(grid, key=lambda values: values["unit"])]
+        for places, alike in groupby(by_unit, key=_without_unit):
+            units = np.array([int(on_axis({"unit": own[0]["unit"]}, 0)["unit"]) for own in alike])
+            size = max(1, _PIECE // (3 * self.n * _WIDEST * len(places)))
+            yield from self._of_units(effect, units, [dict(place) for place in places], size)
+
+    def _of_units(
+        self, effect: Handling, units: NDArray[np.intp], places: Sequence[Values], size: int
+    ) -> Iterator[Candidate]:
+        """The places of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
+        key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
+        kept = self._kept.get(key)
+        if kept is None:
+            columns = np.stack([effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0)) for p in places], axis=3)
+            few, n, _, g, k = columns.shape
+            kept = Candidate(np.swapaxes(columns, 1, 2).reshape(3 * few, n, g, k), shared=True, units=units, key=key)
+            if few == 1:
+                kept = replace(kept, rows=np.tile(np.arange(3), units.size))
+            if kept.columns.size < self._room:
+                self._room -= kept.columns.size
+                self._kept[key] = kept
+        if kept.rows is not None:
+            yield kept
+            return
+        for start in range(0, units.size, size):
+            some = units[start : start + size]
+            blocks = (3 * some[:, None] + np.arange(3)).reshape(-1)
+            yield replace(kept, columns=kept.columns[blocks], units=some, key=(*key, start, size))
+
+    def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
+        """An alternative of the whole lot at some places."""
+        key = (effect.id, len(places), *places[0].items(), *places[-1].items())
+        kept = self._kept.get(key)
+        if kept is None:
+            changes = [effect.change(self.lot, self.slope, **on_axis(place, 0)) for place in places]
+            units = self.lot.state.time.shape[0]
+            rows = np.tile(np.arange(3), units) if all(len(f) == 1 for f in changes) else None
+            if rows is None:
+                changes = [np.broadcast_to(f, (units, *f.shape[1:])) for f in changes]
+            kept = Candidate(np.stack([by_block(f) for f in changes], axis=2), shared=True, rows=rows, key=key)
+            if kept.columns.size < self._room:
+                self._room -= kept.columns.size
+                self._kept[key] = kept
+        return kept
+
+
+def _without_unit(places: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
+    """Places of one unit as a key, without the unit."""
+    return tuple(tuple((name, value) for name, value in place.items() if name != "unit") for place in places)

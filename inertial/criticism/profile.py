@@ -16,12 +16,14 @@ from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise
 from inertial.criticism.problem import Values
 from inertial.criticism.refinement import around, cell, on_scale
-from inertial.criticism.space import Candidate
+from inertial.criticism.space import Candidate, eigen, times_rows
 from inertial.criticism.term import Term
 from inertial.design import grid_of
 from inertial.effects.base import Nonlinear
 
 Array = NDArray[np.float64]
+
+Place = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 _JITTER = 1e-8
 """Part of a column, squared, below which a direction is rounding error, as in the fits."""
@@ -48,6 +50,7 @@ class LikelihoodProfile:
         shared = self.space.targets[..., 1:]
         size = np.sqrt(np.einsum("bnq,bnq->q", shared, shared))
         self.shared = shared / np.where(size > 0.0, size, 1.0)
+        self._known: dict[Term, dict[Place, tuple[Array, Array | None]]] = {}
 
     @cached_property
     def whole(self) -> Array:
@@ -109,31 +112,55 @@ class LikelihoodProfile:
         return best, least
 
     def _over(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
-        """Remaining sums of squares (g, r) at each set of values; by sensor axis (3, g, r) if blocks have own coefficients."""
-        columns = np.stack([self._columns(wrong, values) for values in grid], axis=2)
-        white = Candidate(columns, wrong.shared).whitened(self.problem.covariance, self.noise)
-        blocks, n, g, p = white.shape
-        size = np.sqrt(np.einsum("bngp,bngp->bgp", white, white))
-        left = self.space.project(white.reshape(blocks, n, g * p)).reshape(blocks, n, g, p)
-        if wrong.shared:
-            size = np.sqrt(np.sum(size**2, axis=0))
-            left = left / np.where(size > 0.0, size, 1.0)
-            flat = self.targets.reshape(blocks * n, -1)
-            shared = self.shared.reshape(blocks * n, -1)
-            squares = [
-                _after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
-            ]
-            return np.array(squares), None
-        left = left / np.where(size > 0.0, size, 1.0)[:, None]
-        return self._local(left)
+        """Remaining sums of squares (g, r) at each set of values; by sensor axis (3, g, r) if blocks have own coefficients.
 
-    def _local(self, left: Array) -> tuple[Array, Array | None]:
-        """The same for columns (blocks, n, g, p) with coefficients by block."""
-        both = np.concatenate([self.targets, self.shared], axis=-1)
+        What is left at a set of values is kept: truths and axes are often best at the same values, and a round begins where the
+        one before it ended.
+        """
+        known = self._known.setdefault(wrong, {})
+        names = [tuple(values.items()) for values in grid]
+        new = [name for name in dict.fromkeys(names) if name not in known]
+        if new:
+            total, axes = self._at(wrong, [dict(name) for name in new])
+            known.update({name: (total[k], None if axes is None else axes[:, k]) for k, name in enumerate(new)})
+        by_axis = [own for name in names if (own := known[name][1]) is not None]
+        return np.stack([known[name][0] for name in names]), np.stack(by_axis, axis=1) if by_axis else None
+
+    def _at(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
+        """The same, computed."""
+        candidate = self.problem.varied(wrong.effect, grid, first=wrong.first, start=True)
+        if not wrong.shared:
+            return self._local(candidate)
+        columns = candidate.of_blocks
+        blocks, n, g, p = columns.shape
+        white = self.space.whiten(columns.reshape(blocks, n, g * p))
+        size = np.sqrt(np.einsum("bnm,bnm->m", white, white)).reshape(g, p)
+        left = self.space.project(white).reshape(blocks, n, g, p) / np.where(size > 0.0, size, 1.0)
+        flat = self.targets.reshape(blocks * n, -1)
+        shared = self.shared.reshape(blocks * n, -1)
+        squares = [
+            _after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
+        ]
+        return np.array(squares), None
+
+    @cached_property
+    def _both(self) -> Array:
+        """The truths and the columns that all blocks share, (blocks, n, r + q)."""
+        return np.concatenate([self.targets, self.shared], axis=-1)
+
+    @cached_property
+    def _rows(self) -> Array:
+        return self.space.backed(self._both)
+
+    def _local(self, candidate: Candidate) -> tuple[Array, Array | None]:
+        """The same for columns with coefficients by block."""
+        both = self._both
         r = self.targets.shape[-1]
-        gram = np.einsum("bngp,bngs->bgps", left, left, optimize=True)
-        inside = np.einsum("bngp,bnt->bgpt", left, both, optimize=True)
-        values, vectors = np.linalg.eigh(gram)
+        found = self.space.products(candidate)
+        size = np.sqrt(np.where(found.squares > 0.0, found.squares, 1.0))
+        gram = found.left / (size[..., :, None] * size[..., None, :])
+        inside = times_rows(self._rows, candidate) / size[..., None]
+        values, vectors = eigen(gram)
         scale = np.where(values > _JITTER, 1.0 / np.sqrt(np.where(values > _JITTER, values, 1.0)), 0.0)
         along = np.einsum("bgps,bgpt->bgst", vectors, inside, optimize=True) * scale[..., None]
         if not self.shared.shape[-1]:
@@ -146,11 +173,6 @@ class LikelihoodProfile:
         inner = np.linalg.pinv(whole[:, r:, r:], rcond=_JITTER, hermitian=True)
         taken = np.einsum("gtq,gqs,gts->gt", whole[:, :r, r:], inner, whole[:, :r, r:], optimize=True)
         return np.maximum(np.einsum("gtt->gt", whole[:, :r, :r]) - taken, 0.0), None
-
-    def _columns(self, wrong: Term, values: Values) -> Array:
-        """Columns of an effect and of the unknown state of its memory, (blocks, n, p)."""
-        own = self.problem.columns(wrong.effect, values)[..., : wrong.first]
-        return np.concatenate([own, self.problem.start(wrong.effect, values)], axis=-1)
 
 
 def _value(values: Values, parameter: Nonlinear, axis: int | None) -> float:

@@ -132,6 +132,8 @@ class Split:
 
 _LEAST = 6  # dwells on either side of a split: a response and a bias need four
 _BETTER = 0.05  # largest ratio of the squares of two fits to those of one
+_FAR = 4.0  # multiple of that ratio above which rounding cannot hide a split
+_FIXED = 1e-9  # eigenvalue of the products, over the largest, below which poses do not fix a direction
 
 
 def find_split(force: Array, output: Array) -> Split | None:
@@ -146,6 +148,8 @@ def find_split(force: Array, output: Array) -> Split | None:
     f, y = force[there], output[there]
     whole = _plain_fit(f, y)[1]
     places = np.arange(_LEAST, there.size - _LEAST)
+    if _far_from_split(f, y, places):
+        return None
     coarse = places[:: max(1, places.size // 24)]
     errors = [_plain_fit(f[:p], y[:p])[1] + _plain_fit(f[p:], y[p:])[1] for p in coarse]
     centre = int(coarse[int(np.argmin(errors))])
@@ -155,6 +159,22 @@ def find_split(force: Array, output: Array) -> Split | None:
     before, after = _plain_fit(f[:best], y[:best])[0], _plain_fit(f[best:], y[best:])[0]
     apart = float(np.max(np.abs(after - before))) > 0.01 * float(np.sqrt(np.sum(before[1:] ** 2) / 3.0))
     return Split(int(there[best]), before, after) if min(errors) < _BETTER * whole and apart else None
+
+
+def _far_from_split(force: Array, output: Array, places: NDArray[np.intp]) -> bool:
+    """Whether no place comes near to what a split needs, by the products of all dwells up to each place."""
+    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+    left = output - x @ np.linalg.lstsq(x, output, rcond=1e-9)[0]
+    both = np.concatenate([x, left], axis=-1)
+    before = np.cumsum(both[:, :, None] * both[:, None, :], axis=0)
+    squares = np.zeros(len(places))
+    for gram in (before[places - 1], before[-1] - before[places - 1]):
+        values, vectors = np.linalg.eigh(gram[:, :4, :4])
+        along = np.swapaxes(vectors, -1, -2) @ gram[:, :4, 4:]
+        known = values > _FIXED * values[:, -1:]
+        taken = np.sum(along**2, axis=2) / np.where(known, values, np.inf)
+        squares += np.einsum("kjj->k", gram[:, 4:, 4:]) - taken.sum(axis=1)
+    return bool(squares.min() > _FAR * _BETTER * np.sum(left**2))
 
 
 def _plain_fit(force: Array, output: Array) -> tuple[Array, float]:

@@ -10,8 +10,8 @@ from inertial.criticism import decisions
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise
-from inertial.criticism.problem import Problem
-from inertial.criticism.space import Candidate, Space
+from inertial.criticism.problem import Problem, Values
+from inertial.criticism.space import Gain, Space
 from inertial.criticism.term import Term
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, Nonlinear
@@ -46,7 +46,7 @@ def _placed(space: Space, problem: Problem, term: Term) -> Term:
     if len(near) < 2:
         return term
     pieces = list(problem.pieces(term.effect, near))
-    drop = np.concatenate([space.gain(Candidate(p.columns, p.shared, p.blocks)).drop for p in pieces])
+    drop = np.concatenate([space.gain(replace(p, key=None)).drop for p in pieces])
     return Term(term.effect, tuple(near[int(np.argmax(drop))].items()))
 
 
@@ -55,30 +55,28 @@ def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear
     centre, width = on_scale(parameter, float(np.mean(term.keywords[parameter.name]))), cell(parameter)
     for _ in range(3):
         values = around(parameter, centre, width)
-        gain = space.gain(_varied(problem, term, parameter, values))
+        gain = _varied(space, problem, term, parameter, values)
         centre, width = on_scale(parameter, float(values[int(np.argmax(gain.drop))])), 0.4 * width
     return _with_value(term, parameter, float(_off_scale(parameter, centre)))
 
 
 def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
     """The same for every axis by itself, if the axes differ by more than noise."""
-    common = float(space.gain(term.candidate(problem)).drop[0])
-    best: list[float] = []
-    total = 0.0
-    for axis in range(3):
-        values = parameter.grid()
-        width, taken = cell(parameter), 0.0
-        value = float(values[0])
-        for _ in range(4):
-            by_axis = space.gain(_varied(problem, term, parameter, values)).by_block[axis::3].sum(axis=0)
-            value = float(values[int(np.argmax(by_axis))])
-            taken = float(by_axis.max())
-            values, width = around(parameter, on_scale(parameter, value), width), 0.4 * width
-        best.append(value)
-        total += taken
-    if total - common < decisions.AXES_DIFFER * space.variance:
+    common = float(_gain(space, problem, term, [term.keywords]).drop[0])
+    values = np.repeat(parameter.grid()[:, None], 3, axis=1)
+    width, best, taken = cell(parameter), values[0], np.zeros(3)
+    for _ in range(4):
+        # a value of its own for each axis: one pass over the columns serves the three
+        sets = [{**term.keywords, parameter.name: tuple(each)} for each in values.tolist()]
+        by_block = _gain(space, problem, term, sets).by_block
+        by_axis = by_block.reshape(-1, 3, len(values)).sum(axis=0)
+        place = np.argmax(by_axis, axis=1)
+        best, taken = values[place, range(3)], by_axis[range(3), place]
+        values = np.stack([around(parameter, on_scale(parameter, float(v)), width) for v in best], axis=1)
+        width *= 0.4
+    if float(taken.sum()) - common < decisions.AXES_DIFFER * space.variance:
         return term
-    return _with_value(term, parameter, tuple(best))
+    return _with_value(term, parameter, tuple(best.tolist()))
 
 
 def on_scale(parameter: Nonlinear, value: float) -> float:
@@ -104,13 +102,17 @@ def around(parameter: Nonlinear, centre: float, width: float) -> Array:
     return np.array([_off_scale(parameter, float(p)) for p in points])
 
 
-def _varied(problem: Problem, term: Term, parameter: Nonlinear, values: Array) -> Candidate:
-    """A term's columns at several values of one parameter, with those of an unknown state of its memory."""
-    sets = [{**term.keywords, parameter.name: float(v)} for v in values]
-    columns = np.stack([problem.columns(term.effect, s) for s in sets], axis=2)[..., : term.first]
-    if not term.rest and term.memory:
-        columns = np.concatenate([columns, np.stack([problem.start(term.effect, s) for s in sets], axis=2)], axis=-1)
-    return Candidate(columns, term.shared)
+def _varied(space: Space, problem: Problem, term: Term, parameter: Nonlinear, values: Array) -> Gain:
+    """The gain of a term at several values of one parameter."""
+    return _gain(space, problem, term, [{**term.keywords, parameter.name: float(v)} for v in values])
+
+
+def _gain(space: Space, problem: Problem, term: Term, sets: Sequence[Values]) -> Gain:
+    """The gain of a term at several sets of values, with the unknown state of its memory; of a large lot not many at a time."""
+    size, start = problem.at_a_time, term.memory and not term.rest
+    parts = [sets[first : first + size] for first in range(0, len(sets), size)]
+    made = (problem.varied(term.effect, part, first=term.first, start=start) for part in parts)
+    return Gain.joined([space.gain(one) for one in made])
 
 
 def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:
@@ -180,7 +182,7 @@ def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -
 
     def drop(places: Array) -> Array:
         values = np.array([_off_scale(parameter, float(v)) for v in places])
-        return space.gain(_varied(problem, term, parameter, values)).drop
+        return _varied(space, problem, term, parameter, values).drop
 
     first = drop(coarse)
     centre, cell_ = coarse[int(np.argmax(first))], (high - low) / (_PLACES - 1)

@@ -15,9 +15,12 @@ from inertial.criticism.field import Candidates
 from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import price
-from inertial.criticism.space import SEEN, Space
+from inertial.criticism.space import SEEN, Candidate, Space
 
 Array = NDArray[np.float64]
+
+_DIGITS = 6
+"""Decimals to which ratios of sizes are compared."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ def smallest_named(field: Candidates, model: Model) -> list[Smallest]:
         sizes = sizes[:, np.isfinite(sizes).all(axis=0) & (sizes > 0.0).all(axis=0)]
         if sizes.size:
             smallest.append(Smallest(name, *np.median(sizes, axis=1).tolist()))
-    return sorted(smallest, key=lambda s: -s.size / s.without_slow)
+    # of effects that the plan shows alike the order is that of the catalogue, not that of rounding errors
+    return sorted(smallest, key=lambda s: -round(s.size / s.without_slow, _DIGITS))
 
 
 def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: str, least: float) -> Array:
@@ -56,21 +60,20 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: s
     least : RMS, g, of the part of an effect beyond the model below which it is never reported
     """
     problem, effect = model.problem, field.of(name)
-    there = problem.covariance.there[:, :, None, None]
     values: list[Array] = []
     for piece in problem.pieces(effect, field.grids[name]):
-        raw = np.sqrt(np.einsum("bngp,bngp->gp", piece.columns * there, piece.columns * there) / problem.count)
-        blocks, n, grid, p = piece.columns.shape
-        coefficients = float(p if piece.shared else blocks * p) + len(field.grids[name][0]) * (
+        raw = np.sqrt(_squares(piece, problem.covariance.there) / problem.count)
+        grid, p = piece.columns.shape[2:]
+        coefficients = float(p if piece.shared else problem.blocks * p) + len(field.grids[name][0]) * (
             len(field.grids[name]) > 1
         )
         needed = _needed(coefficients, field.looks, problem.count)
         each: list[Array] = []
         share = np.ones((grid, p))
         for space in spaces:
-            white = piece.whitened(problem.covariance, space.noise)
-            left = space.project(white.reshape(blocks, n, grid * p)).reshape(blocks, n, grid, p)
-            seen, whole = np.einsum("bngp,bngp->gp", left, left), np.einsum("bngp,bngp->gp", white, white)
+            found = space.products(piece)
+            seen = np.diagonal(found.left, axis1=-2, axis2=-1).sum(axis=0)
+            whole = found.squares.sum(axis=0)
             visible = seen > SEEN**2 * whole
             share = np.where(visible, seen / np.where(visible, whole, 1.0), 0.0)
             with np.errstate(over="ignore"):  # an almost invisible column would need an arbitrary size
@@ -80,6 +83,16 @@ def _sizes(field: Candidates, model: Model, spaces: tuple[Space, Space], name: s
         material = least / np.sqrt(np.where(share > 0.0, share, 1.0))
         values.append(np.stack([np.min(np.maximum(each[0], material), axis=1), np.min(each[1], axis=1)]))
     return np.concatenate(values, axis=1)
+
+
+def _squares(piece: Candidate, there: NDArray[np.bool_]) -> Array:
+    """Sums of squares (grid, p) of columns in g over the dwells (blocks, n) that are there."""
+    each = piece.columns**2
+    if piece.rows is None:
+        return np.einsum("bngp,bn->gp", each, there.astype(np.float64))
+    count = np.zeros(each.shape[:2])
+    np.add.at(count, piece.rows, there)
+    return np.einsum("bngp,bn->gp", each, count)
 
 
 def _needed(coefficients: float, looks: int, count: int) -> float:

@@ -16,8 +16,8 @@ from inertial.criticism.noise_shares import Noise
 
 Array = NDArray[np.float64]
 
-_PIECE = 1_000_000
-"""Largest number of columns' values that are worked on at a time, of candidates whose whitened columns are not stored."""
+_PIECE = 500_000
+"""Largest number of columns' values that are whitened at a time."""
 
 SEEN = 0.01
 """Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
@@ -27,29 +27,53 @@ SEEN = 0.01
 class Candidate:
     """Columns of an effect at one or more values of its nonlinear parameters.
 
-    columns : (blocks, n, grid, p), g per unit of the coefficient
+    columns : (rows, n, grid, p), g per unit of the coefficient
     shared : whether all blocks share the p coefficients
-    blocks : the blocks that the columns are of, all if None; the columns of the others are zero. Only where shared
-    key : under which whitened columns are stored; not stored if None
-    distinct : how many blocks, the first, have columns of their own, which the others repeat in turn; all if None
+    rows : (blocks,), the row of each block, every row for as many blocks; None where each block has a row of its own
+    units : the units that the columns are of, each with coefficients of its own for its three axes; those of the others are zero.
+        All units if None. Only where shared
+    key : under which products of the columns are stored; not stored if None
     """
 
     columns: Array
     shared: bool
-    blocks: NDArray[np.intp] | None = None
+    rows: NDArray[np.intp] | None = None
+    units: NDArray[np.intp] | None = None
     key: object = None
-    distinct: int | None = None
 
-    def whitened(self, covariance: Covariance, noise: Noise) -> Array:
-        """The columns in the whitened space, (blocks, n, grid, p)."""
-        blocks, n, grid, p = self.columns.shape
-        flat = self.columns.reshape(blocks, n, grid * p)
-        if self.key is None:
-            white = covariance.whiten(flat, noise.shares, self.blocks)
-        else:
-            white = covariance.whitened(self.key, flat, noise.shares, self.blocks, distinct=self.distinct)
-        scale = noise.scale if self.blocks is None else noise.scale[self.blocks]
-        return (white / scale[:, None, None]).reshape(blocks, n, grid, p)
+    @property
+    def of_blocks(self) -> Array:
+        """The columns of each block, (blocks, n, grid, p)."""
+        return self.columns if self.rows is None else self.columns[self.rows]
+
+    @property
+    def blocks(self) -> NDArray[np.intp] | None:
+        """The blocks of the units that the columns are of; None for all."""
+        return None if self.units is None else (3 * self.units[:, None] + np.arange(3)).reshape(-1)
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products of a candidate's columns in a whitened space, for each value of its nonlinear parameters.
+
+    whole : (b, grid, p, p), with each other
+    along : (b, grid, p, r), with the orthonormal local columns of the model
+    inside : (b, grid, p, t), with the targets
+    """
+
+    whole: Array
+    along: Array
+    inside: Array
+
+    @property
+    def left(self) -> Array:
+        """Products (b, grid, p, p) of the columns with each other after the local columns."""
+        return self.whole - self.along @ np.swapaxes(self.along, -1, -2)
+
+    @property
+    def squares(self) -> Array:
+        """Sums of squares (b, grid, p) of the columns before the local columns."""
+        return np.diagonal(self.whole, axis1=-2, axis2=-1)
 
 
 @dataclass(frozen=True)
@@ -58,7 +82,7 @@ class Gain:
 
     drop : (grid,), reduction of the whitened sum of squares
     rank : (grid,), number of coefficients that the plan determines
-    by_block : (blocks, grid), reduction by block (zeros for shared candidates)
+    by_block : (blocks, grid), reduction by block; (0, grid) for coefficients that blocks share
     """
 
     drop: Array
@@ -89,10 +113,20 @@ class Space:
 
     def __init__(self, covariance: Covariance, noise: Noise, y: Array, local: Array, shared: Array) -> None:
         self.covariance, self.noise = covariance, noise
-        white = self.whiten(np.concatenate([y[..., None], shared, local], axis=-1))
-        self.local = white[..., 1 + shared.shape[-1] :]
-        self.q, self.ranks = _orthonormal(self.local)
-        self.targets = self.project(white[..., : 1 + shared.shape[-1]])
+        self._local = local
+        blocks, n, p = local.shape
+        t = 1 + shared.shape[-1]
+        self.q: Array = np.empty((blocks, n, p))
+        self.targets: Array = np.empty((blocks, n, t))
+        self.ranks, self._log_determinant = np.empty(blocks, dtype=np.intp), 0.0
+        # some blocks at a time: every step makes several arrays of the size of their columns
+        few = max(_PIECE // (n * (p + t)), 1)
+        for some in np.split(np.arange(blocks), range(few, blocks, few)):
+            columns = np.concatenate([y[some, :, None], shared[some], local[some]], axis=-1)
+            white = covariance.whiten(columns, noise.shares, some) / noise.scale[some, None, None]
+            self.q[some], self.ranks[some], own = _basis(white[..., t:])
+            self._log_determinant += own
+            self.targets[some] = self.project(white[..., :t], some)
         self.gram = np.einsum("bnt,bns->ts", self.targets, self.targets)
         self.local_rank = int(self.ranks.sum())
         self.shared_rank = int(np.linalg.matrix_rank(self.gram[1:, 1:], tol=None)) if shared.shape[-1] else 0
@@ -100,6 +134,11 @@ class Space:
     def whiten(self, columns: Array) -> Array:
         """Columns (blocks, n, m) in this space."""
         return self.covariance.whiten(columns, self.noise.shares) / self.noise.scale[:, None, None]
+
+    @property
+    def local(self) -> Array:
+        """The whitened columns with coefficients per block, (blocks, n, p)."""
+        return self.whiten(self._local)
 
     @cached_property
     def rss(self) -> float:
@@ -139,54 +178,71 @@ class Space:
         beta = np.linalg.lstsq(self.gram[1:, 1:], self.gram[1:, 0], rcond=None)[0]
         return self.targets[..., 0] - self.targets[..., 1:] @ beta
 
-    @cached_property
+    @property
     def information(self) -> float:
         """log|HᵀV⁻¹H| of the local columns over all blocks, scales apart."""
-        if self.local.shape[-1] == 0:
-            return 0.0
-        columns = self.local * self.noise.scale[:, None, None]
-        size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
-        safe = np.where(size > 0.0, size, 1.0)
-        unit = columns / safe[:, None, :]
-        values = np.linalg.eigvalsh(np.swapaxes(unit, -1, -2) @ unit)
-        return float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(safe)))
+        return self._log_determinant + 2.0 * self._local.shape[-1] * float(np.sum(np.log(self.noise.scale)))
+
+    @property
+    def deleted(self) -> tuple[Array, Array]:
+        """(Py)_i and P_ii of every dwell, (blocks, n): deleted from its series, it deviates by their ratio, of variance 1/P_ii.
+
+        P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹.
+        """
+        back = self.backed(np.concatenate([self.residual[..., None], self.q], axis=-1))
+        along = np.einsum("bkn,bkn->bn", back[:, 1:], back[:, 1:])
+        return back[:, 0], np.maximum(self.covariance.precision(self.noise) - along, 0.0)
+
+    def projector_at(self, block: int, dwell: int) -> Array:
+        """The column (n,) of P of one block at a dwell."""
+        at = np.zeros((1, self.q.shape[1], 1))
+        at[0, dwell] = 1.0
+        white = self.covariance.whiten(at, self.noise.shares, np.array([block])) / self.noise.scale[block]
+        left = self.project(white, np.array([block]))
+        scale = float(self.covariance.level[block] * self.noise.scale[block])
+        return self.covariance.back(np.swapaxes(left, -1, -2), self.noise.shares, np.array([block]))[0, 0] / scale
 
     def project(self, columns: Array, blocks: NDArray[np.intp] | None = None) -> Array:
         """Whitened columns (blocks, n, m) without the part that the local columns explain."""
         q = self.q if blocks is None else self.q[blocks]
         return columns - q @ (np.swapaxes(q, -1, -2) @ columns)
 
+    def backed(self, white: Array) -> Array:
+        """Rows (blocks, k, n) that give the products of columns in g with whitened series (blocks, n, k)."""
+        rows = self.covariance.back(np.swapaxes(white, -1, -2), self.noise.shares)
+        rows /= (self.covariance.level * self.noise.scale)[:, None, None]
+        return rows
+
+    @cached_property
+    def _rows(self) -> Array:
+        """The rows (blocks, r + t, n) of the orthonormal local columns and of the targets."""
+        return self.backed(np.concatenate([self.q, self.targets], axis=-1))
+
+    def products(self, candidate: Candidate) -> Products:
+        """Products of a candidate's columns, no column of which is whitened for more than its own square.
+
+        With the local columns Q and the targets t in the whitened space, QᵀWc and tᵀWc are rows times the columns in g, and
+        cᵀV⁻¹c depends on neither model nor measurements. What is visible after Q at all is more than 1e-4 of it: taking Q off the
+        products and not off the columns loses no digit that counts.
+        """
+        with_rows = times_rows(self._rows, candidate)
+        local = self.q.shape[-1]
+        scale = self.noise.scale if candidate.blocks is None else self.noise.scale[candidate.blocks]
+        whole = self.covariance.products(candidate, self.noise.shares) / scale[:, None, None, None] ** 2
+        return Products(whole, with_rows[..., :local], with_rows[..., local:])
+
     def gain(self, candidate: Candidate) -> Gain:
         """Gain of a candidate on the residuals."""
-        if candidate.shared or candidate.key is not None or candidate.columns.size <= _PIECE:
-            return self._gain_at_once(candidate)
-        # some blocks at a time: every step makes several arrays of the size of their columns
-        few = max(_PIECE // max(candidate.columns[0].size, 1), 1)
-        whole = np.arange(len(candidate.columns))
-        parts = [self._part(candidate.columns[b], b) for b in np.split(whole, whole[few::few])]
-        along, seen = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return self._gain_along(along, seen)
-
-    def _part(self, columns: Array, blocks: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
-        """Targets along the directions of the columns (b, n, grid, p) of some blocks."""
-        white, left = self.whitened(columns, blocks)
-        size = np.sqrt(np.einsum("bngp,bngp->bgp", white, white))[:, None]
-        return self._along(left.reshape(columns.shape) / np.where(size > 0.0, size, 1.0), self.targets[blocks])
-
-    def _gain_at_once(self, candidate: Candidate) -> Gain:
-        white = candidate.whitened(self.covariance, self.noise)
-        blocks, n, grid, p = white.shape
-        flat = white.reshape(blocks, n, grid * p)
-        size = np.sqrt(np.einsum("bnm,bnm->bm", flat, flat))
-        left = self.project(flat, candidate.blocks)
+        found = self.products(candidate)
         if candidate.shared:
-            rows = slice(None) if candidate.blocks is None else candidate.blocks
-            return self._gain_shared(
-                left.reshape(blocks, n, grid, p), size.reshape(blocks, grid, p), self.targets[rows]
-            )
-        safe = np.where(size > 0.0, size, 1.0)
-        left = (left / safe[:, None, :]).reshape(blocks, n, grid, p)
-        return self._gain_local(left)
+            return self._gain_shared(found, one_unit=candidate.units is not None)
+        size = np.sqrt(found.squares)
+        size = np.where(size > 0.0, size, 1.0)
+        values, vectors = eigen(found.left / (size[..., :, None] * size[..., None, :]))
+        seen = values > SEEN**2
+        scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
+        along = np.swapaxes(vectors, -1, -2) @ (found.inside / size[..., None])
+        return self._gain_along(along * scale[..., None], seen)
 
     def gain_of_dwells(self, columns: Array, places: NDArray[np.intp]) -> Gain:
         """Gain of columns of one dwell each, for every dwell separately; all blocks share their coefficients.
@@ -198,7 +254,7 @@ class Space:
         ----------
         columns : (blocks, n, p), of every dwell; places : (grid,), the dwells
         """
-        blocks, n, p = columns.shape
+        n, p = columns.shape[1:]
         inside, own = np.zeros((n, p, self.targets.shape[-1])), np.zeros((n, p, p))
         size = np.zeros((n, p))
         for members, whitener in self.covariance.whiteners(self.noise.shares):
@@ -212,33 +268,7 @@ class Space:
             own += np.einsum("bnp,bnr,bn->npr", columns[members], columns[members], diagonal)
             size += np.einsum("bnp,bn->np", columns[members] ** 2, whole)
         size = np.sqrt(np.where(size > 0.0, size, 1.0))
-        return self._solved(
-            (own / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places], blocks
-        )
-
-    def whitened(self, columns: Array, blocks: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Columns (b, n, grid, p) of some blocks in this space, and (b, n, grid·p) after the local columns."""
-        flat = columns.reshape(*columns.shape[:2], -1)
-        white = self.covariance.whiten(flat, self.noise.shares, blocks) / self.noise.scale[blocks, None, None]
-        return white.reshape(columns.shape), self.project(white, blocks)
-
-    def _gain_local(self, left: Array) -> Gain:
-        return self._gain_along(*self._along(left, self.targets))
-
-    @staticmethod
-    def _along(left: Array, targets: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Targets (b, n, t) along the directions of columns (b, n, grid, p), (b, grid, p, t); which directions are seen."""
-        inside = np.einsum("bngp,bnt->bgpt", left, targets)
-        if left.shape[-1] == 1:
-            gram = np.einsum("bngp,bngp->bg", left, left)
-            seen = gram > SEEN**2
-            scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, gram, 1.0)), 0.0)
-            return inside * scale[..., None, None], seen[..., None]
-        gram = np.einsum("bngp,bngr->bgpr", left, left)
-        values, vectors = np.linalg.eigh(gram)
-        seen = values > SEEN**2
-        scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)
-        return np.einsum("bgpr,bgpt->bgrt", vectors, inside) * scale[..., None], seen
+        return self._solved((own / size[:, :, None] / size[:, None, :])[places], (inside / size[..., None])[places])
 
     def _gain_along(self, along: Array, seen: NDArray[np.bool_]) -> Gain:
         rank = seen.sum(axis=(0, 2))
@@ -249,43 +279,78 @@ class Space:
         drop = np.array([self.rss - _schur(self.gram - t) for t in taken])
         return Gain(drop, rank, by_block)
 
-    def _gain_shared(self, left: Array, size: Array, targets: Array) -> Gain:
-        """Gain of columns with common coefficients: all values of the grid at once."""
-        blocks, n, grid, p = left.shape
-        total = np.sqrt(np.sum(size**2, axis=0))
-        columns = left / np.where(total > 0.0, total, 1.0)
-        by_value = columns.transpose(2, 3, 0, 1).reshape(grid, p, blocks * n)
-        own = by_value @ np.swapaxes(by_value, -1, -2)
-        inside = by_value @ targets.reshape(blocks * n, -1)  # (grid, p, t)
-        return self._solved(own, inside, self.targets.shape[0])
+    def _gain_shared(self, found: Products, *, one_unit: bool) -> Gain:
+        """Gain of columns whose coefficients all blocks share, or the three of each unit: units in turn, all values of each."""
+        together = 3 if one_unit else found.whole.shape[0]
+        own, squares, inside = (
+            each.reshape(-1, together, *each.shape[1:]).sum(axis=1).reshape(-1, *each.shape[2:])
+            for each in (found.left, found.squares, found.inside)
+        )
+        size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
+        return self._solved(own / (size[:, :, None] * size[:, None, :]), inside / size[..., None])
 
-    def _solved(self, own: Array, inside: Array, blocks: int) -> Gain:
+    def _solved(self, own: Array, inside: Array) -> Gain:
         """Gain from products (grid, p, p) of common columns with each other and (grid, p, t) with the targets."""
         along = inside[..., 0]
         if self.targets.shape[-1] > 1:
             inner = np.linalg.pinv(self.gram[1:, 1:], rcond=1e-10, hermitian=True)
             own = own - inside[..., 1:] @ inner @ np.swapaxes(inside[..., 1:], -1, -2)
             along = along - inside[..., 1:] @ (inner @ self.gram[1:, 0])
-        values, vectors = np.linalg.eigh(own)
+        values, vectors = eigen(own)
         seen = values > SEEN**2
         onto = np.einsum("gpr,gp->gr", vectors, along)
         drop = np.sum(np.where(seen, onto**2 / np.where(seen, values, 1.0), 0.0), axis=1)
-        return Gain(drop, seen.sum(axis=1), np.zeros((blocks, len(own))))
+        return Gain(drop, seen.sum(axis=1), np.zeros((0, len(own))))
 
 
-def _orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
+def times_rows(rows: Array, candidate: Candidate) -> Array:
+    """Rows (blocks, k, n) times the columns of a candidate, (b, grid, p, k)."""
+    if candidate.blocks is not None:
+        rows = rows[candidate.blocks]
+    count, n, grid, p = candidate.columns.shape
+    blocks, k = rows.shape[:2]
+    flat = candidate.columns.reshape(count, n, grid * p)
+    if candidate.rows is None:
+        product = rows @ flat
+    else:
+        # the blocks of each row beside each other: one product of matrices for all of them
+        order = np.argsort(candidate.rows, kind="stable")
+        sorted_ = bool(np.all(order[1:] > order[:-1]))
+        product = ((rows if sorted_ else rows[order]).reshape(count, -1, n) @ flat).reshape(blocks, k, grid * p)
+        if not sorted_:
+            product = product[np.argsort(order)]
+    return np.swapaxes(product, -1, -2).reshape(blocks, grid, p, k)
+
+
+def eigen(gram: Array) -> tuple[Array, Array]:
+    """Eigenvalues (..., p) and vectors (..., p, p) of symmetric matrices; of one row and column without a solver."""
+    if gram.shape[-1] == 1:
+        return gram[..., 0], np.ones(gram.shape)
+    return np.linalg.eigh(gram)
+
+
+def orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
     """Orthonormal bases (blocks, n, p) of what the columns span, directions below the tolerance zeroed; ranks (blocks,)."""
+    return _basis(columns)[:2]
+
+
+def _basis(columns: Array) -> tuple[Array, NDArray[np.intp], float]:
+    """The same, and the logarithm of the determinant of the columns' products over all blocks, vanishing directions limited."""
     if columns.shape[-1] == 0:
-        return columns, np.zeros(len(columns), dtype=np.intp)
+        return columns, np.zeros(len(columns), dtype=np.intp), 0.0
     size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
-    q = columns / np.where(size > 0.0, size, 1.0)[:, None, :]
+    size = np.where(size > 0.0, size, 1.0)
+    q = columns / size[:, None, :]
     keep = np.ones((1, 1), dtype=bool)
+    determinant: float | None = None
     for tolerance in (1e-9, 0.5):  # the second turn removes rounding errors of the first
         values, vectors = np.linalg.eigh(np.swapaxes(q, -1, -2) @ q)
+        if determinant is None:
+            determinant = float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(size)))
         keep = values > tolerance
         scale = np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)
         q = q @ (vectors * scale[:, None, :])
-    return q, keep.sum(axis=-1)
+    return q, keep.sum(axis=-1), determinant or 0.0
 
 
 def _schur(gram: Array) -> float:

@@ -1,6 +1,6 @@
 """An effect in a model, at values of its nonlinear parameters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.problem import SHARED, Problem
@@ -33,6 +33,11 @@ class Term:
         return not isinstance(self.effect, Handling) and self.effect.memory
 
     @property
+    def key(self) -> tuple[object, ...]:
+        """The term as a key; effects are known by their ids."""
+        return self.effect.id, self.values, self.first, self.rest
+
+    @property
     def keywords(self) -> dict[str, float | tuple[float, ...]]:
         """Values as keywords of the effect's columns."""
         return dict(self.values)
@@ -40,3 +45,8 @@ class Term:
     def candidate(self, problem: Problem) -> Candidate:
         """The term's columns in a problem, as a candidate."""
         return problem.candidate(self.effect, [self.keywords], first=self.first)
+
+    def with_start(self, problem: Problem) -> Candidate:
+        """The same with the columns of the unknown state of its memory."""
+        made = problem.varied(self.effect, [self.keywords], first=self.first, start=not self.rest)
+        return replace(made, key=self.key)

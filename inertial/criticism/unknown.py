@@ -120,7 +120,7 @@ def _function_of(base: Model, term: Term, suspect: Suspect) -> bool:
     """Whether a flexible curve of the driver, block by block, reproduces nine tenths of a term's columns."""
     columns = base.problem.columns(term.effect, term.keywords)[..., : term.first]
     before = base.at(base.problem.covariance.white_noise())
-    whole = np.concatenate([base.local, suspect.candidate.columns[:, :, 0, :]], axis=-1)
+    whole = np.concatenate([base.local, suspect.candidate.of_blocks[:, :, 0, :]], axis=-1)
     after = type(before)(before.covariance, before.noise, base.problem.y, whole, base.shared)
     left = [float(np.sum(s.project(s.whiten(columns)) ** 2)) for s in (before, after)]
     return left[1] < 0.1 * left[0]

@@ -153,7 +153,7 @@ def _convincing(model: Model, driver: Driver, looks: int) -> bool:
 
 def _driver_log_p(model: Model, driver: Driver) -> float:
     """Logarithm of the probability that noise follows a driver as much, with the share of wander estimated beside it."""
-    richer = model.with_curves(driver.candidate.columns[:, :, 0, :])
+    richer = model.with_curves(driver.candidate.of_blocks[:, :, 0, :])
     space = model.at(richer.noise)
     gain = space.gain(driver.candidate)
     return log_p_value(space, float(gain.drop[0]) / shared_noise(model), int(gain.rank[0]))

@@ -66,3 +66,9 @@ def applied(lower: Array, series: Array) -> Array:
     """Series (blocks, m, n) times a lower triangle (n, n), by half of the products, as the matrix is triangular."""
     flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
     return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1).T.reshape(series.shape)
+
+
+def applied_back(lower: Array, series: Array) -> Array:
+    """Series (..., n) times the transpose of a lower triangle (n, n), by half of the products."""
+    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
+    return _times(1.0, lower.T, flat.T, side=0, lower=0).T.reshape(series.shape)

@@ -19,18 +19,59 @@ def covariance(rng: np.random.Generator) -> Covariance:
     return Covariance(np.tile(np.arange(N) * 30.0, (BLOCKS, 1)), 1e-5 * np.ones((BLOCKS, N)) * rng.uniform(0.95, 1.05))
 
 
-@pytest.mark.parametrize("distinct", [1, 3])
-def test_columns_that_blocks_repeat_are_whitened_once_with_the_same_numbers(
-    rng: np.random.Generator, distinct: int
+@pytest.mark.parametrize("rows", [[0] * BLOCKS, [0, 1, 2] * 2, [0, 0, 0, 1, 1, 1]])
+@pytest.mark.parametrize("shares", [SHARES, Shares()])
+def test_columns_that_blocks_share_are_whitened_once_with_the_same_products(
+    rng: np.random.Generator, rows: list[int], shares: Shares
 ) -> None:
-    columns = np.tile(rng.standard_normal((distinct, N, 5)), (BLOCKS // distinct, 1, 1))
-    whole, once = (covariance(rng) for _ in range(2))
-    np.testing.assert_allclose(
-        once.whitened("key", columns, SHARES, distinct=distinct),
-        once.level[0] ** -1 * whole.level[0] * whole.whiten(columns, SHARES),
-        rtol=1e-9,
-        atol=1e-9 * np.abs(columns).max() / once.level[0],
-    )
+    few, whole = rng.standard_normal((max(rows) + 1, N, 5, 2)), covariance(rng)
+    once = whole.products(Candidate(few, shared=False, rows=np.array(rows)), shares)
+    white = whole.whiten(few[rows].reshape(BLOCKS, N, 10), shares).reshape(BLOCKS, N, 5, 2)
+    np.testing.assert_allclose(once, np.einsum("bngp,bngq->bgpq", white, white), rtol=1e-9, atol=1e-9 * once.max())
+    np.testing.assert_allclose(whole.products(Candidate(few[rows], shared=False), shares), once, rtol=1e-12)
+
+
+def spaces(rng: np.random.Generator) -> Space:
+    """Blocks with missing dwells and two levels of noise, a column that all share."""
+    error = 1e-5 * np.repeat([1.0, 3.0], BLOCKS // 2)[:, None] * np.ones((BLOCKS, N))
+    error[1, 7], error[4, 30:33] = np.inf, np.inf
+    whole = Covariance(np.tile(np.arange(N) * 30.0, (BLOCKS, 1)), error)
+    local = np.stack([np.ones((BLOCKS, N)), rng.standard_normal((BLOCKS, N))], axis=-1)
+    noise = Noise(SHARES, rng.uniform(0.8, 1.2, BLOCKS))
+    return Space(whole, noise, rng.standard_normal((BLOCKS, N)), local, rng.standard_normal((BLOCKS, N, 1)))
+
+
+@pytest.mark.parametrize("units", [None, np.array([1]), np.array([0, 1])])
+def test_the_gain_of_columns_is_that_of_least_squares_on_whitened_columns(
+    rng: np.random.Generator, units: np.ndarray | None
+) -> None:
+    space = spaces(rng)
+    blocks = np.arange(BLOCKS) if units is None else (3 * units[:, None] + np.arange(3)).reshape(-1)
+    columns = rng.standard_normal((blocks.size, N, 4, 2))
+    found = space.gain(Candidate(columns, shared=True, units=units))
+    expected = []
+    for some in [blocks] if units is None else np.split(blocks, units.size):
+        for g in range(4):
+            whole = np.zeros((BLOCKS, N, 2))
+            whole[some] = columns[np.isin(blocks, some), :, g]
+            both = np.concatenate([space.targets[..., 1:], space.project(space.whiten(whole))], axis=-1).reshape(-1, 3)
+            y = space.targets[..., 0].reshape(-1)
+            left = [y - x @ np.linalg.lstsq(x, y, rcond=None)[0] for x in (both[:, :1], both)]
+            expected.append(float(left[0] @ left[0] - left[1] @ left[1]))
+    assert found.drop.shape == (4 * (1 if units is None else units.size),)
+    np.testing.assert_allclose(found.drop, expected, rtol=1e-8)
+
+
+def test_a_deleted_dwell_deviates_as_the_inverse_of_the_covariance_says(rng: np.random.Generator) -> None:
+    space = spaces(rng)
+    left, size = space.deleted
+    for members, whitener in space.covariance.whiteners(space.noise.shares):
+        for b in members.tolist():
+            roots = space.project((whitener / (space.covariance.level * space.noise.scale)[b])[None], np.array([b]))[0]
+            p = roots.T @ roots
+            np.testing.assert_allclose(size[b], np.diagonal(p), rtol=1e-9, atol=1e-12 * p.max())
+            np.testing.assert_allclose(left[b], roots.T @ space.residual[b], rtol=1e-9, atol=1e-9 * np.abs(left).max())
+            np.testing.assert_allclose(space.projector_at(b, 5), p[:, 5], rtol=1e-9, atol=1e-12 * p.max())
 
 
 @pytest.mark.parametrize("p", [1, 2, 3])
@@ -41,7 +82,7 @@ def test_what_a_candidate_takes_off_draws_is_what_least_squares_takes_off(rng: n
     columns = rng.standard_normal((BLOCKS, N, 4, p))
     columns[2, :, 1, 0] = 3.0 * local[2, :, 1]  # the model has it already
     draws = space.project(rng.standard_normal((BLOCKS, N, 7)))
-    drops = _drops(Candidate(columns, shared=False), space, draws)
+    drops = _drops(Candidate(columns, shared=False), space, space.backed(draws))
     for g, (drop, rank) in enumerate(drops):
         expected, seen = np.zeros(7), 0
         white = space.whiten(columns[:, :, g])

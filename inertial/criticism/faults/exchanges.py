@@ -11,6 +11,9 @@ from inertial.criticism.readings import Array, Readings, exchanged, find_split
 _COMMON = 5.0
 """Multiple of the usual misfit that half of the units exceed in a dwell whose pose is wrong for all."""
 
+_AWAY = 0.005
+"""Distance, g, from its own calibration above which the output of a unit may be that of another."""
+
 
 def changed_units(readings: Readings) -> Iterator[Fault]:
     """A calibration that changes during the run: to that of another unit (cables exchanged), or to another range."""
@@ -44,7 +47,9 @@ def swapped_units(readings: Readings) -> Iterator[Fault]:
     if units < 2:
         return
     exchanged: dict[tuple[int, int], list[int]] = {}
-    for place in range(n):
+    # who is at home in its own calibration was not exchanged
+    away = np.any(np.linalg.norm(readings.misfit, axis=-1) > _AWAY, axis=0)
+    for place in np.flatnonzero(away).tolist():
         for pair in _exchanges(readings, place):
             exchanged.setdefault(pair, []).append(place)
     for (one, other), places in exchanged.items():
@@ -65,7 +70,7 @@ def _exchanges(readings: Readings, place: int) -> Iterator[tuple[int, int]]:
     best = np.argmin(distance, axis=1)
     for i, j in enumerate(best):
         mutual = j > i and best[j] == i
-        if mutual and distance[i, j] < 0.2 * own[i] and distance[j, i] < 0.2 * own[j] and own[i] > 0.005:
+        if mutual and distance[i, j] < 0.2 * own[i] and distance[j, i] < 0.2 * own[j] and own[i] > _AWAY:
             yield int(there[i]), int(there[j])
 
 

@@ -50,6 +50,11 @@ class Handling(Effect):
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Columns of the affected units, (units or 1, n, 3, k), g per unit of the coefficient."""
 
+    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Columns (units or 1, n, 3, k) of the alternative in each unit at a place without its ``unit``; 1: the same in all."""
+        units = range(lot.state.time.shape[0])
+        return np.concatenate([self.change(lot, slope, unit=float(unit), **place) for unit in units])
+
     @abstractmethod
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The description for people; ``size`` (k,) are the coefficients."""
@@ -136,6 +141,23 @@ def after(lot: "Lot", dwell: float) -> Array:
     return (np.arange(lot.state.time.shape[1]) >= dwell).astype(np.float64)
 
 
+def common(values: Array) -> Array:
+    """Values (units, ...) of all units; (1, ...) where they are the same for all."""
+    return values[:1] if bool(np.all(values == values[:1])) else values
+
+
+def common_force(lot: "Lot") -> Array:
+    """Forces (units, n, 3), g; (1, n, 3) where they are the same for all units."""
+    return lot.state.remember(
+        ("common_force",), lambda: common(np.broadcast_to(lot.state.force, (*lot.state.time.shape, 3)))
+    )
+
+
+def rotated_force(lot: "Lot") -> Array:
+    """What small rotations about x, y, z add to the forces, (units or 1, n, 3, 3), g per rad."""
+    return lot.state.remember(("rotated_force",), lambda: turns(common_force(lot)))
+
+
 def turns(force: Array) -> Array:
     """What small rotations about x, y, z add to forces (..., n, 3), by axis and rotation: (..., n, 3, 3), g per rad."""
     return np.stack([np.cross(e, force) for e in np.eye(3)], axis=-1)
@@ -146,6 +168,7 @@ def tilts(state: State) -> Array:
     outer, inner = state.outer, state.inner
     if outer is None or inner is None:
         return np.zeros((*state.force.shape, 0))
+    outer, inner = common(outer), common(inner)
     by_outer = np.stack([np.cos(outer) * np.sin(inner), np.cos(outer) * np.cos(inner), -np.sin(outer)], axis=-1)
     by_inner = np.stack([np.sin(outer) * np.cos(inner), -np.sin(outer) * np.sin(inner), np.zeros_like(outer)], axis=-1)
     return np.stack([by_outer, by_inner], axis=-1)

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from inertial.criticism.handling.base import Array, Handling, after, times, turns
+from inertial.criticism.handling.base import Array, Handling, after, rotated_force, times
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
@@ -25,7 +25,7 @@ class FixtureMoved(Handling):
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Three rotations, the same for all units."""
         del slope
-        return turns(lot.state.force) * after(lot, place["dwell"])[:, None, None]
+        return rotated_force(lot) * after(lot, place["dwell"])[:, None, None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The angle and its axis."""

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from inertial.criticism.handling.base import Array, Handling, after, times
+from inertial.criticism.handling.base import Array, Handling, after, common_force, times
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
@@ -29,6 +29,11 @@ class GainStep(Handling):
         del slope
         force = np.broadcast_to(lot.state.force, (*lot.state.time.shape, 3))[int(place["unit"])]
         return (force * after(lot, place["dwell"])[:, None])[None, ..., None]
+
+    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """The force."""
+        del slope
+        return (common_force(lot) * after(lot, place["dwell"])[:, None])[..., None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The change."""

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, ClassVar
 
-from inertial.criticism.handling.base import Array, Handling, after, times
+from inertial.criticism.handling.base import Array, Handling, after, common_force, times
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
@@ -23,7 +23,7 @@ class ReferenceStep(Handling):
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """The force."""
         del slope
-        return (lot.state.force * after(lot, place["dwell"])[:, None])[..., None]
+        return (common_force(lot) * after(lot, place["dwell"])[:, None])[..., None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The change."""

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from inertial.criticism.handling.base import Array, Handling, after, times, turns
+from inertial.criticism.handling.base import Array, Handling, after, rotated_force, times, turns
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
@@ -30,6 +30,11 @@ class UnitMoved(Handling):
         del slope
         force = np.broadcast_to(lot.state.force, (*lot.state.time.shape, 3))[int(place["unit"])]
         return (turns(force) * after(lot, place["dwell"])[:, None, None])[None]
+
+    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Three rotations."""
+        del slope
+        return rotated_force(lot) * after(lot, place["dwell"])[:, None, None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The angle and its axis."""

@@ -25,3 +25,7 @@ class UnitNotSoaked(NotSoaked):
         """The contribution of the lag in the unit."""
         unit = int(place["unit"])
         return super().change(lot, slope, **place)[unit : unit + 1]
+
+    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """The contribution of the lag."""
+        return super().change(lot, slope, **place)

@@ -34,6 +34,10 @@ class UnitThermometer(Exchangeable):
         own = slope[int(place["unit"])]
         return -(own * (soaks(lot.state) == int(place["soak"]))[:, None])[None, ..., None]
 
+    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """The contribution of an offset of one kelvin."""
+        return SoakThermometer().change(lot, slope, **place)
+
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
         del lot

@@ -1,0 +1,164 @@
+"""What a model and its measurements say about the shares of the noise: products of its columns at any shares."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.noise_shares import Shares
+from inertial.criticism.problem import Problem
+from inertial.criticism.space import Candidate, times_rows
+
+Array = NDArray[np.float64]
+
+_HANGING = 1e-3
+"""Independent part of a column below which a single factorisation is inaccurate."""
+
+VANISHING = 3e-5
+"""Singular value of columns of unit length, over the largest, below which a combination of them vanishes."""
+
+_FAR = 1e3
+"""Multiple of the limit, of the squares, above which the eigenvalues of the products of columns decide on their rank."""
+
+_KEPT = 4_000_000
+"""Largest number of values of rows that are kept for models with one more term."""
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """V⁻¹ times the columns of the blocks that share a whitener, those that differ: rows (k, n), and the place of each column."""
+
+    members: NDArray[np.intp]
+    rows: Array
+    places: NDArray[np.intp]
+
+
+class ShareStatistics:
+    """Products of the columns with coefficients by block, and of the measurements, with each other.
+
+    Parameters
+    ----------
+    local : (blocks, n, p), columns, g per unit of the coefficient
+    before : those of a model without its last term, whose products serve all that follow it; None without one
+    further : the columns of the last term, at one value of its parameters
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        local: Array,
+        before: "ShareStatistics | None" = None,
+        further: Candidate | None = None,
+    ) -> None:
+        self.problem, self.local = problem, local
+        self.whole = self._determined is local
+        # a combination that vanishes mixes the columns: then all are whitened together
+        nested = before is not None and further is not None and self.whole and before.whole
+        self._before, self._further = (before, further) if nested else (None, None)
+        self._kept: dict[Shares, list[_Rows]] = {}
+
+    @property
+    def rank(self) -> int:
+        """Number of columns without combinations that vanish."""
+        return int(self._determined.shape[-1])
+
+    @cached_property
+    def _determined(self) -> Array:
+        """Columns (blocks, n, r) that span those with coefficients by block, without combinations that vanish.
+
+        Of misalignment only three of six columns show in a norm, and a turn about one axis shows two of three forces. Counted
+        among the information, a combination that vanishes takes off ln F per share F of wander: the largest would always be best.
+        """
+        there = self.problem.covariance.there.astype(np.float64)
+        products = np.swapaxes(self.local, -1, -2) @ (self.local * there[..., None])
+        size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 0.0))
+        size = np.where(size > 0.0, size, 1.0)
+        squares = np.linalg.eigvalsh(products / (size[:, :, None] * size[:, None, :]))
+        if not squares.size or bool(np.all(squares[:, 0] > _FAR * VANISHING**2 * squares[:, -1])):
+            return self.local
+        unit = self.local * there[..., None] / size[:, None, :]
+        _, values, turn = np.linalg.svd(unit, full_matrices=False)
+        ranks = np.sum(values > VANISHING * values[:, :1], axis=1)
+        rank = int(ranks.max())
+        if rank == self.local.shape[-1] or int(ranks.min()) != rank:
+            return self.local
+        scaled = self.local / np.where(size > 0.0, size, 1.0)[:, None, :]
+        return scaled @ np.swapaxes(turn[:, :rank], -1, -2)
+
+    @cached_property
+    def _columns(self) -> Array:
+        """Determined columns, and the measurements behind them, (blocks, n, r + 1).
+
+        Of the measurements a plain fit is taken off before: what the model leaves of them is a millionth of their squares.
+        """
+        x, y = self._determined, self.problem.y[..., None]
+        there = self.problem.covariance.there[..., None]
+        own = x * there
+        size = np.sqrt(np.einsum("bnp,bnp->bp", own, own))
+        unit = own / np.where(size > 0.0, size, 1.0)[:, None, :]
+        across = np.swapaxes(unit, -1, -2)
+        fitted = unit @ (np.linalg.pinv(across @ unit, rcond=1e-12, hermitian=True) @ (across @ y))
+        return np.concatenate([x, (y - fitted) * there], axis=-1)
+
+    @cached_property
+    def _distinct(self) -> tuple[Array, NDArray[np.intp]]:
+        """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + 1)."""
+        columns = np.swapaxes(self._columns, 0, -1).swapaxes(1, -1)
+        blocks = self.problem.blocks
+        few: list[Array] = []
+        places: list[NDArray[np.intp]] = []
+        count = 0
+        for column in columns:
+            rows = self.problem.rows_of(column)
+            few.append(column if rows is None else column[np.unique(rows, return_index=True)[1]])
+            places.append(count + (np.arange(blocks) if rows is None else rows))
+            count += len(few[-1])
+        return np.concatenate(few), np.stack(places, axis=1)
+
+    def products(self, shares: Shares) -> Array:
+        """Products (blocks, r + 1, r + 1) of the determined columns and the measurements with each other."""
+        if self._before is None or self._further is None:
+            return self._rows(shares) @ self._columns
+        rows, further = self._before._rows(shares), self._further  # noqa: SLF001  # of its own kind
+        known, across = rows @ self._before._columns, times_rows(rows, further)[:, 0]  # noqa: SLF001
+        own = self.problem.covariance.products(further, shares)[:, 0]
+        # the measurements stay last
+        r = known.shape[-1] - 1
+        above = np.concatenate([known[:, :r, :r], np.swapaxes(across, -1, -2)[:, :r], known[:, :r, r:]], axis=-1)
+        beside = np.concatenate([across[..., :r], own, across[..., r:]], axis=-1)
+        last = np.concatenate([known[:, r:, :r], np.swapaxes(across, -1, -2)[:, r:], known[:, r:, r:]], axis=-1)
+        return np.concatenate([above, beside, last], axis=1)
+
+    def _rows(self, shares: Shares) -> Array:
+        """Rows (blocks, r + 1, n) that give the products of the determined columns and the measurements with columns in g."""
+        covariance = self.problem.covariance
+        if shares not in self._kept:
+            columns, places = self._distinct
+            kept = [
+                _Rows(members, rows, np.searchsorted(own, places[members]))
+                for members, own, rows in covariance.solved(columns, places, shares)
+            ]
+            size = sum(one.rows.size for one in kept)
+            while self._kept and (len(self._kept) + 1) * size > _KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[shares] = kept
+        out = np.empty((self.problem.blocks, self._distinct[1].shape[1], self.problem.n))
+        for one in self._kept[shares]:
+            out[one.members] = one.rows[one.places]
+        out /= covariance.level[:, None, None] ** 2
+        return out
+
+    def at(self, shares: Shares) -> tuple[float, Array] | None:
+        """log|HᵀV⁻¹H| and sums of squares (blocks,), by one factorisation; None if columns are collinear."""
+        products = self.products(shares)
+        size = np.sqrt(np.maximum(np.diagonal(products, axis1=-2, axis2=-1), 1e-300))
+        try:
+            root = np.linalg.cholesky(products / (size[:, :, None] * size[:, None, :]))
+        except np.linalg.LinAlgError:
+            return None
+        diagonal = np.diagonal(root, axis1=-2, axis2=-1)
+        if float(diagonal[:, :-1].min(initial=1.0)) < _HANGING:
+            return None
+        information = 2.0 * float(np.sum(np.log(diagonal[:, :-1] * size[:, :-1])))
+        return information, np.asarray((diagonal[:, -1] * size[:, -1]) ** 2, dtype=np.float64)
