@@ -109,7 +109,8 @@ def _fit(job: Job, run: Run) -> Tables:
 
 def _verify(job: Job, run: Run) -> Tables:
     del job
-    return verify_tables(_lot(run), *(run.table(name) for name in _VERIFIED[2:]))
+    coefficients, covariance, predictions = (run.table(name) for name in _VERIFIED[2:])
+    return verify_tables(_lot(run), coefficients, covariance, predictions)
 
 
 def _noise(job: Job, run: Run) -> Tables:
@@ -124,7 +125,8 @@ _BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verif
 
 def _budget(job: Job, run: Run) -> Tables:
     lot = _lot(run)
-    tables = BudgetTables(lot.dwells, lot.history, *(run.table(name) for name in _BUDGETED[2:]), lot=lot)
+    own = (run.table(name) for name in _BUDGETED[2:])
+    tables = BudgetTables(lot.dwells, lot.history, *own, lot=lot, calibration=None)
     return budget(tables, budget_terms(job))
 
 

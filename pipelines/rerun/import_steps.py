@@ -86,7 +86,12 @@ def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
     def call(run: Run) -> Tables:
         tables = {name: run.table(name) for name in names}
         whole = BudgetTables(
-            dwells=run.table("dwells"), history=recorded_history(run), noise=no_noise(), lot=None, **tables
+            dwells=run.table("dwells"),
+            history=recorded_history(run),
+            noise=no_noise(),
+            lot=None,
+            calibration=None,
+            **tables,
         )
         return budget(whole, terms) if known else norm_budget(whole, terms)
 
