@@ -6,6 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from inertial.criticism.bases import SEEN, eigen
+from inertial.criticism.candidate import Candidate, times_rows
 from inertial.criticism.decisions import CERTAIN_BELOW, DRAWS, ENOUGH, LEAST_SHARE
 from inertial.criticism.drivers import Driver
 from inertial.criticism.field import Candidates
@@ -14,7 +16,7 @@ from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.shares import place_of, shares_at
-from inertial.criticism.space import SEEN, Candidate, Space, eigen, times_rows
+from inertial.criticism.space import Space
 from inertial.criticism.tail_areas import log_f_tail
 from inertial.criticism.tails import heavy
 

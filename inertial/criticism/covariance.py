@@ -9,18 +9,19 @@ that axis: the kernels are then (F·K_F + W·K_W) ∘ (u·uᵀ) with the directi
 """
 
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property, lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, walk_kernel
 from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.whitener import EVEN, DwellProfile, applied, applied_back, whitener_of
+from inertial.criticism.products import PIECE, products_of
+from inertial.criticism.whitener import applied, applied_back, grouped, whitener_of
 from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
@@ -34,10 +35,6 @@ _WHITENERS = 12_000_000
 _PRODUCTS = 2_000_000
 """Largest number of products of columns that are kept."""
 
-_PIECE = 1_000_000
-"""Largest number of columns' values that are whitened at a time for their products."""
-
-
 LARGE = 15_000
 """Values of a column of all blocks above which columns are not stored between passes: a store has room for a small part of those
 that a pass goes through in turn, and each would be gone before it is used again."""
@@ -49,36 +46,16 @@ def _lattice(shares: Shares) -> tuple[int | None, ...]:
     return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in shares)
 
 
-class Columns(Protocol):
-    """Columns whose products are wanted: :class:`inertial.criticism.space.Candidate`."""
-
-    @property
-    def columns(self) -> Array:
-        """(rows, n, grid, p), g per unit of the coefficient."""
-        ...
-
-    @property
-    def rows(self) -> NDArray[np.intp] | None:
-        """The row of each block; None where each has its own."""
-        ...
-
-    @property
-    def blocks(self) -> NDArray[np.intp] | None:
-        """The blocks that the columns are of; None for all."""
-        ...
-
-    @property
-    def key(self) -> object:
-        """Under which the products are kept; not kept if None."""
-        ...
+def _about_mean(covariance: Array) -> float:
+    n = max(len(covariance), 1)
+    return float(np.trace(covariance) / n - covariance.sum() / n**2)
 
 
-def _squares(columns: Array, whitener: Array | None, white: Array) -> Array:
-    """Products (rows, grid, p, p) of columns (rows, n, grid, p) with each other after a whitener (n, n), or one by dwell (n,)."""
-    rows, n, grid, p = columns.shape
-    own = columns.transpose(0, 2, 3, 1).reshape(rows * grid, p, n)
-    white = own * white if whitener is None else applied(whitener, own)
-    return (white @ np.swapaxes(white, -1, -2)).reshape(rows, grid, p, p)
+def _of_steps(covariance: Array) -> float:
+    if len(covariance) < 2:
+        return 0.0
+    each = np.diagonal(covariance)
+    return float(np.mean(0.5 * (each[1:] + each[:-1]) - np.diagonal(covariance, 1)))
 
 
 class Covariance:
@@ -101,29 +78,10 @@ class Covariance:
         self.white = float(np.exp(np.mean(np.log(self.level**2))))
         """White variance that is the unit of the shares, g²."""
         self.span = max(float(np.ptp(time)), 1.0)
-        self._kernels: list[DwellProfile] = []
-        self._groups = self._grouped(time, error, direction)
+        self._kernels, self._groups = grouped(time, error, direction, self.level, self.white)
         self._whiteners: OrderedDict[tuple[int, int | None, int | None], tuple[Array, float]] = OrderedDict()
         self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
         self._used = 0
-
-    def _grouped(self, time: Array, error: Array, direction: Array | None) -> list[tuple[int, int, NDArray[np.intp]]]:
-        """(kernel, steps by which its shares are larger than the lot's, blocks)."""
-        groups: dict[tuple[int, int], list[int]] = {}
-        for block, there in enumerate(self.there):
-            profile = np.where(there, np.where(there, error[block], 1.0) / self.level[block], 1.0)
-            own = profile[there]
-            if own.size and own.max() < EVEN * own.min():
-                profile = np.ones_like(profile)
-            place = next((i for i, k in enumerate(self._kernels) if k.fits(time[block], there, profile)), None)
-            if place is None:
-                place = len(self._kernels)
-                way = None if direction is None else direction[block]
-                self._kernels.append(DwellProfile(time[block], there, profile, way))
-            # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
-            steps = 2 * round(0.5 * SHARE_STEP * np.log10(self.white / self.level[block] ** 2))
-            groups.setdefault((place, steps), []).append(block)
-        return [(place, steps, np.array(blocks)) for (place, steps), blocks in groups.items()]
 
     @cached_property
     def _wander(self) -> tuple[Array, Array] | None:
@@ -153,30 +111,20 @@ class Covariance:
 
     def about_mean(self, shares: Shares) -> Array:
         """Mean variance of the wander of each block about its record's own mean, over its white variance, (blocks,)."""
-        variance = np.zeros(len(self.level))
-        if self._wander is None:
-            return variance
-        for place, steps, blocks in self._groups:
-            there = self._kernels[place].there
-            for share, kernel in zip(shares, self._wander, strict=True):
-                own = kernel[place][np.ix_(there, there)]
-                n = max(len(own), 1)
-                variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * (np.trace(own) / n - own.sum() / n**2)
-        return variance
+        return self._of_wander(shares, _about_mean)
 
     def side_by_side(self, shares: Shares) -> Array:
         """Half the mean variance of the wander's steps from one dwell to the next, over the white variance, (blocks,)."""
+        return self._of_wander(shares, _of_steps)
+
+    def _of_wander(self, shares: Shares, variance_of: Callable[[Array], float]) -> Array:
+        """A variance of the wander of each block over its white variance, (blocks,), from the covariance of its dwells."""
         variance = np.zeros(len(self.level))
-        if self._wander is None:
-            return variance
-        for place, steps, blocks in self._groups:
+        for place, steps, blocks in self._groups if self._wander is not None else ():
             there = self._kernels[place].there
-            for share, kernel in zip(shares, self._wander, strict=True):
+            for share, kernel in zip(shares, self._wander or (), strict=True):
                 own = kernel[place][np.ix_(there, there)]
-                if len(own) > 1:
-                    each = np.diagonal(own)
-                    step = 0.5 * (each[1:] + each[:-1]) - np.diagonal(own, 1)
-                    variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * float(np.mean(step))
+                variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * variance_of(own)
         return variance
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
@@ -211,7 +159,7 @@ class Covariance:
                     return white
                 b, n, m = columns.shape
                 white = np.empty((b, m, n))
-                few = max(_PIECE // max(n * m, 1), 1)
+                few = max(PIECE // max(n * m, 1), 1)
                 for some in (slice(start, start + few) for start in range(0, b, few)):
                     own = columns[some] / level[some, None, None]
                     white[some] = applied(whitener[0], np.swapaxes(own, -1, -2))
@@ -281,7 +229,7 @@ class Covariance:
             if whitener is None:
                 out[own] = rows[own] * white
                 continue
-            few = max(_PIECE // max(rows[0].size, 1), 1)
+            few = max(PIECE // max(rows[0].size, 1), 1)
             for some in np.split(own, range(few, own.size, few)):
                 out[some] = applied_back(whitener, rows[some])
         return out
@@ -309,16 +257,16 @@ class Covariance:
             out[members] = white**2 if whitener is None else np.einsum("mn,mn->n", whitener, whitener)
         return out / (self.level * noise.scale)[:, None] ** 2
 
-    def products(self, candidate: "Columns", shares: Shares) -> Array:
+    def products(self, candidate: Candidate, shares: Shares) -> Array:
         """Products cᵀV⁻¹c of columns with each other, for each value of their nonlinear parameters, (b, grid, p, p).
 
-        They depend on the columns and the shares alone, and are kept for the models that are tried at the same shares. Rows that
-        blocks share are whitened once.
+        They depend on the columns and the shares alone, and are kept for the models that are tried at the same shares.
         """
         name = (candidate.key, shares)
         kept = None if candidate.key is None else self._kept.get(name)
         if kept is None:
-            kept = self._products(candidate, shares)
+            level = self.level if candidate.blocks is None else self.level[candidate.blocks]
+            kept = products_of(candidate, level, self._by_whitener(shares, candidate.blocks))
             if candidate.key is not None:
                 self._kept[name] = kept
                 self._used += kept.size
@@ -327,19 +275,6 @@ class Covariance:
         else:
             self._kept.move_to_end(name)
         return kept
-
-    def _products(self, candidate: "Columns", shares: Shares) -> Array:
-        columns, blocks = candidate.columns, candidate.blocks
-        count, _, grid, p = columns.shape
-        level = self.level if blocks is None else self.level[blocks]
-        row_of = np.arange(count) if candidate.rows is None else candidate.rows
-        out = np.empty((level.size, grid, p, p))
-        for own, whitener, white in self._by_whitener(shares, blocks):
-            rows, back = np.unique(row_of[own], return_inverse=True)
-            few = max(_PIECE // columns[0].size, 1)
-            parts = np.split(rows, range(few, rows.size, few))
-            out[own] = np.concatenate([_squares(columns[some], whitener, white) for some in parts])[back]
-        return out / level[:, None, None, None] ** 2
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""

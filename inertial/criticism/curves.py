@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
-from inertial.criticism.space import Candidate, Space
+from inertial.criticism.space import Space
 
 Array = NDArray[np.float64]
 

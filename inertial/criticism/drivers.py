@@ -8,9 +8,10 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.penalty import log_p_value
 from inertial.criticism.problem import Problem
-from inertial.criticism.space import Candidate, Space
+from inertial.criticism.space import Space
 from inertial.quantities import attribute_drivers, is_clock
 from inertial.state import State
 

@@ -8,9 +8,9 @@ from scipy import optimize, stats
 
 from inertial import effects as catalogue
 from inertial.counts import degrees_of_freedom, number_of
+from inertial.criticism.bases import SEEN
 from inertial.criticism.field import Candidates
 from inertial.criticism.model import Model
-from inertial.criticism.space import SEEN
 from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]

@@ -14,12 +14,13 @@ from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.decisions import CLASS_WIDTH, RISES
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
+from inertial.criticism.freedom import refuse_without_freedom
 from inertial.criticism.handling import alternatives
 from inertial.criticism.handling.base import Exchangeable, Handling, Misfit
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
-from inertial.criticism.model import Model, refuse_without_freedom
+from inertial.criticism.model import Model
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import terms_of

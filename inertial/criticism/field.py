@@ -5,9 +5,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.handling.base import Handling, OfOneDwell, by_block
 from inertial.criticism.problem import Problem
-from inertial.criticism.space import Candidate, Gain, Space
+from inertial.criticism.space import Gain, Space
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from inertial.criticism import decisions
+from inertial.criticism.bases import orthonormal
 from inertial.criticism.decisions import BLOCKS
 from inertial.criticism.handling.base import soaks
 from inertial.criticism.heldout import residuals
 from inertial.criticism.model import Model
 from inertial.criticism.noise import LONGEST
 from inertial.criticism.problem import Problem
-from inertial.criticism.space import orthonormal
 
 Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "blocks of time"]

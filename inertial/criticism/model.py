@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism import variance
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.covariance import LARGE
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.problem import Problem
 from inertial.criticism.share_statistics import ShareStatistics
 from inertial.criticism.shares import best_shares, plausible_shares
-from inertial.criticism.space import Candidate, Space
+from inertial.criticism.space import Space
 from inertial.criticism.term import Term
-from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 
@@ -296,20 +296,3 @@ class Model:
     def without_term(self, term: Term) -> "Model":
         """The model less one term."""
         return self._variant([t for t in self.terms if t is not term])
-
-
-def refuse_without_freedom(model: Model) -> None:
-    """Refuse to judge a model that has as many coefficients as there are measurements: it fits any data.
-
-    Raises
-    ------
-    NotIdentified
-        No degree of freedom is left.
-    """
-    if model.at(model.problem.covariance.white_noise()).dof < 1:
-        count, series = model.problem.count, model.problem.blocks
-        raise NotIdentified(
-            f"model: {count // series} dwells a unit leave no degree of freedom to judge the model, more dwells than its "
-            "coefficients on "
-            "an axis are needed; measure more poses or repeats, or judge a smaller model"
-        )

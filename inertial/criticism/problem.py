@@ -8,10 +8,11 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.covariance import Covariance
 from inertial.criticism.handling.base import Handling, by_block
 from inertial.criticism.lot import Lot
-from inertial.criticism.space import Candidate
+from inertial.criticism.shared_rows import finest_rows, shared_rows
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 
@@ -221,7 +222,7 @@ class Problem:
             rows = None if shared else self.rows_of(own)
             every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
             rows_of.append(rows)
-        rows = self._finest(rows_of)
+        rows = finest_rows(rows_of, radial=self.lot.radial)
         count = self.blocks if rows is None else int(rows.max()) + 1
         columns = np.empty((count, len(grid), every[0].shape[-1], self.n))
         for place, (own, of_own) in enumerate(zip(every, rows_of, strict=True)):
@@ -230,30 +231,9 @@ class Problem:
             columns[:, place] = np.swapaxes(own, -1, -2)
         return Candidate(columns.transpose(0, 3, 1, 2), shared, rows=rows, key=key)
 
-    def _finest(self, rows_of: Sequence[NDArray[np.intp] | None]) -> NDArray[np.intp] | None:
-        """The rows of blocks for the columns of several values: where they differ at one, they differ."""
-        known = [rows for rows in rows_of if rows is not None]
-        if len(known) < len(rows_of):
-            return None
-        finest = max(known, key=lambda rows: int(rows.max()))
-        by_unit = self.blocks > 3 and not self.lot.radial and any(rows[0] != rows[3] for rows in known)
-        by_axis = not self.lot.radial and any(rows[0] != rows[1] for rows in known)
-        return None if by_unit and by_axis else finest
-
     def rows_of(self, columns: Array) -> NDArray[np.intp] | None:
         """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None."""
-        if self.lot.radial:
-            return np.zeros(self.blocks, dtype=np.intp) if np.all(columns == columns[:1]) else None
-        by_unit = columns.reshape(-1, 3, *columns.shape[1:])
-        # most candidates differ in a few values already
-        axes = np.array_equal(by_unit[-1, 0, -1], by_unit[-1, 2, -1]) and bool(np.all(by_unit == by_unit[:, :1]))
-        units = len(by_unit) > 1 and np.array_equal(by_unit[-1, :, -1], by_unit[0, :, -1])
-        units = units and bool(np.all(by_unit == by_unit[:1]))
-        if not axes and not units:
-            return None
-        place = np.arange(self.blocks)
-        unit, axis = (0 if units else place // 3), (0 if axes else place % 3)
-        return unit * (1 if axes else 3) + axis + np.zeros(self.blocks, dtype=np.intp)
+        return shared_rows(columns, radial=self.lot.radial)
 
     def pieces(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None

@@ -10,13 +10,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.bases import eigen
+from inertial.criticism.candidate import Candidate, times_rows
 from inertial.criticism.decisions import AXES_DIFFER
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise
 from inertial.criticism.problem import Values
 from inertial.criticism.refinement import around, cell, on_scale
-from inertial.criticism.space import Candidate, eigen, times_rows
 from inertial.criticism.term import Term
 from inertial.design import grid_of
 from inertial.effects.base import Nonlinear

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.candidate import Candidate, times_rows
 from inertial.criticism.noise_shares import Shares
 from inertial.criticism.problem import Problem
-from inertial.criticism.space import Candidate, times_rows
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from inertial.criticism.bases import SEEN
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
 from inertial.criticism.field import Candidates
 from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import price
-from inertial.criticism.space import SEEN, Candidate, Space
+from inertial.criticism.space import Space
 
 Array = NDArray[np.float64]
 

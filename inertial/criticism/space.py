@@ -11,6 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.bases import SEEN, basis, eigen, schur
+from inertial.criticism.candidate import Candidate, times_rows
 from inertial.criticism.covariance import Covariance
 from inertial.criticism.noise_shares import Noise
 
@@ -18,38 +20,6 @@ Array = NDArray[np.float64]
 
 _PIECE = 500_000
 """Largest number of columns' values that are whitened at a time."""
-
-SEEN = 0.01
-"""Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """Columns of an effect at one or more values of its nonlinear parameters.
-
-    columns : (rows, n, grid, p), g per unit of the coefficient
-    shared : whether all blocks share the p coefficients
-    rows : (blocks,), the row of each block, every row for as many blocks; None where each block has a row of its own
-    units : the units that the columns are of, each with coefficients of its own for its three axes; those of the others are zero.
-        All units if None. Only where shared
-    key : under which products of the columns are stored; not stored if None
-    """
-
-    columns: Array
-    shared: bool
-    rows: NDArray[np.intp] | None = None
-    units: NDArray[np.intp] | None = None
-    key: object = None
-
-    @property
-    def of_blocks(self) -> Array:
-        """The columns of each block, (blocks, n, grid, p)."""
-        return self.columns if self.rows is None else self.columns[self.rows]
-
-    @property
-    def blocks(self) -> NDArray[np.intp] | None:
-        """The blocks of the units that the columns are of; None for all."""
-        return None if self.units is None else (3 * self.units[:, None] + np.arange(3)).reshape(-1)
 
 
 @dataclass(frozen=True)
@@ -124,7 +94,7 @@ class Space:
         for some in np.split(np.arange(blocks), range(few, blocks, few)):
             columns = np.concatenate([y[some, :, None], shared[some], local[some]], axis=-1)
             white = covariance.whiten(columns, noise.shares, some) / noise.scale[some, None, None]
-            self.q[some], self.ranks[some], own = _basis(white[..., t:])
+            self.q[some], self.ranks[some], own = basis(white[..., t:])
             self._log_determinant += own
             self.targets[some] = self.project(white[..., :t], some)
         self.gram = np.einsum("bnt,bns->ts", self.targets, self.targets)
@@ -143,7 +113,7 @@ class Space:
     @cached_property
     def rss(self) -> float:
         """Whitened sum of squares after the model."""
-        return _schur(self.gram)
+        return schur(self.gram)
 
     @cached_property
     def dof(self) -> int:
@@ -276,7 +246,7 @@ class Space:
         if self.targets.shape[-1] == 1:
             return Gain(by_block.sum(axis=0), rank, by_block)
         taken = np.einsum("bgrt,bgrs->gts", along, along)
-        drop = np.array([self.rss - _schur(self.gram - t) for t in taken])
+        drop = np.array([self.rss - schur(self.gram - t) for t in taken])
         return Gain(drop, rank, by_block)
 
     def _gain_shared(self, found: Products, *, one_unit: bool) -> Gain:
@@ -301,63 +271,3 @@ class Space:
         onto = np.einsum("gpr,gp->gr", vectors, along)
         drop = np.sum(np.where(seen, onto**2 / np.where(seen, values, 1.0), 0.0), axis=1)
         return Gain(drop, seen.sum(axis=1), np.zeros((0, len(own))))
-
-
-def times_rows(rows: Array, candidate: Candidate) -> Array:
-    """Rows (blocks, k, n) times the columns of a candidate, (b, grid, p, k)."""
-    if candidate.blocks is not None:
-        rows = rows[candidate.blocks]
-    count, n, grid, p = candidate.columns.shape
-    blocks, k = rows.shape[:2]
-    flat = candidate.columns.reshape(count, n, grid * p)
-    if candidate.rows is None:
-        product = rows @ flat
-    else:
-        # the blocks of each row beside each other: one product of matrices for all of them
-        order = np.argsort(candidate.rows, kind="stable")
-        sorted_ = bool(np.all(order[1:] > order[:-1]))
-        product = ((rows if sorted_ else rows[order]).reshape(count, -1, n) @ flat).reshape(blocks, k, grid * p)
-        if not sorted_:
-            product = product[np.argsort(order)]
-    return np.swapaxes(product, -1, -2).reshape(blocks, grid, p, k)
-
-
-def eigen(gram: Array) -> tuple[Array, Array]:
-    """Eigenvalues (..., p) and vectors (..., p, p) of symmetric matrices; of one row and column without a solver."""
-    if gram.shape[-1] == 1:
-        return gram[..., 0], np.ones(gram.shape)
-    return np.linalg.eigh(gram)
-
-
-def orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Orthonormal bases (blocks, n, p) of what the columns span, directions below the tolerance zeroed; ranks (blocks,)."""
-    return _basis(columns)[:2]
-
-
-def _basis(columns: Array) -> tuple[Array, NDArray[np.intp], float]:
-    """The same, and the logarithm of the determinant of the columns' products over all blocks, vanishing directions limited."""
-    if columns.shape[-1] == 0:
-        return columns, np.zeros(len(columns), dtype=np.intp), 0.0
-    size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
-    size = np.where(size > 0.0, size, 1.0)
-    q = columns / size[:, None, :]
-    keep = np.ones((1, 1), dtype=bool)
-    determinant: float | None = None
-    for tolerance in (1e-9, 0.5):  # the second turn removes rounding errors of the first
-        values, vectors = np.linalg.eigh(np.swapaxes(q, -1, -2) @ q)
-        if determinant is None:
-            determinant = float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(size)))
-        keep = values > tolerance
-        scale = np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)
-        q = q @ (vectors * scale[:, None, :])
-    return q, keep.sum(axis=-1), determinant or 0.0
-
-
-def _schur(gram: Array) -> float:
-    """Sum of squares of the first target after the others."""
-    if gram.shape[0] == 1:
-        return float(gram[0, 0])
-    size = np.sqrt(np.maximum(np.diag(gram)[1:], 1e-300))
-    inner = gram[1:, 1:] / np.outer(size, size)
-    cross = gram[1:, 0] / size
-    return float(gram[0, 0] - cross @ np.linalg.lstsq(inner, cross, rcond=1e-8)[0])

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, replace
 
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.problem import SHARED, Problem
-from inertial.criticism.space import Candidate
 from inertial.effects.base import AnyEffect
 
 

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from inertial import frames
 from inertial.criticism import decisions
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import curve, quantities, varies
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.problem import Problem
-from inertial.criticism.space import Candidate
 from inertial.criticism.term import Term
 from inertial.effects.covariate import COVARIATE_PREFIX
 from inertial.quantities import is_clock

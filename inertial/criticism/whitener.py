@@ -35,6 +35,35 @@ class DwellProfile:
         return alike and float(ratio.max()) < EVEN and float(ratio.min()) > 1.0 / EVEN
 
 
+def grouped(
+    time: Array, error: Array, direction: Array | None, level: Array, white: float
+) -> tuple[list[DwellProfile], list[tuple[int, int, NDArray[np.intp]]]]:
+    """Profiles of dwells that whiteners are made for, and groups of blocks that have a whitener in common.
+
+    A group is the place of its profile, the steps of the lattice by which its shares are larger than the lot's, and its blocks.
+
+    Parameters
+    ----------
+    time, error : (blocks, n); direction : (blocks, n, 3) or None; as of :class:`inertial.criticism.covariance.Covariance`
+    level : (blocks,), typical white standard error, g; white : the lot's white variance, g²
+    """
+    profiles: list[DwellProfile] = []
+    groups: dict[tuple[int, int], list[int]] = {}
+    for block, there in enumerate(np.isfinite(error)):
+        profile = np.where(there, np.where(there, error[block], 1.0) / level[block], 1.0)
+        own = profile[there]
+        if own.size and own.max() < EVEN * own.min():
+            profile = np.ones_like(profile)
+        place = next((i for i, one in enumerate(profiles) if one.fits(time[block], there, profile)), None)
+        if place is None:
+            place = len(profiles)
+            profiles.append(DwellProfile(time[block], there, profile, None if direction is None else direction[block]))
+        # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
+        steps = 2 * round(0.5 * SHARE_STEP * np.log10(white / level[block] ** 2))
+        groups.setdefault((place, steps), []).append(block)
+    return profiles, [(place, steps, np.array(blocks)) for (place, steps), blocks in groups.items()]
+
+
 def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Array, Array]) -> tuple[Array, float]:
     """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance.
 

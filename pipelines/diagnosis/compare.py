@@ -9,9 +9,10 @@ from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
 from inertial.criticism.comparison import estimate, residuals_of, rms
+from inertial.criticism.freedom import refuse_without_freedom
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.left_out import left_out
-from inertial.criticism.model import Model, refuse_without_freedom
+from inertial.criticism.model import Model
 from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import intervals, settled, terms_of
 from inertial.effects import StationEffect

@@ -5,9 +5,11 @@ import pytest
 from scipy import stats
 
 from inertial.criticism.adequacy import _drops
+from inertial.criticism.bases import SEEN
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.covariance import Covariance
 from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.space import SEEN, Candidate, Space
+from inertial.criticism.space import Space
 from inertial.criticism.tail_areas import log_chi2_tail, log_f_tail
 from inertial.noise.flicker import flicker_kernel, summed, time_constants
 

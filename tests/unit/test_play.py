@@ -8,7 +8,7 @@ import pytest
 
 from inertial import effects as catalogue
 from inertial import operators
-from inertial.criticism import adequacy, covariance, model, problem, share_statistics, space
+from inertial.criticism import adequacy, covariance, model, problem, products, share_statistics, space
 from inertial.criticism.drivers import drivers_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.wrong_pose import WrongPose
@@ -61,8 +61,10 @@ def test_small_pieces_and_empty_stores_change_no_number(monkeypatch: pytest.Monk
     lot = lot_of(measured(made.dwells, made.history))
     whole = numbers(lot)
     assert whole[0] > np.log(adequacy.CERTAIN_BELOW)  # then noise is drawn
-    for module in (problem, adequacy, space, covariance):
+    for module in (problem, adequacy, space):
         monkeypatch.setattr(module, "_PIECE", 300)
+    for module in (covariance, products):
+        monkeypatch.setattr(module, "PIECE", 300)
     monkeypatch.setattr(problem, "_CACHE", 0)
     monkeypatch.setattr(covariance, "_PRODUCTS", 0)
     monkeypatch.setattr(share_statistics, "_KEPT", 0)

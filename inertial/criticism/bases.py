@@ -1,0 +1,53 @@
+"""Bases of what columns span, eigenvalues of their products, and what is visible of a column."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SEEN = 0.01
+"""Share of a column, after the base model, below which it is not visible (noise of the drivers has this size)."""
+
+
+def eigen(gram: Array) -> tuple[Array, Array]:
+    """Eigenvalues (..., p) and vectors (..., p, p) of symmetric matrices; of one row and column without a solver."""
+    if gram.shape[-1] == 1:
+        return gram[..., 0], np.ones(gram.shape)
+    return np.linalg.eigh(gram)
+
+
+def orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Orthonormal bases (blocks, n, p) of what the columns span, directions below the tolerance zeroed; ranks (blocks,)."""
+    return basis(columns)[:2]
+
+
+def basis(columns: Array) -> tuple[Array, NDArray[np.intp], float]:
+    """Bases and ranks as of :func:`orthonormal`, and the logarithm of the determinant of the columns' products over all blocks.
+
+    Directions that vanish count with a limit.
+    """
+    if columns.shape[-1] == 0:
+        return columns, np.zeros(len(columns), dtype=np.intp), 0.0
+    size = np.sqrt(np.einsum("bnp,bnp->bp", columns, columns))
+    size = np.where(size > 0.0, size, 1.0)
+    q = columns / size[:, None, :]
+    keep = np.ones((1, 1), dtype=bool)
+    determinant: float | None = None
+    for tolerance in (1e-9, 0.5):  # the second turn removes rounding errors of the first
+        values, vectors = np.linalg.eigh(np.swapaxes(q, -1, -2) @ q)
+        if determinant is None:
+            determinant = float(np.sum(np.log(np.maximum(values, SEEN**2))) + 2.0 * np.sum(np.log(size)))
+        keep = values > tolerance
+        scale = np.where(keep, 1.0 / np.sqrt(np.where(keep, values, 1.0)), 0.0)
+        q = q @ (vectors * scale[:, None, :])
+    return q, keep.sum(axis=-1), determinant or 0.0
+
+
+def schur(gram: Array) -> float:
+    """Sum of squares of the first target after the others."""
+    if gram.shape[0] == 1:
+        return float(gram[0, 0])
+    size = np.sqrt(np.maximum(np.diag(gram)[1:], 1e-300))
+    inner = gram[1:, 1:] / np.outer(size, size)
+    cross = gram[1:, 0] / size
+    return float(gram[0, 0] - cross @ np.linalg.lstsq(inner, cross, rcond=1e-8)[0])

@@ -1,0 +1,56 @@
+"""Columns of an effect as a candidate for a model, and rows times them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Columns of an effect at one or more values of its nonlinear parameters.
+
+    columns : (rows, n, grid, p), g per unit of the coefficient
+    shared : whether all blocks share the p coefficients
+    rows : (blocks,), the row of each block, every row for as many blocks; None where each block has a row of its own
+    units : the units that the columns are of, each with coefficients of its own for its three axes; those of the others are zero.
+        All units if None. Only where shared
+    key : under which products of the columns are stored; not stored if None
+    """
+
+    columns: Array
+    shared: bool
+    rows: NDArray[np.intp] | None = None
+    units: NDArray[np.intp] | None = None
+    key: object = None
+
+    @property
+    def of_blocks(self) -> Array:
+        """The columns of each block, (blocks, n, grid, p)."""
+        return self.columns if self.rows is None else self.columns[self.rows]
+
+    @property
+    def blocks(self) -> NDArray[np.intp] | None:
+        """The blocks of the units that the columns are of; None for all."""
+        return None if self.units is None else (3 * self.units[:, None] + np.arange(3)).reshape(-1)
+
+
+def times_rows(rows: Array, candidate: Candidate) -> Array:
+    """Rows (blocks, k, n) times the columns of a candidate, (b, grid, p, k)."""
+    if candidate.blocks is not None:
+        rows = rows[candidate.blocks]
+    count, n, grid, p = candidate.columns.shape
+    blocks, k = rows.shape[:2]
+    flat = candidate.columns.reshape(count, n, grid * p)
+    if candidate.rows is None:
+        product = rows @ flat
+    else:
+        # the blocks of each row beside each other: one product of matrices for all of them
+        order = np.argsort(candidate.rows, kind="stable")
+        sorted_ = bool(np.all(order[1:] > order[:-1]))
+        product = ((rows if sorted_ else rows[order]).reshape(count, -1, n) @ flat).reshape(blocks, k, grid * p)
+        if not sorted_:
+            product = product[np.argsort(order)]
+    return np.swapaxes(product, -1, -2).reshape(blocks, grid, p, k)
