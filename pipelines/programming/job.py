@@ -121,8 +121,10 @@ def _refuse_older(ledger: Ledger, run: Run, serial: str, day: str) -> None:
     for one in ledger.calibrations(serial):
         if one.run == run.id or not one.holds(day):
             continue
-        theirs, ours = _measured_at(Run(run.archive, one.run)), _measured_at(run)
-        if theirs >= ours:
+        other = Run(run.archive, one.run)
+        theirs, ours = _measured_at(other), _measured_at(run)
+        same = bool(run.about.get("capture")) and other.about.get("capture") == run.about.get("capture")
+        if same or theirs >= ours:
             raise WrongUse(
                 f"program: unit {serial}: certificate {one.certificate} is of run {one.run}, measured {theirs}, and run {run.id} "
                 f"was measured {ours}, not after it; write that run, or end its certificate with 'tumbleline revoke {serial}'"

@@ -397,21 +397,26 @@ def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> Non
     assert interrupted.number == 2
 
 
-def newer(run: Run) -> Run:
-    """Another run of the same units, measured after it and certified for A1."""
+def newer(run: Run, change: tuple[str, str]) -> Run:
+    """Another run of the same units, made after it and certified for A1."""
     from capture_double import small_run
 
     folder = Path(str(run.archive.root)).parent
-    other = small_run(folder, None, ('"small"', '"later"'))
+    other = small_run(folder, None, change)
     certify(Ledger(run.archive.root), other, ["A1"])
     return other
 
 
-def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run) -> None:
+@pytest.mark.parametrize(
+    "change",
+    [("temperatures_C = [0.0, 50.0]", "temperatures_C = [0.0, 51.0]"), ('"small"', '"later"')],
+    ids=["measured later", "the same data again"],
+)
+def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change: tuple[str, str]) -> None:
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     ledger.revoke("A1", REASON, day=today())  # a writing of this run began once and was not completed
-    other = newer(run)
+    other = newer(run, change)
     with pytest.raises(
         WrongUse, match=rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
     ):

