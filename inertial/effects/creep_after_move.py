@@ -15,6 +15,9 @@ a creep of 17 s loses 2 % of its reduction."""
 _PARTS = 12
 """Of the way between two poses."""
 
+_MIDDLE = 1.0 - (np.arange(_PARTS) + 0.5) / _PARTS
+"""Part of the way that is still to go in the middle of each part."""
+
 
 class CreepAfterMove(SensorEffect):
     """Output that creeps to its new value after a change of specific force."""
@@ -41,9 +44,12 @@ class CreepAfterMove(SensorEffect):
         """
         del nonlinear
         since = np.full_like(state.time, 1.0) if state.since_move is None else state.since_move
-        kick = _on_arrival(state, axis, tau, since) if way else state.force_step[..., axis]
-        left = state.remember((self.id, axis, tau, way), lambda: operators.relaxation(state.time, since, kick, tau))
-        return stack(state, [left])
+
+        def left() -> Array:
+            kick = _on_arrival(state, axis, tau, since) if way else state.force_step[..., axis]
+            return operators.relaxation(state.time, since, kick, tau)
+
+        return stack(state, [state.remember((self.id, axis, tau, way), left)])
 
     def start_columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
         del axis, nonlinear
@@ -62,16 +68,28 @@ def _on_arrival(state: State, axis: int, tau: float, since: Array) -> Array:
     step = state.force_step[..., axis]
     if state.outer is None or state.inner is None:
         return step
-    at = np.stack(np.broadcast_arrays(state.outer, state.inner), axis=-1)
-    turned = np.zeros_like(at)
-    turned[..., 1:, :] = np.diff(at, axis=-2)
-    between = np.zeros_like(since + step)
-    between[..., 1:] = np.diff(np.broadcast_to(state.time, between.shape), axis=-1)
-    seconds = np.minimum(np.max(np.abs(turned), axis=-1) / _SPEED, np.maximum(between - since, 0.0))
-    part = np.arange(_PARTS + 1) / _PARTS
-    ways = at[..., None, :] - (1.0 - part[:, None]) * turned[..., None, :]
-    force = frames.force_from_angles(ways[..., 0], ways[..., 1])[..., axis]
-    changes = np.diff(force, axis=-1)
-    middle = 1.0 - 0.5 * (part[1:] + part[:-1])
-    lost = np.sum(changes * -np.expm1(-seconds[..., None] * middle / tau), axis=-1)
-    return step - lost
+    outer, inner = _once(state.outer), _once(state.inner)
+    alike = len(outer) == len(inner) == 1
+    key = ("changes on the way",)
+    # the same for every τ and axis, and small where all units are on one table
+    changes = state.remember(key, lambda: _changes(outer, inner)) if alike else _changes(outer, inner)
+    turned = np.maximum(*(np.abs(np.diff(angle, axis=-1, prepend=angle[..., :1])) for angle in (outer, inner)))
+    time, after = _once(state.time), _once(since)
+    between = np.diff(time, axis=-1, prepend=time[..., :1])
+    seconds = np.minimum(turned / _SPEED, np.maximum(between - after, 0.0))
+    left = -np.expm1(-seconds[..., None] * _MIDDLE / tau)
+    return step - np.sum(changes[..., axis] * left, axis=-1)
+
+
+def _changes(outer: Array, inner: Array) -> Array:
+    """Changes of force in the parts of the way to each pose, (..., n, parts, 3), g, at angles (..., n), rad."""
+    part = 1.0 - np.arange(_PARTS + 1) / _PARTS
+    ways = [
+        angle[..., None] - part * np.diff(angle, axis=-1, prepend=angle[..., :1])[..., None] for angle in (outer, inner)
+    ]
+    return np.diff(frames.force_from_angles(*ways), axis=-2)
+
+
+def _once(values: Array) -> Array:
+    """Values (units, n), one row where those of all units are equal."""
+    return values[:1] if values.ndim > 1 and bool(np.all(values == values[:1])) else values
