@@ -52,8 +52,13 @@ def diagnosed(root: Path, dwells: Path) -> tuple[float, float, float, dict[str, 
 
 
 _COMMAND = """
-import atexit, resource, sys
-atexit.register(lambda: print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, end=""))
+import atexit, pathlib, sys
+
+def peak():  # not ru_maxrss, which begins with the memory of the process that started this one
+    lines = pathlib.Path("/proc/self/status").read_text().splitlines()
+    print(next(line.split()[1] for line in lines if line.startswith("VmHWM")), end="")
+
+atexit.register(peak)
 from pipelines.cli import main
 sys.exit(main())
 """
