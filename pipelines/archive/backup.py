@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 from pipelines.archive import files, packs
 from pipelines.archive.files import TEMPORARY
+from pipelines.archive.hash_chain import name_of_entry
 from schemas.errors import ArchiveUnusable, WrongUse
 
 if TYPE_CHECKING:
@@ -52,11 +53,11 @@ class _ChainAtStart:
 
     Attributes
     ----------
-    entries : numbers of its entries
+    entries : names of its entries
     hashes : SHA-256 of files by their names, as the newest entry that names each states it
     """
 
-    entries: frozenset[int]
+    entries: frozenset[str]
     hashes: Mapping[str, str]
 
     def lacks_entry_of(self, name: str, data: bytes) -> bool:
@@ -64,7 +65,7 @@ class _ChainAtStart:
         if not SEAL.fullmatch(name):
             return False
         try:
-            return json.loads(data)["entry"] not in self.entries
+            return name_of_entry(json.loads(data)["entry"]) not in self.entries
         except (ValueError, TypeError, KeyError):  # 'tumbleline verify' reports it
             return False
 
@@ -112,8 +113,7 @@ def _chain_of(root: Place, entries: set[str]) -> _ChainAtStart:
             hashes.update(files.read_json(root / name).get("files", {}))
         except ArchiveUnusable:  # 'tumbleline verify' reports it
             continue
-    numbers = (PurePosixPath(name).stem for name in entries)
-    return _ChainAtStart(frozenset(int(number) for number in numbers if number.isdecimal()), hashes)
+    return _ChainAtStart(frozenset(entries), hashes)
 
 
 def _as_stated(root: Place, name: str, chain: _ChainAtStart) -> bool | None:

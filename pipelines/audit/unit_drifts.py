@@ -15,6 +15,7 @@ from inertial.population.drift import (
     leaves,
     standing,
 )
+from pipelines.audit.drifts import AHEAD, KindDrift
 from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, last_of_each, pairs_of
 from pipelines.audit.parameters import FAMILY_OF
 
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Index = NDArray[np.int64]
-from pipelines.audit.drifts import AHEAD, KindDrift
 
 
 @dataclass(frozen=True)

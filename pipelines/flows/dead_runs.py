@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from prefect.client.schemas.objects import FlowRun
 
 PROCESSES = Path("/proc")
+OF_KERNEL = 0x00200000
+"""Flag of a thread of the kernel (PF_KTHREAD of Linux), which never has an environment."""
+
 STARTED_WITHIN = timedelta(seconds=1)
 """Longest time for which a process that is being started may have no environment yet."""
 
@@ -148,9 +151,9 @@ def _environment(process: Path) -> bytes:
     until = monotonic() + STARTED_WITHIN.total_seconds()
     try:
         while not (environment := (process / "environ").read_bytes()):
-            # the state follows the name, which may hold brackets itself; Z: ended, and not yet collected by its parent
-            state = (process / "stat").read_text(errors="replace").rpartition(")")[2].split()[0]
-            if state in "ZX" or monotonic() > until:
+            # state and flags follow the name, which may hold brackets itself; Z: ended, and not yet collected by its parent
+            state, *_, flags = (process / "stat").read_text(errors="replace").rpartition(")")[2].split()[:7]
+            if state in "ZX" or int(flags) & OF_KERNEL or monotonic() > until:
                 break
             sleep(0.01)
     except OSError:

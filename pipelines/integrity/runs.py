@@ -51,7 +51,9 @@ def check_run(run: Run, checked: VerifiedPart, schema: int) -> VerifiedPart:
     _check_others(run, names, manifests, checked)
     checked.remarks += differing_libraries(run.id, manifests)
     if not names.keys() & {"report.json", SEALED} and capture:
-        command = "'tumbleline rerun'" if about.get("rerun_of") else "its command"
+        command = (
+            "'tumbleline rerun'" if "because" in about else "its command"
+        )  # a fit states its origin, but no reasons
         checked.remarks.append(f"run {run.id} is not finished: give {command} again to continue it")
     return checked
 

@@ -58,11 +58,11 @@ def run_of_process(pid: int) -> Any:
     return SimpleNamespace(id="run-1", infrastructure_pid=str(pid))
 
 
-def processes(folder: Path, state: str, environment: bytes) -> Path:
+def processes(folder: Path, state: str, environment: bytes, flags: int = 4194560) -> Path:
     """A folder as ``/proc`` with process 7, whose name holds a bracket and a state."""
     process = folder / "7"
     process.mkdir(parents=True)
-    (process / "stat").write_text(f"7 (a) Z) {state} 1 7 7 0")
+    (process / "stat").write_text(f"7 (a) Z) {state} 1 7 7 0 -1 {flags} 0 0")
     (process / "environ").write_bytes(environment)
     return process
 
@@ -85,7 +85,7 @@ def test_a_process_that_is_being_started_is_asked_again(tmp_path: Path, monkeypa
 @pytest.mark.parametrize(
     ("state", "environment"),
     [("Z", b""), ("S", b""), ("S", b"PREFECT__FLOW_RUN_ID=run-2\0")],
-    ids=["ended", "of-the-kernel", "of-another-run"],
+    ids=["ended", "never-starts", "of-another-run"],
 )
 def test_a_process_that_does_not_work_on_the_run_does_not_live(
     state: str, environment: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -95,3 +95,11 @@ def test_a_process_that_does_not_work_on_the_run_does_not_live(
     processes(tmp_path, state, environment)
     assert not dead_runs.lives(run_of_process(7))
     assert not dead_runs.lives(run_of_process(8))
+
+
+def test_a_thread_of_the_kernel_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run without a number looks at every process, among them a hundred such threads."""
+    monkeypatch.setattr(dead_runs, "PROCESSES", tmp_path)
+    monkeypatch.setattr(dead_runs, "sleep", lambda _seconds: pytest.fail("waited"))
+    processes(tmp_path, "S", b"", flags=2129984)
+    assert not dead_runs.lives(SimpleNamespace(id="run-1", infrastructure_pid=None))
