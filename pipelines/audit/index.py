@@ -123,7 +123,7 @@ def up_to_date(archive: Archive, distribute: Distributor | None = None, workers:
 
     Parameters
     ----------
-    spread, workers : where parts are made, see :func:`pipelines.parallel.map_partitions`
+    distribute, workers : where parts are made, see :func:`pipelines.parallel.map_partitions`
     """
     place = archive.root / FOLDER
     if not (archive.root / "runs").is_dir():  # a mistyped address must not become a folder

@@ -119,12 +119,15 @@ def figures_of(index: AuditIndex, calibrations: Calibrations, chosen: Flags) -> 
         kept &= chosen[row]
     else:
         row = place
+    chosen_rows = np.flatnonzero(kept)
+    # an index grown run by run and one made again hold the same rows in another order; sums must not depend on it
+    chosen_rows = chosen_rows[np.argsort(row[chosen_rows], kind="stable")]
     return Figures(
-        row[kept],
-        frame["figure"].astype(str).to_numpy(object)[kept],
-        frame["value"].to_numpy(float)[kept],
-        frame["limit"].to_numpy(float)[kept],
-        frame["unit_text"].astype(str).to_numpy(object)[kept],
+        row[chosen_rows],
+        frame["figure"].astype(str).to_numpy(object)[chosen_rows],
+        frame["value"].to_numpy(float)[chosen_rows],
+        frame["limit"].to_numpy(float)[chosen_rows],
+        frame["unit_text"].astype(str).to_numpy(object)[chosen_rows],
     )
 
 

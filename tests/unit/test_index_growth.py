@@ -4,15 +4,19 @@ import json
 import logging
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from capture_double import small_run
 
 from pipelines.archive import Archive
 from pipelines.audit import index_growth
-from pipelines.audit.index import FOLDER, part_folders, runs_of, up_to_date, version_of_rows
+from pipelines.audit.calibrations import load
+from pipelines.audit.index import FOLDER, AuditIndex, part_folders, runs_of, up_to_date, version_of_rows
 from pipelines.audit.index_growth import add_runs
+from pipelines.audit.population import Figures, figures_of
 
 
 @pytest.fixture
@@ -70,6 +74,25 @@ def test_a_run_that_was_added_and_changed_is_read_again(archive: Archive) -> Non
     index = up_to_date(archive)
     assert (index.made, index.kept) == (6, 0), "its part is made anew"
     assert {row["run"] for row in rows(archive, "runs")} == set(names(archive))
+
+
+def test_figures_do_not_depend_on_the_order_of_parts(archive: Archive) -> None:
+    for name in names(archive):
+        add_runs(archive, [name])
+    index = up_to_date(archive)
+    backwards = replace(index, parts=index.parts[::-1])
+    assert len(index.parts) == 6
+
+    def figures(of: AuditIndex) -> Figures:
+        runs = of.table("runs", ["run", "device", "station"]).to_pandas().astype(str)
+        # an audit counts copies of a capture once; here each is a calibration of its own, a day after the one before
+        calibrations = load(of, runs.assign(day=[20_000.0 + names(archive).index(run) for run in runs["run"]]))
+        return figures_of(of, calibrations, np.ones(calibrations.day.size, dtype=bool))
+
+    here, there = figures(index), figures(backwards)
+    assert here.row.size > 0
+    for column in ("row", "figure", "value", "limit", "unit_text"):
+        np.testing.assert_array_equal(getattr(here, column), getattr(there, column), err_msg=column)
 
 
 def test_an_index_that_cannot_grow_is_a_warning(archive: Archive, caplog: pytest.LogCaptureFixture) -> None:
