@@ -232,9 +232,10 @@ def _part_line(name: str, rows: list[dict[str, Any]]) -> str:
         if ratios:
             middle = ratios[len(ratios) // 2]
             line.append(f"within 30 % of the promise {interval(inside, len(ratios))}, median {middle:.2f}")
-            clean = sorted(p["added"] for p in made if p["added"] is not None)
-            inside = sum(0.7 <= r <= 1.3 for r in clean)
-            line.append(f"without noise {interval(inside, len(clean))}, median {clean[len(clean) // 2]:.2f}")
+            for said, key in (("without noise", "added"), ("and at the noise of the promise", "same_noise")):
+                clean = sorted(p[key] for p in made if p[key] is not None)
+                inside = sum(0.7 <= r <= 1.3 for r in clean)
+                line.append(f"{said} {interval(inside, len(clean))}, median {clean[len(clean) // 2]:.2f}")
         line.append(
             "; ".join(
                 " | ".join(p["pair"]) + f" {p['promised']:.0f}→{p['measured']:.0f}"

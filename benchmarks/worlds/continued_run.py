@@ -16,7 +16,7 @@ Floats = np.ndarray
 RAMP = 3.0 / 60.0  # K/s of the air
 LAG = 300.0  # s, sensors behind the air
 SETTLED = 0.1  # K
-HORIZON = 6.0 * 3600.0  # of station time after the run
+HORIZON = 24.0 * 3600.0  # of station time after the run: a proposal may take a day
 MOVE = 20.0
 
 

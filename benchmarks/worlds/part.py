@@ -85,7 +85,7 @@ def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step], before
     groups = [list(n.effects.ids) for n in after.named] if after is not None else []
     wrong = other if truth == one else one
     promised = dict(wanted.if_true).get(truth)
-    measured = added = None
+    measured = added = same_noise = None
     if after is not None and promised is not None:
         measured = separation(after, truth, wrong)
         # of what the steps add, luck apart: the devices without their noise, judged by the noise that was there
@@ -93,9 +93,12 @@ def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step], before
         clean = separation(after, truth, wrong, run.tables(steps, quiet=True))
         clean -= separation(before, truth, wrong, run.tables(quiet=True))
         added = clean / max(expected, 1e-9)
+        # the same at the noise that was known when it was promised: what is left is the prediction of the physics
+        clean = separation(after, truth, wrong, run.tables(steps, quiet=True), of=before)
+        same_noise = (clean - separation(before, truth, wrong, run.tables(quiet=True))) / max(expected, 1e-9)
     return {
         "pair": list(wanted.pair), "minutes": wanted.minutes, "steps": len(steps), "promised": promised,
-        "measured": measured, "added": added,
+        "measured": measured, "added": added, "same_noise": same_noise,
         "after": groups, "kinds": list(wanted.kinds),
         # of a pair without the truth neither is right: parted is what leaves neither with the truth
         "parted": any(truth in g for g in groups) and not any(truth in g and wrong in g for g in groups)
@@ -103,11 +106,13 @@ def _measured(run: Continued, truth: str, wanted: Any, steps: list[Step], before
     }  # fmt: skip
 
 
-def separation(diagnosis: Any, truth: str, wrong: str, instead: Any = None) -> float:
+def separation(diagnosis: Any, truth: str, wrong: str, instead: Any = None, *, of: Any = None) -> float:
     """Chi-square by which the wrong one of two leaves more than the true one, both fitted to everything measured.
 
-    ``instead`` are tables of the same dwells to be fitted in place of those of the diagnosis, at its noise.
+    ``instead`` are tables of the same dwells to be fitted in place of those of the diagnosis, at its noise or at that of the
+    diagnosis ``of``.
     """
+    whose = of or diagnosis
     from inertial import effects as catalogue
     from inertial.criticism.model import Model
     from inertial.criticism.problem import Problem
@@ -116,16 +121,19 @@ def separation(diagnosis: Any, truth: str, wrong: str, instead: Any = None) -> f
     from inertial.design import grid_of
     from pipelines.tables.dwells import lot_of, measured
 
-    problem, rest, noise = diagnosis.problem, diagnosis.base.terms, diagnosis.final.noise
+    problem, rest, noise = diagnosis.problem, diagnosis.base.terms, whose.final.noise
     if instead is not None:
         problem = Problem(lot_of(measured(*instead)))
-        noise = problem.covariance.rescaled(noise, diagnosis.problem.covariance)
+        noise = problem.covariance.rescaled(noise, whose.problem.covariance)
     base = Model(problem, rest)
     left = []
     for name in (wrong, truth):
         effect = catalogue.get(name)
-        grid = grid_of(effect, problem.lot.state)
-        gain = base.at(noise).gain(problem.candidate(effect, grid))
-        term = refine(base, Term(effect, tuple(grid[int(np.argmax(gain.drop))].items())), noise)
-        left.append(Model(problem, [*rest, term]).at(noise).rss)
-    return float((left[0] - left[1]) / diagnosis.final.space.variance)
+        # as many columns as an effect has in a class, the state of its memory unknown
+        terms = [
+            Term(effect, tuple(values.items()), first=effect.primary) for values in grid_of(effect, problem.lot.state)
+        ]
+        squares = [Model(problem, [*rest, term]).at(noise).rss for term in terms]
+        best = refine(base, terms[int(np.argmin(squares))], noise)
+        left.append(min(*squares, Model(problem, [*rest, best]).at(noise).rss))
+    return float((left[0] - left[1]) / whose.final.space.variance)

@@ -230,12 +230,12 @@ class Model:
         at = 0
         for other in (t for t in self.terms if t.shared):
             count = self._of(other).shape[-1]
-            if other is term:
+            if other.key == term.key:  # a model that was kept has an equal term
                 space = self.space
                 sizes = np.linalg.lstsq(space.gram[1:, 1:], space.gram[1:, 0], rcond=1e-10)[0]
                 return sizes[at : at + count].astype(np.float64)
             at += count
-        return np.zeros(0)
+        raise KeyError(f"{term.effect.id}: not a term of the model")
 
     def explained(self, candidate: Candidate, floor: float) -> float:
         """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""
@@ -294,5 +294,5 @@ class Model:
         return self._variant([t for t in self.terms if t.effect.id != effect_id])
 
     def without_term(self, term: Term) -> "Model":
-        """The model less one term."""
-        return self._variant([t for t in self.terms if t is not term])
+        """The model less one term; a model that was kept holds an equal one."""
+        return self._variant([t for t in self.terms if t.key != term.key])

@@ -29,7 +29,7 @@ def verdict(document: dict[str, Any]) -> str:
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
         rest = f"; also missing: {', and '.join(named)}" if named else ""
-        return f"{told}; the data: {'; '.join(spoilt)}{rest}."
+        return f"{told}; these figures are without the faults of the data: {'; '.join(spoilt)}{rest}."
     if named:
         return f"{told}; missing: {', and '.join(named)}."
     driver = (document["unexplained"] or {}).get("driver")

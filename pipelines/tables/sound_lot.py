@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from inertial.criticism.decisions import ADEQUATE_ABOVE
 from inertial.criticism.faults import find_faults
 from inertial.errors import InertialError
 from pipelines.tables.condense import condense
@@ -116,5 +117,8 @@ def error_of(verdict: HasFigures) -> dict[str, Any]:
 
 
 def is_small(error: Mapping[str, Any]) -> bool:
-    """Whether a significant error, ``rms_ug`` and ``floor_ug``, is so near the noise that it can be mistaken for it."""
-    return bool(error["rms_ug"] < _SMALL * error["floor_ug"])
+    """Whether an error is significant by its ``p_value``, but so near the noise that it can be mistaken for it.
+
+    A model that is not adequate only because of faults of the data leaves no significant error beside them.
+    """
+    return bool(error["rms_ug"] < _SMALL * error["floor_ug"] and error["p_value"] <= ADEQUATE_ABOVE)

@@ -78,3 +78,12 @@ def test_an_error_below_the_noise_that_is_no_noise_is_said_to_be_small(rms, told
     said = verdict({**document, "classes": [{"effects": ["scale_temperature_quadratic"], "scope": "sensor"}]})
     assert said.startswith("NOT ADEQUATE")
     assert ("the misfit is smaller than the noise" in said) == told_so
+
+
+def test_a_model_that_fits_beside_faulty_dwells_has_no_misfit() -> None:
+    error = {"rms_ug": 24.6, "floor_ug": 28.9, "p_value": 0.74}
+    group = {"effects": ["gain_step"], "scope": "data", "units": ["SN-2"], "dwells": [19]}
+    document = {"adequate": False, "error": error, "blocked_by": [], "units": ["SN-1", "SN-2"], "unexplained": None}
+    said = verdict({**document, "classes": [group]})
+    assert "misfit" not in said
+    assert said.endswith("these figures are without the faults of the data: gain_step (SN-2, dwell 19).")

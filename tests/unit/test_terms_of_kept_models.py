@@ -1,0 +1,73 @@
+"""A model with one more term is kept by the term's values: what is asked of it with an equal term is what was asked first."""
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from inertial.criticism.examination import ExaminedRun
+from inertial.criticism.handling.gain_step import GainStep
+from inertial.criticism.model import Model
+from inertial.criticism.term import Term
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.tables.dwells import lot_of, measured
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
+
+from noise import Noise
+from world import World, make
+
+MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
+PPM = 500.0
+FROM = 36
+
+
+def dwells_with_a_gain_step(units: int, seed: int) -> tuple[pd.DataFrame, pd.DataFrame, str]:
+    """A lot whose last unit reads by :data:`PPM` more from the dwell half-way on; its temperatures; the unit."""
+    made = make(World(units=units, noise=Noise(white=25.0, flicker=30.0)), 5_700_000 + seed)
+    dwells = made.dwells.copy()
+    unit = sorted(dwells["unit"].unique())[-1]
+    later = (dwells["unit"] == unit) & (dwells["dwell"] >= FROM)
+    assert 0.3 < later.sum() / (dwells["unit"] == unit).sum() < 0.7
+    dwells.loc[later, ["out_x", "out_y", "out_z"]] *= 1.0 + 1e-6 * PPM
+    return dwells, made.history, unit
+
+
+def model_and_term() -> tuple[Model, Term]:
+    dwells, history, _ = dwells_with_a_gain_step(2, 23)
+    base = ExaminedRun(lot_of(measured(dwells, history), square=False), MODEL).model()
+    return base, Term(GainStep(), (("unit", 1.0), ("dwell", float(FROM))))
+
+
+def equal(term: Term) -> Term:
+    return Term(GainStep(), tuple(dict(term.values).items()))
+
+
+def test_the_size_of_an_equal_term_is_its_size() -> None:
+    base, term = model_and_term()
+    first = base.with_term(term)
+    again = base.with_term(equal(term))
+    assert again is first
+    assert 1e6 * again.shared_sizes(equal(term)) == pytest.approx([PPM], rel=0.2)
+    with pytest.raises(KeyError, match="gain_step: not a term of the model"):
+        base.shared_sizes(term)
+
+
+def test_a_model_less_an_equal_term_does_not_hold_it() -> None:
+    base, term = model_and_term()
+    richer = base.with_term(term)
+    assert [t.effect.id for t in richer.without_term(equal(term)).terms] == [t.effect.id for t in base.terms]
+
+
+@pytest.mark.parametrize("units", [1, 2])
+@pytest.mark.parametrize("seed", [3, 4, 7])
+def test_a_gain_step_of_few_units_is_named_with_its_size(units: int, seed: int, no_next_measurement: None) -> None:
+    dwells, history, unit = dwells_with_a_gain_step(units, seed)
+    document = diagnose(dwells, history)
+    (group,) = document["classes"]
+    assert "gain_step" in group["effects"]
+    if group["effects"] == ["gain_step"] and units > 1:
+        assert group["units"] == [unit]
+    assert group["p_value"] < 1e-10
+    assert group["size_ug"] > 10.0
