@@ -99,7 +99,8 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
     """Step of a converter that is coarser than the noise of a sample; None where there is none.
 
     With steps q well above the noise, samples take the two next values: their variance is q²·p·(1 − p), p the place of the mean
-    between the two, and it comes again with every step.
+    between the two, and it comes again with every step. Noise that grows with temperature, or in time, is no such scatter:
+    the means follow the temperature too, and some step fits both. What follows either is left out.
     """
     if readings.spread is None or readings.count is None:
         return None
@@ -108,13 +109,11 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
         a[there] for a in (readings.output[unit, :, axis], readings.spread[unit, :, axis], readings.count[unit])
     )
     typical = float(np.median(spread))
-    if (
-        mean.size < 16
-        or typical <= 0.0
-        or np.std(spread) / typical < decisions.STEPS_UNEVEN / np.sqrt(2.0 * float(np.median(count)))
-    ):
+    if mean.size < 16 or typical <= 0.0:
         return None
-    square = spread**2 - np.mean(spread**2)
+    square = _without_drivers(readings, unit, there, spread**2)
+    if np.std(square) / (2.0 * typical**2) < decisions.STEPS_UNEVEN / np.sqrt(2.0 * float(np.median(count))):
+        return None
     whole, reach = float(np.sum(square**2)), float(np.ptp(mean))
     # p(1 − p) is at most a quarter: the largest scatter is half a step
     low, high = 1.6 * float(spread.max()), 2.6 * float(spread.max())
@@ -134,6 +133,24 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
             best, step = float(explained[place]), 1.0 / float(part[place])
     return step if best > decisions.STEPS_FOLLOW else None
 
+
+def _without_drivers(readings: Readings, unit: int, there: NDArray[np.bool_], values: Array) -> Array:
+    """Values of the dwells that are there, less their mean and what follows the temperature or the time."""
+    drivers = [readings.time[unit]]
+    drivers += [v[unit] for v in (readings.temperature, readings.chamber) if v is not None]
+    columns = [np.ones(values.size)]
+    for driver in drivers:
+        own = driver[there]
+        if np.isfinite(own).all() and np.ptp(own) > 0.0:
+            unit_range = 2.0 * (own - own.min()) / np.ptp(own) - 1.0
+            columns += [unit_range**k for k in range(1, _DEGREE + 1)]
+    x = np.stack(columns, axis=1)
+    left: Array = values - x @ np.linalg.lstsq(x, values, rcond=1e-9)[0]
+    return left
+
+
+_DEGREE = 4
+"""Degree of the polynomial of a driver that the scatter of dwells may follow."""
 
 _MOST_STEPS = 20_000
 """Steps over the range of the means beyond which the step cannot be estimated from these dwells."""
