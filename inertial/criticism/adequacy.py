@@ -126,7 +126,7 @@ class _Draws:
 
     def _shares(self, place: int) -> Shares:
         flicker, walk = self.lattice
-        return shares_at((flicker[place // len(walk)], walk[place % len(walk)]))
+        return shares_at((flicker[place // len(walk)], walk[place % len(walk)]), self.model.noise.shares.own)
 
     def _estimated(self, series: Array) -> NDArray[np.intp]:
         """The place of the lattice with the smallest restricted deviance of each draw, (draws,).

@@ -1,7 +1,8 @@
 """Whitening of a lot's series: white noise, 1/f and random walk, with whiteners shared by equal blocks.
 
 A block is the series of one unit and axis. Its covariance is s²·(diag(e²) + F·K_F + W·K_W), where e is the white standard error
-of its dwells and F and W, in units of the lot's white variance, are the same for all blocks. Blocks that have the same dwells at
+of its dwells and F and W, in units of the lot's white variance, are the same for all blocks but those whose wander is of another
+kind (:mod:`inertial.criticism.own_shares`). Blocks that have the same dwells at
 the same times and about the same white noise share a whitener; a missing dwell only leaves out its row.
 
 Where only the norm of gravity is known, a block is a unit. Wander along one axis enters the norm in proportion to the force along
@@ -43,7 +44,7 @@ that a pass goes through in turn, and each would be gone before it is used again
 @lru_cache(maxsize=256)
 def _lattice(shares: Shares) -> tuple[int | None, ...]:
     """The steps of the lattice at which shares stand; None for none."""
-    return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in shares)
+    return tuple(None if s <= 0.0 else round(SHARE_STEP * np.log10(s)) for s in (shares.flicker, shares.walk))
 
 
 def _about_mean(covariance: Array) -> float:
@@ -66,9 +67,12 @@ class Covariance:
     time : (blocks, n), s
     error : (blocks, n), white standard error of each dwell, g; infinite where a dwell is missing
     direction : (blocks, n, 3), unit vectors of the force where the measurement is its norm; None where it is one axis' output
+    loudness : (n,), standard deviation of the noise of each dwell over the lot's; None where it is the same in all
     """
 
-    def __init__(self, time: Array, error: Array, direction: Array | None = None) -> None:
+    def __init__(
+        self, time: Array, error: Array, direction: Array | None = None, loudness: Array | None = None
+    ) -> None:
         self.there = np.isfinite(error)
         self.count = self.there.sum(axis=1)
         white = np.where(self.there, error, 0.0) ** 2
@@ -78,7 +82,7 @@ class Covariance:
         self.white = float(np.exp(np.mean(np.log(self.level**2))))
         """White variance that is the unit of the shares, g²."""
         self.span = max(float(np.ptp(time)), 1.0)
-        self._kernels, self._groups = grouped(time, error, direction, self.level, self.white)
+        self._kernels, self._groups = grouped(time, error, direction, self.level, self.white, loudness)
         self._whiteners: OrderedDict[tuple[int, int | None, int | None], tuple[Array, float]] = OrderedDict()
         self._kept: OrderedDict[tuple[object, Shares], Array] = OrderedDict()
         self._used = 0
@@ -120,12 +124,37 @@ class Covariance:
     def _of_wander(self, shares: Shares, variance_of: Callable[[Array], float]) -> Array:
         """A variance of the wander of each block over its white variance, (blocks,), from the covariance of its dwells."""
         variance = np.zeros(len(self.level))
-        for place, steps, blocks in self._groups if self._wander is not None else ():
+        for place, steps, blocks, common in self._groups_at(shares) if self._wander is not None else ():
             there = self._kernels[place].there
-            for share, kernel in zip(shares, self._wander or (), strict=True):
-                own = kernel[place][np.ix_(there, there)]
+            for share, kernel in zip((common.flicker, common.walk), self._wander or (), strict=True):
+                own = self._kernels[place].louder(kernel[place])[np.ix_(there, there)]
                 variance[blocks] += share * 10.0 ** (steps / SHARE_STEP) * variance_of(own)
         return variance
+
+    def _groups_at(self, shares: Shares) -> list[tuple[int, int, NDArray[np.intp], Shares]]:
+        """Groups of blocks that have a whitener in common at shares: place of the profile, steps, blocks, and their shares."""
+        common = shares.common
+        if not shares.own:
+            return [(*group, common) for group in self._groups]
+        apart = np.array([block for block, _, _ in shares.own])
+        groups = [(place, steps, blocks[~np.isin(blocks, apart)], common) for place, steps, blocks in self._groups]
+        groups = [group for group in groups if group[2].size]
+        for block, flicker, walk in shares.own:
+            place, steps = self.group_of(block)
+            groups.append((place, steps, np.array([block]), Shares(flicker, walk)))
+        return groups
+
+    def group_of(self, block: int) -> tuple[int, int]:
+        """Place of the profile of a block, and its steps."""
+        return next((place, steps) for place, steps, blocks in self._groups if block in blocks)
+
+    def whitener_of_block(self, block: int, shares: Shares) -> tuple[Array, float]:
+        """Lower triangle (n, n) that makes the noise of a block at shares white, and the log-determinant of its covariance."""
+        place, steps = self.group_of(block)
+        kernel = self._kernels[place]
+        white = np.where(kernel.there, 1.0 / kernel.white, 0.0)
+        logdet = 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
+        return self._whitener(place, steps, shares) or (np.diag(white), logdet)
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
@@ -148,7 +177,7 @@ class Covariance:
 
     def whiten(self, columns: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Columns (blocks, n, m) of all or some blocks with white noise of variance s² in them; zero where a dwell is missing."""
-        if len(self._groups) == 1:
+        if len(self._groups) == 1 and not shares.own:
             place, steps, _ = self._groups[0]
             level = self.level if blocks is None else self.level[blocks]
             whitener = self._whitener(place, steps, shares)
@@ -168,15 +197,15 @@ class Covariance:
         where = np.full(len(self.level), -1)
         where[place_of] = np.arange(place_of.size)
         out = np.empty(columns.shape)
-        for place, steps, members in self._groups:
+        for place, steps, members, common in self._groups_at(shares):
             rows = where[members]
             rows = rows[rows >= 0]
             if rows.size:
                 own = columns[rows] / self.level[place_of[rows], None, None]
-                whitener = self._whitener(place, steps, shares)
+                whitener = self._whitener(place, steps, common)
                 if whitener is None:
                     kernel = self._kernels[place]
-                    out[rows] = own * np.where(kernel.there, 1.0 / kernel.profile, 0.0)[:, None]
+                    out[rows] = own * np.where(kernel.there, 1.0 / kernel.white, 0.0)[:, None]
                 else:
                     n, m = columns.shape[1:]
                     flat = whitener[0] @ own.transpose(1, 0, 2).reshape(n, -1)
@@ -196,25 +225,25 @@ class Covariance:
         if blocks is not None:
             where = np.full(len(self.level), -1)
             where[blocks] = np.arange(blocks.size)
-        for place, steps, members in self._groups:
+        for place, steps, members, common in self._groups_at(shares):
             own = where[members]
             own = own[own >= 0]
             if own.size:
-                whitener = self._whitener(place, steps, shares)
+                whitener = self._whitener(place, steps, common)
                 kernel = self._kernels[place]
-                yield own, None if whitener is None else whitener[0], np.where(kernel.there, 1.0 / kernel.profile, 0.0)
+                yield own, None if whitener is None else whitener[0], np.where(kernel.there, 1.0 / kernel.white, 0.0)
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, n, m), g, with this noise, from independent normal numbers; zero where a dwell is missing."""
         out = np.empty(drawn.shape)
-        for place, steps, members in self._groups:
+        for place, steps, members, common in self._groups_at(noise.shares):
             kernel = self._kernels[place]
-            whitener = self._whitener(place, steps, noise.shares)
+            whitener = self._whitener(place, steps, common)
             n, m = drawn.shape[1:]
             flat = drawn[members].transpose(1, 0, 2).reshape(n, -1)
             made = np.zeros_like(flat)
             if whitener is None:
-                made = flat * (kernel.profile * kernel.there)[:, None]
+                made = flat * (kernel.white * kernel.there)[:, None]
             else:
                 there = kernel.there
                 made[there] = solve_triangular(whitener[0][np.ix_(there, there)], flat[there], lower=True)
@@ -279,12 +308,21 @@ class Covariance:
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""
         logdets = np.zeros(len(self.level))
-        for place, steps, members in self._groups:
+        for place, steps, members, common in self._groups_at(shares):
             kernel = self._kernels[place]
-            whitener = self._whitener(place, steps, shares)
-            white = 2.0 * float(np.sum(np.log(kernel.profile[kernel.there])))
+            whitener = self._whitener(place, steps, common)
+            white = 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
             logdets[members] = white if whitener is None else whitener[1]
         return logdets
+
+    def of_dwells(self, block: int, noise: Noise, dwells: NDArray[np.intp]) -> Array:
+        """Covariance (k, k), g², of some dwells of a block."""
+        place, steps = self.group_of(block)
+        kernel = self._kernels[place]
+        covariance = np.diag(kernel.white**2)
+        for share, each in zip((noise.shares.flicker, noise.shares.walk), self._wander or (), strict=False):
+            covariance = covariance + share * 10.0 ** (steps / SHARE_STEP) * kernel.louder(each[place])
+        return covariance[np.ix_(dwells, dwells)] * float(self.level[block] * noise.scale[block]) ** 2
 
     def white_noise(self) -> Noise:
         """White noise as stated by the errors."""
@@ -293,5 +331,4 @@ class Covariance:
     def rescaled(self, noise: Noise, other: "Covariance") -> Noise:
         """Noise of another covariance, of the same blocks, in the units of this one."""
         factor = other.white / self.white
-        shares = Shares(noise.shares.flicker * factor, noise.shares.walk * factor * self.span / other.span)
-        return Noise(shares, noise.scale, noise.prior)
+        return Noise(noise.shares.times(factor, factor * self.span / other.span), noise.scale, noise.prior)

@@ -15,6 +15,20 @@ changes no result, and a wander with 180 times the standard deviation of the whi
 0.95 (0.80–1.18), 0.96 (0.82–1.03), 0.94 (0.87–1.01); one unit: 0.87 (0.45–1.26), 0.97 (0.76–1.21), 1.05 (0.93–1.21).
 """
 
+OWN_SUSPECT, OWN_SHARES = 22.0, 20.0
+"""Box-Pierce statistic of three lags from which a block's wander may be of another kind than the lot's; and the deviance by which
+shares of 1/f and of random walk of its own must fit its residuals better than those of the lot.
+
+Derived: chi-square of three degrees of freedom exceeds 22 with a probability of 7e-5, and of two exceeds 20 with one of 5e-5.
+"""
+
+LOUDER_BELOW = 1e-4
+"""Probability of the differences of the scatter of soaks, over units and axes, below which each soak has a noise of its own.
+
+Derived: an F test of means over units and axes within each soak, by whose scatter the means are judged; equal soaks pass for
+different in one lot of ten thousand.
+"""
+
 PRIOR_BETTER = 4.0
 """Deviance by which different variances of units and axes must fit better than a common one.
 

@@ -20,6 +20,7 @@ from inertial.criticism.handling.base import Exchangeable, Handling, Misfit
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
+from inertial.criticism.loudness import loudness_of
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
@@ -97,6 +98,9 @@ class ExaminedRun:
 def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSearch]":
     """A run without bad dwells and handling errors, and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects))
+    loudness = loudness_of(run.model())
+    if loudness is not None:
+        run.lot = replace(lot, loudness=loudness)
     run.removed = bad_dwells(run.model())
     searched = mended(run)
     for _ in range(_TURNS):

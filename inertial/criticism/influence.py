@@ -1,6 +1,6 @@
 """Influence of dwells on a verdict: their shares of the deviance, and the verdict without the largest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from inertial.criticism.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import fall, freedom
-from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.problem import Problem
 from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ def log_p_without(model: Model, term: Term, dwells: tuple[Influence, ...]) -> fl
     error = lot.error.copy()
     for one in dwells:
         error[one.unit, one.dwell] = np.inf
-    problem = Problem(Lot(lot.state, lot.output, error, lot.response, lot.radial), slope=model.problem.slope)
+    problem = Problem(replace(lot, error=error), slope=model.problem.slope)
     space = Model(problem, model.terms, near=model.noise).at(model.noise)
     gain = space.gain(term.candidate(problem))
     rank = int(gain.rank[0])

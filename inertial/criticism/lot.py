@@ -21,6 +21,7 @@ class Lot:
     response : (units, 3, 3), K over its diagonal: how a change of force shows on each axis
     radial : only the norm of the force is known; the state's force is then the corrected output's own direction
     recorded : the white errors are from the scatter and number of samples, not from the residuals
+    loudness : (n,), standard deviation of the noise of each dwell over the lot's; None where it is the same in all
     """
 
     state: State
@@ -29,6 +30,7 @@ class Lot:
     response: Array
     radial: bool = False
     recorded: bool = False
+    loudness: Array | None = None
 
     def units(self, index: Sequence[int]) -> "Lot":
         """The lot of some units only."""

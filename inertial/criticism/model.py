@@ -10,6 +10,7 @@ from inertial.criticism import variance
 from inertial.criticism.candidate import Candidate
 from inertial.criticism.covariance import LARGE
 from inertial.criticism.noise_shares import Noise, Shares
+from inertial.criticism.own_shares import own_shares
 from inertial.criticism.problem import Problem
 from inertial.criticism.share_statistics import ShareStatistics
 from inertial.criticism.shares import best_shares, plausible_shares
@@ -31,6 +32,9 @@ _RICHER = 2
 _SHARE_OF_WHITE = 0.5
 """Part of the recorded white variance that the noise of norms has at the least."""
 
+
+_TURNS = 3
+"""Rounds in which blocks with shares of their own and the shares of the others are found in turn."""
 
 _OWN = 20
 """Degrees of freedom of a block from which on its own variance is used for the shares; blocks with fewer have a common one."""
@@ -114,12 +118,26 @@ class Model:
         noises = {} if self._simpler is None else self._simpler._noises  # noqa: SLF001  # of its own kind
         known = None if self._added is None else noises.get(self._added.key)
         if known is None:
-            near = None if self._near is None else self._near.shares
-            known = self.noise_at(best_shares(self._restricted, near, finest=4 if self.problem.n > _LONG else 2))
+            known = self.noise_at(self._best_shares())
             self._spaces.clear()
             if self._added is not None:
                 noises[self._added.key] = known
         return known
+
+    def _best_shares(self) -> Shares:
+        """Shares of the smallest restricted deviance; blocks whose wander is of another kind have their own."""
+        near = None if self._near is None else self._near.shares
+        finest = 4 if self.problem.n > _LONG else 2
+        best = best_shares(self._restricted, near, finest=finest)
+        for _ in range(_TURNS):
+            space = self._rough(best)
+            series = self.problem.y if not self.shared.shape[-1] else self.problem.y - self.shared @ space.shared_sizes
+            own = own_shares(self.problem, series, self.local, space)
+            if own == best.own:
+                break
+            # the others without them, from where they were
+            best = best_shares(self._restricted, best._replace(own=own), finest=finest)
+        return best
 
     def forget(self) -> None:
         """Drop what is kept for models that follow: of a large lot it takes much memory."""
@@ -231,9 +249,7 @@ class Model:
         for other in (t for t in self.terms if t.shared):
             count = self._of(other).shape[-1]
             if other.key == term.key:  # a model that was kept has an equal term
-                space = self.space
-                sizes = np.linalg.lstsq(space.gram[1:, 1:], space.gram[1:, 0], rcond=1e-10)[0]
-                return sizes[at : at + count].astype(np.float64)
+                return self.space.shared_sizes[at : at + count]
             at += count
         raise KeyError(f"{term.effect.id}: not a term of the model")
 

@@ -10,10 +10,32 @@ Array = NDArray[np.float64]
 
 
 class Shares(NamedTuple):
-    """Variances of 1/f and of random walk at the end of the record, over the lot's white variance."""
+    """Variances of 1/f and of random walk at the end of the record, over the lot's white variance.
+
+    own : block, and its variances of 1/f and of random walk, for blocks whose wander is of another kind than the lot's
+    """
 
     flicker: float = 0.0
     walk: float = 0.0
+    own: tuple[tuple[int, float, float], ...] = ()
+
+    @property
+    def common(self) -> "Shares":
+        """Those of the lot, without blocks that have their own."""
+        return Shares(self.flicker, self.walk)
+
+    def pick(self, blocks: list[int]) -> "Shares":
+        """The shares of some blocks, numbered as they are given."""
+        if not self.own:
+            return self
+        by_block = {block: rest for block, *rest in self.own}
+        own = [(place, *by_block[block]) for place, block in enumerate(blocks) if block in by_block]
+        return self._replace(own=tuple(own))
+
+    def times(self, flicker: float, walk: float) -> "Shares":
+        """Each share times a factor of its kind."""
+        own = tuple((block, flicker * one, walk * other) for block, one, other in self.own)
+        return Shares(flicker * self.flicker, walk * self.walk, own)
 
 
 @dataclass(frozen=True)
@@ -30,4 +52,4 @@ class Noise:
 
     def pick(self, blocks: list[int]) -> "Noise":
         """The noise of some blocks."""
-        return Noise(self.shares, self.scale[blocks], self.prior)
+        return Noise(self.shares.pick(blocks), self.scale[blocks], self.prior)

@@ -74,7 +74,7 @@ class Problem:
     def covariance(self) -> Covariance:
         """The covariances of the blocks, at any noise."""
         time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
-        return Covariance(time, self.error, self._direction if self.lot.radial else None)
+        return Covariance(time, self.error, self._direction if self.lot.radial else None, self.lot.loudness)
 
     def forget(self) -> None:
         """Drop the columns and products that are kept: they are made again where they are needed."""

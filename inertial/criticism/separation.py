@@ -187,4 +187,5 @@ def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | N
         typical = np.where(np.isfinite(typical), typical, np.nanmedian(typical))
     error = np.concatenate([lot.error, np.broadcast_to(typical, (units, len(steps), 3))], axis=1)
     output = np.concatenate([lot.output, np.zeros((units, len(steps), 3))], axis=1)
-    return Problem(replace(lot, state=state, output=output, error=error))
+    loudness = None if lot.loudness is None else np.concatenate([lot.loudness, np.ones(len(steps))])
+    return Problem(replace(lot, state=state, output=output, error=error, loudness=loudness))

@@ -26,14 +26,15 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
 
     Parameters
     ----------
-    near : start; 1/f of three times the white variance if None
+    near : start; 1/f of three times the white variance if None; blocks that have their own keep them
     finest : smallest stride, in eighths of a decade
     """
     known: dict[Place, float] = {}
+    own = () if near is None else near.own
 
     def at(place: Place) -> float:
         if place not in known:
-            known[place] = deviance(shares_at(place))
+            known[place] = deviance(shares_at(place, own))
         return known[place]
 
     here = (4, None) if near is None else place_of(near)
@@ -45,7 +46,7 @@ def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None,
             if best is None:
                 break
             here = best
-    return shares_at(here)
+    return shares_at(here, own)
 
 
 def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[tuple[Shares, float]]:
@@ -56,7 +57,7 @@ def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[
     """
     stride = _STRIDES[0]
     middle = place_of(best)
-    known = {middle: deviance(shares_at(middle))}
+    known = {middle: deviance(shares_at(middle, best.own))}
     open_, least = [middle], known[middle]
     while open_:
         first, second = open_.pop()
@@ -64,13 +65,13 @@ def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[
         near += [(first, k) for k in _beside(second, stride, middle[1])]
         for place in near:
             if place not in known and len(known) < _MOST_PLACES:
-                known[place] = deviance(shares_at(place))
+                known[place] = deviance(shares_at(place, best.own))
                 if known[place] < least + _RULED_OUT:
                     least = min(least, known[place])
                     open_.append(place)
     kept = {place: np.exp(-0.5 * (value - least)) for place, value in known.items() if value < least + _RULED_OUT}
     total = sum(kept.values())
-    return [(shares_at(place), float(weight / total)) for place, weight in kept.items()]
+    return [(shares_at(place, best.own), float(weight / total)) for place, weight in kept.items()]
 
 
 def _beside(k: int | None, stride: int, middle: int | None) -> list[int | None]:
@@ -85,15 +86,15 @@ def place_of(shares: Shares) -> Place:
     """The place of the lattice nearest to shares."""
     first, second = (
         None if s <= 10.0 ** ((LEAST_SHARE - 4) / SHARE_STEP) else _inside(round(SHARE_STEP * np.log10(s)))
-        for s in shares
+        for s in (shares.flicker, shares.walk)
     )
     return first, second
 
 
-def shares_at(place: Place) -> Shares:
-    """The shares of a place of the lattice."""
+def shares_at(place: Place, own: tuple[tuple[int, float, float], ...] = ()) -> Shares:
+    """The shares of a place of the lattice, and of blocks that have their own."""
     flicker, walk = (0.0 if k is None else 10.0 ** (k / SHARE_STEP) for k in place)
-    return Shares(flicker, walk)
+    return Shares(flicker, walk, own)
 
 
 def _inside(k: int) -> int:

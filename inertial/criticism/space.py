@@ -149,6 +149,11 @@ class Space:
         return self.targets[..., 0] - self.targets[..., 1:] @ beta
 
     @property
+    def shared_sizes(self) -> Array:
+        """Coefficients (q,) of the columns that all blocks share."""
+        return np.linalg.lstsq(self.gram[1:, 1:], self.gram[1:, 0], rcond=1e-10)[0].astype(np.float64)
+
+    @property
     def information(self) -> float:
         """log|HᵀV⁻¹H| of the local columns over all blocks, scales apart."""
         return self._log_determinant + 2.0 * self._local.shape[-1] * float(np.sum(np.log(self.noise.scale)))

@@ -19,12 +19,27 @@ EVEN = 1.5
 
 @dataclass(frozen=True)
 class DwellProfile:
-    """Valid dwells, their times and white profile, common to the blocks of one whitener."""
+    """Valid dwells, their times and white profile, common to the blocks of one whitener.
+
+    loudness : (n,), by which all noise of a dwell is larger than the lot's; one where it is not known
+    """
 
     time: Array
     there: NDArray[np.bool_]
     profile: Array
     direction: Array | None = None
+    loudness: Array | float = 1.0
+
+    @property
+    def white(self) -> Array:
+        """Standard deviation of the white noise of each dwell over the block's, (n,)."""
+        return self.profile * self.loudness
+
+    def louder(self, kernel: Array) -> Array:
+        """A covariance of wander (n, n), as loud as the dwells."""
+        if isinstance(self.loudness, float):
+            return kernel
+        return kernel * (self.loudness[:, None] * self.loudness)
 
     def fits(self, time: Array, there: NDArray[np.bool_], profile: Array) -> bool:
         """Whether a block with these dwells can have the same whitener."""
@@ -36,7 +51,7 @@ class DwellProfile:
 
 
 def grouped(
-    time: Array, error: Array, direction: Array | None, level: Array, white: float
+    time: Array, error: Array, direction: Array | None, level: Array, white: float, loudness: Array | None = None
 ) -> tuple[list[DwellProfile], list[tuple[int, int, NDArray[np.intp]]]]:
     """Profiles of dwells that whiteners are made for, and groups of blocks that have a whitener in common.
 
@@ -46,7 +61,9 @@ def grouped(
     ----------
     time, error : (blocks, n); direction : (blocks, n, 3) or None; as of :class:`inertial.criticism.covariance.Covariance`
     level : (blocks,), typical white standard error, g; white : the lot's white variance, g²
+    loudness : (n,), of the dwells of all blocks
     """
+    louder = 1.0 if loudness is None else loudness
     profiles: list[DwellProfile] = []
     groups: dict[tuple[int, int], list[int]] = {}
     for block, there in enumerate(np.isfinite(error)):
@@ -57,7 +74,8 @@ def grouped(
         place = next((i for i, one in enumerate(profiles) if one.fits(time[block], there, profile)), None)
         if place is None:
             place = len(profiles)
-            profiles.append(DwellProfile(time[block], there, profile, None if direction is None else direction[block]))
+            way = None if direction is None else direction[block]
+            profiles.append(DwellProfile(time[block], there, profile, way, louder))
         # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
         steps = 2 * round(0.5 * SHARE_STEP * np.log10(white / level[block] ** 2))
         groups.setdefault((place, steps), []).append(block)
@@ -73,9 +91,10 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     wander : covariances (n, n) of 1/f and of random walk of variance one
     """
     there, whole = dwells.there, bool(dwells.there.all())
-    covariance = np.diag(dwells.profile[there] ** 2)
-    for i, kernel in zip(index, wander, strict=True):
+    covariance = np.diag(dwells.white[there] ** 2)
+    for i, each in zip(index, wander, strict=True):
         if i is not None:
+            kernel = dwells.louder(each)
             own = kernel if whole else kernel[np.ix_(there, there)]
             covariance += 10.0 ** (i / SHARE_STEP) * own
     # of the transpose, which is in Fortran order: no copy
