@@ -70,14 +70,22 @@ class Named:
 
 @dataclass
 class ExaminedRun:
-    """A lot under examination: the corrections so far, and the terms that stay in the model beside the judged effects."""
+    """A lot under examination: the corrections so far, and the terms that stay in the model beside the judged effects.
+
+    barred : alternatives that only imitate a drift, and are not searched again
+    """
 
     lot: Lot
     effects: tuple[str, ...]
     beside: list[Term] = field(default_factory=list[Term])
     handled: list[Named] = field(default_factory=list[Named])
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
+    barred: set[str] = field(default_factory=set[str])
     _made: tuple[list[object], Model] | None = None
+
+    def alternatives(self) -> list[Handling]:
+        """Handling errors that are searched."""
+        return [a for a in alternatives() if a.id not in self.barred]
 
     def model(self) -> Model:
         """The model that is judged, in the lot without its bad dwells; the same object while nothing changes."""
@@ -135,7 +143,7 @@ def mended(run: ExaminedRun) -> EffectSearch:
     """The search for effects; a handling error that ranks first is reported and removed before the next search."""
     while True:
         base = run.model()
-        fields = Candidates(base.problem, candidates_of(base, run.effects), alternatives())
+        fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
         part = _part(fields, base)
         searched = search(part.field, part.base, stop=part.imitates)
         if searched.handling is None and part.field is not fields:
@@ -146,7 +154,28 @@ def mended(run: ExaminedRun) -> EffectSearch:
             base.forget()
         if searched.handling is None or len(run.handled) >= _MENDED:
             return EffectSearch(base, fields, part, searched)
+        if _drifts(run, part, searched.handling):
+            continue
         _mend(run, part.field, searched, searched.handling)
+
+
+def _drifts(run: ExaminedRun, part: "LotPart", term: Term) -> bool:
+    """Whether a sudden change of the whole lot that comes a second time is one drift; then neither change is told any more.
+
+    One step of the reader's reference is an event. Two of them, one after the other, are what a scale factor that changes
+    slowly looks like, and a smooth curve of one driver explains it better.
+    """
+    before = [t for t in run.beside if t.effect.id == term.effect.id and "unit" not in t.keywords]
+    if not before or "unit" in term.keywords:
+        return False
+    others = [t for t in part.base.terms if all(t is not one for one in before)]
+    base = Model(part.field.problem, others, near=part.base.noise)
+    if better_curve(base, [*before, term], part.suspected) is None:
+        return False
+    run.barred.add(term.effect.id)
+    run.beside = [t for t in run.beside if t not in before]
+    run.handled = [one for one in run.handled if one.effects.members[0].term.effect.id != term.effect.id]
+    return True
 
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:

@@ -12,7 +12,7 @@ from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
 from inertial.criticism.likelihood import Ratio, likelihood_ratio, weighed
 from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Noise, Shares
+from inertial.criticism.noise_shares import Noise
 from inertial.criticism.penalty import cost_of_model, fall
 from inertial.criticism.refinement import refine
 from inertial.criticism.space import Gain, Space
@@ -147,7 +147,7 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
     leave = {*(t.effect.id for t in model.terms if not isinstance(t.effect, Handling)), barred}
     chosen: dict[str, Term] = {}
     noise = model.noise
-    less = Shares(noise.shares.flicker * decisions.LESS_FLICKER, noise.shares.walk * decisions.LESS_WALK)
+    less = noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
     for other in [noise] if less == noise.shares else [noise, model.noise_at(less)]:
         looked = scanned(field, model.at(other), leave)
         for term, _ in looked[:finalists]:

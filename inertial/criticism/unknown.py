@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 _KNOTS = 9  # of a smooth curve over a driver
 _TIME_KNOTS = 12  # the same over time
+_FEW_KNOTS = 6  # of a smooth dependence of the scale factors
 _HARMONICS = 5  # of a table angle
 _CYCLES = np.arange(1.0, 14.1, 0.5)  # of a swing within the run
 _LEVELS = 14  # number of groups of values from which on a driver is continuous
@@ -56,6 +57,9 @@ def suspects(problem: Problem) -> list[Suspect]:
             steps = None if is_clock(name) else _levels(values)
             if steps is not None:
                 suspected.append(Suspect(name, _alike(problem, steps)))
+            if not problem.lot.radial and knots > 2:
+                # the same dependence of the scale factors: what the driver changes is then felt along each axis
+                suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS)))))
     if not problem.lot.radial:
         own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
         suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
@@ -193,6 +197,14 @@ def _alike(problem: Problem, columns: Array) -> Candidate:
 
 def _columns(columns: Array, *, shared: bool = False) -> Candidate:
     return Candidate(columns[:, :, None, :], shared=shared)
+
+
+def along_force(problem: Problem, columns: Array) -> Array:
+    """Columns (units, n, d) times the force along each axis, (blocks, n, d)."""
+    state = problem.lot.state
+    own = np.stack([state.along(axis) for axis in range(3)], axis=1)
+    wide = np.broadcast_to(columns[:, None], (*own.shape, columns.shape[-1]))
+    return (own[..., None] * wide).reshape(problem.blocks, problem.n, -1)
 
 
 def _swing(time: Array, cycles: float) -> Array:

@@ -24,7 +24,7 @@ Misfit = Callable[["Lot", tuple[int, ...]], float]
 """Whitened sum of squares of the model's residuals on a lot of some units, by their numbers in the whole lot."""
 
 _PLACES = 40
-_EDGE = 3  # dwells at both ends after which, or before which, no change can be detected
+EDGE = 3  # dwells at both ends after which, or before which, no change can be detected
 _SOAK_APART = 3.0  # K
 
 
@@ -133,7 +133,7 @@ def stride(lot: "Lot") -> int:
 def times(lot: "Lot") -> list[int]:
     """Dwells from which on a change is possible, without the ends."""
     n = lot.state.time.shape[1]
-    return list(range(_EDGE, n - _EDGE + 1, stride(lot)))
+    return list(range(EDGE, n - EDGE + 1, stride(lot)))
 
 
 def after(lot: "Lot", dwell: float) -> Array:

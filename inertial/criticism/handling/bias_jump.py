@@ -4,12 +4,15 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from inertial.criticism.handling.base import Array, Handling, after, times
+from inertial.criticism.handling.base import EDGE, Array, Handling, after, times
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
 AXES = "xyz"
+
+_EVERY = 160
+"""Dwells up to which each is a place."""
 
 
 class BiasJump(Handling):
@@ -30,12 +33,14 @@ class BiasJump(Handling):
         """Every axis of every unit at every place in time; none where only a norm is known."""
         if lot.radial:
             return []
-        units = lot.state.time.shape[0]
+        units, n = lot.state.time.shape
+        # a jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it
+        every = range(EDGE, n - EDGE + 1) if n <= _EVERY else times(lot)
         return [
             {"unit": float(u), "axis": float(axis), "dwell": float(k)}
             for u in range(units)
             for axis in range(len(AXES))
-            for k in times(lot)
+            for k in every
         ]
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
