@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 GRID_S = 1.0
+FAST_S = 400  # shorter than a soak
 PAST = 3  # record lengths of 1/f before the record
 
 
@@ -24,6 +25,8 @@ class Noise:
     unit_factors, axis_factors : factors on all terms, cyclic over units and axes
     unit_white, unit_slow, axis_slow : factors on the white part by unit; on 1/f and walk by unit and by axis
     tails : degrees of freedom of a t distribution for the white part of the dwells; 0 for normal
+    telegraph : jumps between two levels: their distance, µg, the mean time at one, s, and the share of the axes that jump
+    hot : K by which white noise and the fast part of 1/f grow by e, about 25 °C; infinite where they do not
     """
 
     white: float = 25.0
@@ -35,6 +38,8 @@ class Noise:
     unit_slow: tuple[float, ...] = (1.0,)
     axis_slow: tuple[float, float, float] = (1.0, 1.0, 1.0)
     tails: int = 0
+    telegraph: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    hot: float = float("inf")
 
     def factors(self, units: int) -> Floats:
         """Factor on all terms, (units, 3)."""
@@ -42,8 +47,10 @@ class Noise:
         return own[:, None] * np.array(self.axis_factors)
 
 
-def dwell_noise(noise: Noise, start: Floats, duration: Floats, units: int, rng: np.random.Generator) -> Floats:
-    """Errors of the dwell means, (units, n, 3), µg, for dwells that start at ``start`` (n,) s."""
+def dwell_noise(
+    noise: Noise, start: Floats, duration: Floats, units: int, rng: np.random.Generator, warm: Floats | None = None
+) -> Floats:
+    """Errors of the dwell means, (units, n, 3), µg, for dwells that start at ``start`` (n,) s, at ``warm`` (n,) °C."""
     white = noise.white / np.sqrt(2.0 * duration)
     shape = (units, len(start), 3)
     drawn = rng.standard_t(noise.tails, shape) / np.sqrt(3.0) if noise.tails else rng.standard_normal(shape)
@@ -55,13 +62,32 @@ def dwell_noise(noise: Noise, start: Floats, duration: Floats, units: int, rng: 
         slow += noise.flicker * fractional(rng, 3 * units, steps)
     if noise.walk > 0.0:
         slow += noise.walk * np.sqrt(GRID_S) * np.cumsum(rng.standard_normal((3 * units, steps)), axis=1)
+    if noise.telegraph[2] > 0.0:
+        slow += _telegraph(noise.telegraph, 3 * units, steps, rng)
+    louder = np.ones(len(start)) if warm is None else np.exp((warm - 25.0) / noise.hot)
+    errors = errors * louder[:, None]
     whole = np.concatenate([np.zeros((3 * units, 1)), np.cumsum(slow, axis=1)], axis=1)
     first = ((start - begin) / GRID_S).astype(int)
     last = np.maximum(((start + duration - begin) / GRID_S).astype(int), first + 1)
     means = (whole[:, last] - whole[:, first]) / (last - first)
+    if np.isfinite(noise.hot):
+        # only what is faster than the time constants of a soak: a slow part would jump with the temperature
+        early, late = np.maximum(first - FAST_S // 2, 0), np.minimum(last + FAST_S // 2, whole.shape[1] - 1)
+        around = (whole[:, late] - whole[:, early]) / (late - early)
+        means = around + (means - around) * louder
     slow_factors = np.resize(noise.unit_slow, units)[:, None] * np.array(noise.axis_slow)
     errors = errors + means.reshape(units, 3, -1).transpose(0, 2, 1) * slow_factors[:, None, :]
     return errors * noise.factors(units)[:, None, :]
+
+
+def _telegraph(kind: tuple[float, float, float], channels: int, steps: int, rng: np.random.Generator) -> Floats:
+    """Jumps between two levels about zero, (channels, steps), µg; of some channels only."""
+    distance, stay, share = kind
+    level = np.zeros((channels, steps))
+    for k in np.flatnonzero(rng.random(channels) < share).tolist():
+        jumps = np.cumsum(rng.random(steps) < GRID_S / stay) + rng.integers(2)
+        level[k] = distance * (jumps % 2 - 0.5)
+    return level
 
 
 def fractional(rng: np.random.Generator, channels: int, steps: int) -> Floats:

@@ -33,6 +33,14 @@ NULLS: dict[str, World] = {
     "lengths": World(durations=(2.0, 60.0)),
     "rest20": World(rest=20.0),
     "lsb5": World(noise=Noise(white=50.0, flicker=5.0), lsb=5.0),
+    "hot_x2": World(noise=Noise(hot=100.0)),
+    "hot_x4": World(noise=Noise(hot=50.0)),
+    "hot_x4_one_unit": World(units=1, noise=Noise(hot=50.0)),
+    "hot_white_x4": World(noise=Noise(white=150.0, flicker=10.0, hot=50.0)),
+    "telegraph_200s": World(noise=Noise(telegraph=(150.0, 200.0, 0.3))),
+    "telegraph_900s": World(noise=Noise(telegraph=(150.0, 900.0, 0.3))),
+    "telegraph_3000s": World(noise=Noise(telegraph=(150.0, 3000.0, 0.3))),
+    "telegraph_two_units": World(units=2, noise=Noise(telegraph=(150.0, 900.0, 0.5))),
 }
 FAULTS: dict[str, World] = {
     "dwell_0.3mg": World(fault="bad_dwell", amount=0.3),

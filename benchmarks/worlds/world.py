@@ -105,7 +105,7 @@ def make(world: World, seed: int) -> Made:
     lot = Lot.drawn(device, world.units)
     scene, again = (replace(s, output=lot.output(s)) for s in (scene, _with_heat(scene, world, second)))
     noises = [
-        1e-6 * dwell_noise(noise, s.start, s.duration, world.units, g)
+        1e-6 * dwell_noise(noise, s.start, s.duration, world.units, g, s.temperature.mean(axis=0))
         for noise, s, g in ((world.noise, scene, first), (world.fresh_noise or world.noise, again, second))
     ]
     floor = float(np.sqrt(np.mean((noises[0] - noises[0].mean(axis=1, keepdims=True)) ** 2)))
