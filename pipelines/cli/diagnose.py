@@ -131,7 +131,7 @@ def diagnosed(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("looking for missing effects"):
-        from pipelines.diagnosis.examination import examination  # loads scipy.stats: after the first line
+        from pipelines.diagnosis.examination import examination  # loads the search for effects: after the first line
 
         made = examination(table, history, judged, left_out)
     if not with_report:
