@@ -7,6 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from inertial.criticism.candidate import Candidate
+from inertial.criticism.covariance import LARGE
 from inertial.criticism.decisions import CERTAIN_BELOW, DRAWS, ENOUGH
 from inertial.criticism.drivers import Driver
 from inertial.criticism.field import Candidates
@@ -30,10 +31,21 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
     is estimated again (of the model's own residuals where their tails are heavy); a failure far beyond what draws can show is
     charged with the number of looks instead.
     """
+    worst, looks = _worst_look(field, drivers, model)
+    draws = NoiseDraws(model, rng)
+    charged = worst + np.log(max(looks, 1))
+    certain = CERTAIN_BELOW**2 if draws.heavy else CERTAIN_BELOW
+    if charged < np.log(certain):
+        return float(charged)
+    return _against_draws(draws, lambda: _everything(field, drivers), worst)
+
+
+def _worst_look(field: Candidates, drivers: list[Driver], model: Model) -> tuple[float, int]:
+    """Natural logarithm of the smallest probability of a look at the residuals of a model, and the number of looks."""
     space = model.space
     common = shared_noise(model)
     of_poses = max(common, scatter_of_poses(model))
-    worst, looks, draws = 0.0, 0, NoiseDraws(model, rng)
+    worst, looks = 0.0, 0
     for candidate in _everything(field, drivers):
         gain = space.gain(candidate)
         looks += gain.drop.size
@@ -43,21 +55,24 @@ def adequacy(field: Candidates, drivers: list[Driver], model: Model, rng: Genera
             if log_p < worst and together > 1.0:
                 log_p = log_p_value(space, drop * _own_part(space, candidate, place, together), rank)
             worst = min(worst, log_p)
-    charged = worst + np.log(max(looks, 1))
-    certain = CERTAIN_BELOW**2 if draws.heavy else CERTAIN_BELOW
-    if charged < np.log(certain):
-        return float(charged)
-    return _against_draws(draws, lambda: _everything(field, drivers), worst)
+    return worst, looks
 
 
 def _against_draws(draws: NoiseDraws, looks: Callable[[], Iterable[Candidate]], worst: float) -> float:
     """Logarithm of the share of draws that fail as much somewhere; drawing ends when the result is clear."""
     blocks, n = draws.model.problem.blocks, draws.model.problem.n
     batch = int(np.clip(_NUMBERS // (blocks * n), 5, _BATCH))
+    if blocks * n > LARGE:
+        draws.model.forget()  # the draws need the memory
     drawn, beyond = 0, 0
     while drawn < DRAWS and beyond < ENOUGH:
-        log_p = draws.worst(looks(), batch)
-        drawn, beyond = drawn + log_p.size, beyond + int(np.count_nonzero(log_p <= worst))
+        # what the first batch does not decide two together seldom leave undecided: columns are made once for both
+        batches = 1 if not drawn else min(2, -(-(DRAWS - drawn) // batch))
+        for used, log_p in enumerate(draws.worst(looks(), batch, batches), 1):
+            drawn, beyond = drawn + log_p.size, beyond + int(np.count_nonzero(log_p <= worst))
+            if beyond >= ENOUGH:
+                draws.keep(used)
+                break
     return float(np.log((1.0 + beyond) / (1.0 + drawn)))
 
 

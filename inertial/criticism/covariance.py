@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _FEW = 16
 """Columns of a block up to which a triangular product, including its transposition, is faster than a general one."""
 
-_WHITENERS = 12_000_000
+_WHITENERS = 18_000_000
 """Largest number of stored whiteners."""
 
 _PRODUCTS = 2_000_000
@@ -138,7 +138,7 @@ class Covariance:
         if key not in self._whiteners:
             self._whiteners[key] = whitener_of(self._kernels[place], index, (wander[0][place], wander[1][place]))
             # applied to many blocks, a whitener costs little beside its use
-            room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 4
+            room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 6
             most = max(room // self.there.shape[1] ** 2, 4)
             while len(self._whiteners) > most:
                 self._whiteners.popitem(last=False)

@@ -3,7 +3,7 @@
 A draw is worked on as rows, (blocks, draws, n): some blocks at a time fit the cache, and no series is turned round.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 _PIECE = 150_000
 """Largest number of values worked on at a time."""
 
-_KEPT = 8_000_000
+_KEPT = 3_200_000
 """Largest number of values of bases that are kept for further draws."""
 
 _OFF = (-8, -4, 0, 4, 8)
@@ -63,15 +63,18 @@ class NoiseDraws:
         self._values = left / np.sqrt(np.mean(left**2))
         self._bases: dict[int, _Basis] = {}
         self._directions: dict[tuple[int, int], Directions] = {}
+        self._states: list[Mapping[str, object]] = []
 
-    def worst(self, looks: Iterable[Candidate], count: int) -> Array:
-        """Smallest log p over all tests of each of so many further draws, (count,), in any order.
+    def worst(self, looks: Iterable[Candidate], count: int, batches: int = 1) -> Array:
+        """Smallest log p over all tests of each of so many further draws, (batches, count).
 
         Parameters
         ----------
         looks : the tests, the same for all draws
+        batches : that are drawn one after the other, and worked on together
         """
-        rows = self._drawn(count)
+        rows = self._drawn(count, batches)
+        count *= batches
         chosen = self._estimated(rows)
         order = np.argsort(chosen, kind="stable")
         for some in _some_blocks(rows):
@@ -93,14 +96,24 @@ class NoiseDraws:
                     if rank and after > 0:
                         ratio = (drop / rank) / (np.maximum(total[own] - drop, 1e-300) / after)
                         worst[own] = np.minimum(worst[own], log_f_tail(ratio, rank, after))
-        return worst
+        drawn = np.empty(count)
+        drawn[order] = worst
+        return drawn.reshape(batches, -1)
 
-    def _drawn(self, count: int) -> Array:
-        """Draws (blocks, count, n) of the noise of the model, g."""
+    def keep(self, batches: int) -> None:
+        """Go on as if only the first batches of the last draws had been drawn."""
+        self.rng.bit_generator.state = self._states[batches - 1]
+
+    def _drawn(self, count: int, batches: int) -> Array:
+        """Draws (blocks, batches · count, n) of the noise of the model, g."""
         problem = self.model.problem
-        rows = np.empty((problem.blocks, count, problem.n))
-        for some in _some_blocks(rows):
-            rows[some] = np.swapaxes(self._white((len(rows[some]), problem.n, count)), 1, 2)
+        rows = np.empty((problem.blocks, batches * count, problem.n))
+        self._states = []
+        for first in range(0, batches * count, count):
+            for some in _some_blocks(rows):
+                white = self._white((len(rows[some]), problem.n, count))
+                rows[some, first : first + count] = np.swapaxes(white, 1, 2)
+            self._states.append(self.rng.bit_generator.state)
         return problem.covariance.coloured(self.model.noise, rows)
 
     def _white(self, shape: tuple[int, ...]) -> Array:

@@ -92,8 +92,9 @@ def _squares(piece: Candidate, there: NDArray[np.bool_]) -> Array:
     each = piece.columns**2
     if piece.rows is None:
         return np.einsum("bngp,bn->gp", each, there.astype(np.float64))
-    count = np.zeros(each.shape[:2])
-    np.add.at(count, piece.rows, there)
+    order = np.argsort(piece.rows, kind="stable")
+    first = np.searchsorted(piece.rows[order], np.arange(len(each)))
+    count = np.add.reduceat(there[order].astype(np.float64), first, axis=0)
     return np.einsum("bngp,bn->gp", each, count)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inertial.criticism.bases import SEEN
+from inertial.criticism.bases import SEEN, eigen
 from inertial.criticism.candidate import Candidate, times_rows
 from inertial.criticism.covariance import Covariance
 from inertial.criticism.noise_draws import Directions
@@ -131,3 +131,17 @@ def test_tail_areas_are_those_of_the_distributions() -> None:
         )
         np.testing.assert_allclose(log_chi2_tail(ratio, first), stats.chi2.logsf(ratio, first), rtol=1e-12, atol=1e-12)
     assert log_f_tail(-1e-12, 2, 5) == 0.0
+
+
+def test_eigenvalues_of_two_rows_are_those_of_the_solver(rng: np.random.Generator) -> None:
+    roots = rng.standard_normal((500, 2, 2))
+    roots[:100, 1] = roots[:100, 0] + 1e-3 * rng.standard_normal((100, 2))  # nearly parallel
+    given = [np.zeros((2, 2)), np.eye(2), np.diag([3.0, 1.0]), np.diag([1.0, 3.0]), [[1.0, 1.0], [1.0, 1.0]]]
+    gram = np.concatenate([roots @ np.swapaxes(roots, -1, -2), given])
+    values, vectors = eigen(gram)
+    expected = np.linalg.eigvalsh(gram)
+    np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(
+        vectors @ np.swapaxes(vectors, -1, -2), np.broadcast_to(np.eye(2), gram.shape), atol=1e-14
+    )
+    np.testing.assert_allclose((vectors * values[:, None]) @ np.swapaxes(vectors, -1, -2), gram, atol=1e-13)
