@@ -82,6 +82,7 @@ class NoiseDraws:
         places, first = np.unique(chosen[order], return_index=True)
         groups = [slice(a, b) for a, b in zip(first, [*first[1:], count], strict=True)]
         total = np.concatenate([self._left(rows, k, own) for k, own in zip(places.tolist(), groups, strict=True)])
+        dof = {k: self._basis(k).dof for k in places.tolist()}
         worst, spaces = np.zeros(count), dict[int, Space]()
         for place, candidate in enumerate(looks):
             along = times_rows(rows, candidate)
@@ -92,7 +93,7 @@ class NoiseDraws:
                     self._directions[place, k] = Directions.of(spaces[k], candidate)
                 found = self._directions[place, k]
                 for drop, rank in zip(found.drops(along[..., own]), found.ranks.tolist(), strict=True):
-                    after = self._basis(k).dof - rank
+                    after = dof[k] - rank
                     if rank and after > 0:
                         ratio = (drop / rank) / (np.maximum(total[own] - drop, 1e-300) / after)
                         worst[own] = np.minimum(worst[own], log_f_tail(ratio, rank, after))
