@@ -121,9 +121,10 @@ def looks(runs: int, first: int) -> Iterator[str]:
         problem, noise = model.problem, model.noise
         field = Candidates(problem, candidates_of(model, run.effects))
         pieces = list(field.pieces())
-        drawn = problem.covariance.coloured(noise, rng.standard_normal((problem.blocks, problem.n, 10 * runs)))
+        white = rng.standard_normal((problem.blocks, problem.n, 10 * runs))
+        drawn = problem.covariance.coloured(noise, np.swapaxes(white, 1, 2).copy())
         for k in range(10 * runs):
-            space, least, count = Space(problem.covariance, noise, drawn[..., k], model.local, model.shared), 0.0, 0
+            space, least, count = Space(problem.covariance, noise, drawn[:, k], model.local, model.shared), 0.0, 0
             for piece in pieces:
                 gain = space.gain(piece)
                 count += gain.drop.size

@@ -25,6 +25,52 @@ def chi2_upper(probability: ArrayLike, dof: ArrayLike) -> Array:
     return np.asarray(special.chdtri(_positive(dof), probability), dtype=np.float64)
 
 
+def f_tail(value: ArrayLike, first: ArrayLike, second: ArrayLike) -> Array:
+    """Probability that F with ``first`` and ``second`` degrees of freedom exceeds a value, one below zero; broadcast."""
+    return np.asarray(special.fdtrc(_positive(first), _positive(second), np.maximum(value, 0.0)), dtype=np.float64)
+
+
+def f_upper(probability: ArrayLike, first: ArrayLike, second: ArrayLike) -> Array:
+    """Value that F with ``first`` and ``second`` degrees of freedom exceeds with a probability; broadcast."""
+    return np.asarray(
+        special.fdtri(_positive(first), _positive(second), 1.0 - np.asarray(probability)), dtype=np.float64
+    )
+
+
+def noncentral_f_tail(value: ArrayLike, first: ArrayLike, second: ArrayLike, noncentrality: ArrayLike) -> Array:
+    """Probability, above 1e-12, that F with a noncentrality exceeds a value; broadcast."""
+    return np.asarray(1.0 - special.ncfdtr(_positive(first), _positive(second), noncentrality, value), dtype=np.float64)
+
+
+def normal_tail(value: ArrayLike) -> Array:
+    """Probability that a standard normal variable exceeds a value."""
+    return np.asarray(special.ndtr(-np.asarray(value)), dtype=np.float64)
+
+
+def student_tail(value: ArrayLike, dof: ArrayLike) -> Array:
+    """Probability that Student's t with ``dof`` degrees of freedom exceeds a value; broadcast."""
+    return np.asarray(special.stdtr(_positive(dof), -np.asarray(value)), dtype=np.float64)
+
+
+def student_upper(probability: ArrayLike, dof: ArrayLike) -> Array:
+    """Value that Student's t with ``dof`` degrees of freedom exceeds with a probability; broadcast."""
+    return np.asarray(-special.stdtrit(_positive(dof), probability), dtype=np.float64)
+
+
+def kurtosis_tail(values: Array) -> float:
+    """Probability that as many normal values, eight at least, have more kurtosis (Anscombe & Glynn, Biometrika 70 (1983) 227)."""
+    n = float(values.size)
+    centred = values - values.mean()
+    kurtosis = float(np.mean(centred**4) / np.mean(centred**2) ** 2)
+    variance = 24.0 * n * (n - 2.0) * (n - 3.0) / ((n + 1.0) ** 2 * (n + 3.0) * (n + 5.0))
+    x = (kurtosis - 3.0 * (n - 1.0) / (n + 1.0)) / np.sqrt(variance)
+    skew = 6.0 * (n**2 - 5.0 * n + 2.0) / ((n + 7.0) * (n + 9.0))
+    skew *= np.sqrt(6.0 * (n + 3.0) * (n + 5.0) / (n * (n - 2.0) * (n - 3.0)))
+    dof = 6.0 + 8.0 / skew * (2.0 / skew + np.sqrt(1.0 + 4.0 / skew**2))
+    ratio = (1.0 - 2.0 / dof) / (1.0 + x * np.sqrt(2.0 / (dof - 4.0)))
+    return float(normal_tail((1.0 - 2.0 / (9.0 * dof) - np.cbrt(ratio)) / np.sqrt(2.0 / (9.0 * dof))))
+
+
 def normal_upper(probability: ArrayLike) -> Array:
     """Value that a standard normal variable exceeds with a probability."""
     return np.asarray(-special.ndtri(probability), dtype=np.float64)

@@ -37,8 +37,16 @@ def recursion(start: ArrayLike, keep: Array, drive: Array) -> Array:
     out[..., 0] = start
     rows = out.reshape(-1, out.shape[-1])
     if len(rows) > _FEW:
-        for k in range(drive.shape[-1]):
-            out[..., k + 1] = keep[..., k] * out[..., k] + drive[..., k]
+        # times first: a row is contiguous
+        kept, driven = (
+            np.ascontiguousarray(np.broadcast_to(a, drive.shape).reshape(len(rows), -1).T) for a in (keep, drive)
+        )
+        line = np.empty(rows.shape[::-1])
+        line[0] = rows[:, 0]
+        for before, after, k, d in zip(line[:-1], line[1:], kept, driven, strict=True):
+            np.multiply(before, k, out=after)
+            np.add(after, d, out=after)
+        rows[:] = line.T
         return out
     each = zip(*(np.broadcast_to(a, drive.shape).reshape(len(rows), -1).tolist() for a in (keep, drive)), strict=True)
     for row, (kept, driven) in zip(rows, each, strict=True):

@@ -206,5 +206,15 @@ def _at_dwells(grid: Array, values: Array, time: Array) -> Array:
     """Values on ``grid`` (m,) read at ``time`` (..., n), linear in between, constant beyond the ends."""
     flat_values = values.reshape(-1, values.shape[-1])
     flat_time = np.broadcast_to(time, (*values.shape[:-1], time.shape[-1])).reshape(-1, time.shape[-1])
-    picked = [np.interp(t, grid, v) for t, v in zip(flat_time, flat_values, strict=True)]
-    return np.array(picked).reshape(*values.shape[:-1], time.shape[-1])
+    if len(grid) < 2 or not np.array_equal(flat_time, np.broadcast_to(flat_time[:1], flat_time.shape)):
+        picked = np.array([np.interp(t, grid, v) for t, v in zip(flat_time, flat_values, strict=True)])
+    else:
+        # units read at the same times share the places on the grid; the numbers are those of np.interp
+        at = np.clip(flat_time[0], grid[0], grid[-1])
+        place = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+        below = flat_values[:, place]
+        step = grid[place + 1] - grid[place]
+        slope = (flat_values[:, place + 1] - below) / np.where(step > 0.0, step, 1.0)
+        picked = slope * (at - grid[place]) + below
+        picked = np.where(at == grid[-1], flat_values[:, -1:], picked)
+    return picked.reshape(*values.shape[:-1], time.shape[-1])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -29,6 +29,21 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THRE
 KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
 """Variables of the GNU C library by which a process uses memory of arrays of some MB again. Else the system maps every such array
 anew, page by page, which is a quarter of the time of an uncertainty budget."""
+
+
+_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # names of the two in <malloc.h>
+
+
+def keep_memory() -> None:
+    """From now on this process uses memory of arrays of some MB again, where its C library is the GNU one."""
+    import ctypes
+
+    settings = zip((_MMAP_THRESHOLD, _TRIM_THRESHOLD), KEPT_MEMORY.values(), strict=True)
+    with suppress(OSError, TypeError, AttributeError):  # another C library, or another system
+        library = ctypes.CDLL(None)
+        if hasattr(library, "gnu_get_libc_version"):
+            for setting, size in settings:
+                library.mallopt(setting, int(size))
 
 
 class Distributor(Protocol):

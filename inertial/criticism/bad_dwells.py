@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from inertial.criticism.bad_norms import bad_norms
 from inertial.criticism.decisions import BAD_DWELL, COMMON, MOST_BAD
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.space import Space
+from inertial.distributions import chi2_upper, f_tail
 
 Array = NDArray[np.float64]
 
@@ -117,12 +117,12 @@ class _Deletion:
         squares = self._studentised(drop)
         statistic = squares.sum(axis=1)
         if self.units > 2:
-            together = np.median(statistic, axis=0) > float(stats.chi2.isf(COMMON, self.axes))
+            together = np.median(statistic, axis=0) > float(chi2_upper(COMMON, self.axes))
             statistic = np.where(together, 0.0, statistic)
         unit, dwell = np.unravel_index(int(np.argmax(statistic)), statistic.shape)
         dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
         freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())
-        chance = float(stats.f.sf(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
+        chance = float(f_tail(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
         outlier = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
         return outlier if chance < BAD_DWELL and dof >= _LEAST_DOF else None
 

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 from scipy.special import gammaln
 
 from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise
 from inertial.criticism.problem import Lot, Problem
+from inertial.criticism.tail_areas import log_f_tail
+from inertial.distributions import chi2_quantile
 
 Array = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
             p, py = _projector(model, Noise(noise, model.noise.scale, model.noise.prior), unit)
             for size, drop, places in _drops(p, py):
                 left = np.maximum(space.rss - drop, 1e-300) / max(space.dof - size, 1)
-                log_p = stats.f.logsf(drop / size / left, size, max(space.dof - size, 1))
+                log_p = log_f_tail(drop / size / left, size, max(space.dof - size, 1))
                 order = np.argsort(log_p)[:_TRIED]
                 for k in order.tolist():
                     if log_p[k] + _looks(model, size) < 0.0:
@@ -141,7 +142,7 @@ def _variance(rest: Model, unit: int) -> tuple[float, int]:
     if not rest.problem.lot.recorded:
         return own, dof
     scale = float(rest.noise.scale[unit]) ** 2
-    low, high = stats.chi2.ppf([0.5 * AGREES, 1.0 - 0.5 * AGREES], dof) / dof
+    low, high = chi2_quantile([0.5 * AGREES, 1.0 - 0.5 * AGREES], dof) / dof
     if not low < own * scale < high:
         return own, dof
     return (dof * own + RECORDED_DOF / scale) / (dof + RECORDED_DOF), dof + RECORDED_DOF
@@ -159,11 +160,11 @@ def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | Non
     size = len(dwells)
     variance, dof = _variance(rest, unit)
     statistic = float(py[list(dwells)] @ off) / variance
-    log_p = float(stats.f.logsf(statistic / size, size, dof)) + _looks(model, size)
+    log_p = float(log_f_tail(statistic / size, size, dof)) + _looks(model, size)
     error = np.sqrt(np.diagonal(np.linalg.inv(own)) * variance)
     if size > 1:
         # each must be bad by itself beside the other
-        each = stats.f.logsf((off / error) ** 2, 1, dof) + _looks(model, 1)
+        each = log_f_tail((off / error) ** 2, 1, dof) + _looks(model, 1)
         if not bool(np.all(each < np.log(SECOND))):
             return None
     return Suspicion(unit, dwells, tuple(off.tolist()), tuple(np.abs(off / error).tolist()), log_p)

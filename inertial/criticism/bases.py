@@ -10,10 +10,33 @@ SEEN = 0.01
 
 
 def eigen(gram: Array) -> tuple[Array, Array]:
-    """Eigenvalues (..., p) and vectors (..., p, p) of symmetric matrices; of one row and column without a solver."""
+    """Eigenvalues (..., p), ascending, and vectors (..., p, p) of symmetric matrices; up to two rows without a solver."""
     if gram.shape[-1] == 1:
         return gram[..., 0], np.ones(gram.shape)
+    if gram.shape[-1] == 2:
+        return _eigen_of_two(gram)
     return np.linalg.eigh(gram)
+
+
+def _eigen_of_two(gram: Array) -> tuple[Array, Array]:
+    """The same of two rows and columns, by the angle of their main axes."""
+    first, second, beside = gram[..., 0, 0], gram[..., 1, 1], gram[..., 1, 0]
+    half = 0.5 * (first - second)
+    reach, middle = np.hypot(half, beside), 0.5 * (first + second)
+    values, vectors = np.empty(gram.shape[:-1]), np.empty(gram.shape)
+    values[..., 0], values[..., 1] = middle - reach, middle + reach
+    # of the two equal forms of a component the one without a difference of nearly equal numbers
+    large = np.hypot(reach + np.abs(half), beside)
+    known = large > 0.0
+    large = np.where(known, large, 1.0)
+    cosine = np.where(known, (reach + np.abs(half)) / large, 1.0)
+    sine = np.where(known, beside / large, 0.0)
+    upper = half >= 0.0
+    vectors[..., 0, 1] = np.where(upper, cosine, sine)
+    vectors[..., 1, 1] = np.where(upper, sine, cosine)
+    vectors[..., 0, 0] = -vectors[..., 1, 1]
+    vectors[..., 1, 0] = vectors[..., 0, 1]
+    return values, vectors
 
 
 def orthonormal(columns: Array) -> tuple[Array, NDArray[np.intp]]:

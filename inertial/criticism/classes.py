@@ -63,7 +63,7 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     """The class of one term of a model, with all other terms kept; every serious rival with its own noise."""
     rest = model.without_term(term)
     leave = {t.effect.id for t in rest.terms if not isinstance(t.effect, Handling)}
-    looked = scanned(field, rest.at(model.noise), leave)
+    looked = scanned(field, [rest.at(model.noise)], leave)[0]
     own = judge(field, rest, term)
     least = max((score for _, score in looked), default=0.0) - decisions.RIVAL_NEAR * _stretch(term, looked, own)
     near = [t for t, score in looked[:_MOST] if score > least and t.effect.id != term.effect.id]

@@ -15,14 +15,13 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from inertial.criticism.candidate import Candidate
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, walk_kernel
 from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.products import PIECE, products_of
-from inertial.criticism.whitener import applied, applied_back, grouped, whitener_of
+from inertial.criticism.products import PIECE, products_of, products_with
+from inertial.criticism.whitener import applied, applied_back, grouped, solved, whitener_of
 from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
@@ -30,7 +29,7 @@ Array = NDArray[np.float64]
 _FEW = 16
 """Columns of a block up to which a triangular product, including its transposition, is faster than a general one."""
 
-_WHITENERS = 12_000_000
+_WHITENERS = 18_000_000
 """Largest number of stored whiteners."""
 
 _PRODUCTS = 2_000_000
@@ -168,7 +167,7 @@ class Covariance:
         if key not in self._whiteners:
             self._whiteners[key] = whitener_of(self._kernels[place], index, (wander[0][place], wander[1][place]))
             # applied to many blocks, a whitener costs little beside its use
-            room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 4
+            room = _WHITENERS if self.there.size <= LARGE else _WHITENERS // 6
             most = max(room // self.there.shape[1] ** 2, 4)
             while len(self._whiteners) > most:
                 self._whiteners.popitem(last=False)
@@ -234,22 +233,34 @@ class Covariance:
                 yield own, None if whitener is None else whitener[0], np.where(kernel.there, 1.0 / kernel.white, 0.0)
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
-        """Series (blocks, n, m), g, with this noise, from independent normal numbers; zero where a dwell is missing."""
-        out = np.empty(drawn.shape)
+        """Series (blocks, m, n), g, with this noise, in place of independent normal numbers; zero where a dwell is missing."""
+        few = max(PIECE // max(drawn[0].size, 1), 1)
         for place, steps, members, common in self._groups_at(noise.shares):
             kernel = self._kernels[place]
             whitener = self._whitener(place, steps, common)
-            n, m = drawn.shape[1:]
-            flat = drawn[members].transpose(1, 0, 2).reshape(n, -1)
-            made = np.zeros_like(flat)
+            for some in np.split(members, range(few, members.size, few)):
+                own = drawn[some]
+                if whitener is None:
+                    own *= kernel.white * kernel.there
+                elif kernel.there.all():
+                    own = solved(whitener[0], own, overwrite=True)
+                else:
+                    inside = solved(whitener[0][np.ix_(kernel.there, kernel.there)], own[..., kernel.there])
+                    own = np.zeros(own.shape)
+                    own[..., kernel.there] = inside
+                drawn[some] = own * (self.level * noise.scale)[some, None, None]
+        return drawn
+
+    def white_rows(self, rows: Array, shares: Shares, blocks: slice) -> Array:
+        """Series (b, m, n) of some blocks with white noise of variance one over their level in them, in their place."""
+        for own, whitener, white in self._by_whitener(shares, np.arange(len(self.level))[blocks]):
             if whitener is None:
-                made = flat * (kernel.white * kernel.there)[:, None]
+                rows[own] *= white
+            elif own.size == len(rows):
+                rows = applied(whitener, rows, overwrite=True)
             else:
-                there = kernel.there
-                made[there] = solve_triangular(whitener[0][np.ix_(there, there)], flat[there], lower=True)
-            own = made.reshape(n, members.size, m).transpose(1, 0, 2)
-            out[members] = own * (self.level * noise.scale)[members, None, None]
-        return out
+                rows[own] = applied(whitener, rows[own], overwrite=True)
+        return rows
 
     def back(self, rows: Array, shares: Shares, blocks: NDArray[np.intp] | None = None) -> Array:
         """Rows (blocks, k, n) of whitened series of all or some blocks times the whiteners, for white noise of variance one."""
@@ -304,6 +315,10 @@ class Covariance:
         else:
             self._kept.move_to_end(name)
         return kept
+
+    def products_with(self, candidate: Candidate, rows: Array, shares: Shares) -> tuple[Array, Array]:
+        """Products cᵀV⁻¹c (blocks, p, p) of a candidate's columns at one value, and with rows (blocks, k, n): (blocks, p, k)."""
+        return products_with(candidate, rows, self.level, self._by_whitener(shares))
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
 
 from inertial import effects as catalogue
 from inertial.counts import degrees_of_freedom, number_of
@@ -12,6 +11,8 @@ from inertial.criticism.bases import SEEN
 from inertial.criticism.field import Candidates
 from inertial.criticism.model import Model
 from inertial.criticism.term import Term
+from inertial.distributions import f_upper, noncentral_f_tail
+from inertial.roots import root
 
 Array = NDArray[np.float64]
 
@@ -181,11 +182,11 @@ def _cubic(model: Model, field: Candidates) -> float | None:
         return None
     power = np.einsum("bnp,bnp->p", after, after) / max(space.variance, 1e-300)
     power = power[power > SEEN**2]
-    limit = float(stats.f.isf(_LEVEL / max(len(field.effects), 1), rank, left))
+    limit = float(f_upper(_LEVEL / max(len(field.effects), 1), rank, left))
 
     def excess(size: float) -> float:
-        return float(stats.ncf.sf(limit, rank, left, size**2 * float(power.min()))) - POWER
+        return float(noncentral_f_tail(limit, rank, left, size**2 * float(power.min()))) - POWER
 
     if not power.size or excess(_LARGEST) <= 0.0:
         return None
-    return float(optimize.brentq(excess, 1e-9, _LARGEST))  # pyright: ignore[reportArgumentType]
+    return root(excess, 1e-9, _LARGEST)

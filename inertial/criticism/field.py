@@ -1,6 +1,6 @@
 """The candidates of a search: effects at the values of their nonlinear parameters, alternatives at their places."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,18 +62,24 @@ class Candidates:
 
     def gains(self, space: Space, leave: set[str], *, handling: bool = False) -> dict[str, Gain]:
         """Gain of every candidate that the model does not hold already."""
-        gains: dict[str, Gain] = {}
+        return self.gains_in([space], leave, handling=handling)[0]
+
+    def gains_in(self, spaces: Sequence[Space], leave: set[str], *, handling: bool = False) -> list[dict[str, Gain]]:
+        """The same in each of some spaces: columns are made once for all."""
+        gains: list[dict[str, Gain]] = [{} for _ in spaces]
         for effect in (*self.effects, *(self.handling if handling else ())):
             if effect.id not in leave:
-                gains[effect.id] = self._gain(space, effect, None)
+                for each, gain in zip(gains, self._gain(spaces, effect, None), strict=True):
+                    each[effect.id] = gain
         return gains
 
-    def _gain(self, space: Space, effect: AnyEffect | Handling, first: int | None) -> Gain:
+    def _gain(self, spaces: Sequence[Space], effect: AnyEffect | Handling, first: int | None) -> list[Gain]:
         if isinstance(effect, OfOneDwell) and not self.problem.lot.radial:
             places = np.array([int(place["at"]) for place in self.grids[effect.id]])
-            return space.gain_of_dwells(self._every_dwell(effect), places)
+            return [space.gain_of_dwells(self._every_dwell(effect), places) for space in spaces]
         pieces = self.problem.pieces(effect, self.grids[effect.id], first=first)
-        return Gain.joined([space.gain(piece) for piece in pieces])
+        parts = [[space.gain(piece) for space in spaces] for piece in pieces]
+        return [Gain.joined(own) for own in zip(*parts, strict=True)]
 
     def _every_dwell(self, effect: OfOneDwell) -> Array:
         """Columns (blocks, n, p) of an alternative of one dwell, for each dwell in turn."""
@@ -88,11 +94,12 @@ class Candidates:
         for effect in self.effects:
             yield from self.problem.pieces(effect, self.grids[effect.id])
 
-    def primary_gains(self, space: Space, leave: set[str]) -> dict[str, Gain]:
+    def primary_gains_in(self, spaces: Sequence[Space], leave: set[str]) -> list[dict[str, Gain]]:
         """Gain of the leading column alone, for effects of several columns whose first is an effect of its own."""
-        gains: dict[str, Gain] = {}
+        gains: list[dict[str, Gain]] = [{} for _ in spaces]
         for effect in self.effects:
             first = effect.primary
             if effect.id not in leave and first is not None:
-                gains[effect.id] = self._gain(space, effect, first)
+                for each, gain in zip(gains, self._gain(spaces, effect, first), strict=True):
+                    each[effect.id] = gain
         return gains

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from inertial.criticism import variance
 from inertial.criticism.decisions import TOGETHER
@@ -21,10 +20,11 @@ from inertial.criticism.penalty import freedom, price
 from inertial.criticism.space import Space
 from inertial.criticism.tail_areas import log_chi2_tail
 from inertial.criticism.term import Term
+from inertial.distributions import chi2_quantile
 
 Array = NDArray[np.float64]
 
-_MEDIAN = float(stats.chi2.median(1))
+_MEDIAN = float(chi2_quantile(0.5, 1.0))
 _FEWEST_POSES = 10
 _QUANTILES = (0.5, 0.75, 0.9)
 """Of the poses, at which their scatter is compared with that of the noise: a table may be off in a part of its poses only."""

@@ -14,7 +14,7 @@ from inertial.criticism.handling.base import Handling, by_block
 from inertial.criticism.lot import Lot
 from inertial.criticism.shared_rows import finest_rows, shared_rows
 from inertial.effects import SensorEffect
-from inertial.effects.base import AnyEffect, excited
+from inertial.effects.base import AnyEffect, excited, has_start
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,9 @@ SHARED = ("station", "data")
 
 _PIECE = 1_000_000
 """Number of columns processed at a time."""
+
+_FEW = 1000
+"""Values of a column of all blocks up to which it takes longer to find equal columns than to work on all."""
 
 _MOST = 40
 """Values of a grid at a time, where blocks have equal columns."""
@@ -44,6 +47,13 @@ Values = Mapping[str, float | tuple[float, ...]]
 def on_axis(values: Values, axis: int) -> dict[str, float]:
     """The values that hold for one sensor axis."""
     return {name: value[axis] if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def _by_axis(values: Values) -> list[dict[str, float]]:
+    """The values of each sensor axis; the same where no parameter has one for each."""
+    if any(isinstance(value, tuple) for value in values.values()):
+        return [on_axis(values, axis) for axis in range(3)]
+    return [on_axis(values, 0)] * 3
 
 
 class Problem:
@@ -127,17 +137,18 @@ class Problem:
             return effect.columns(self.lot, self.slope, **on_axis(values, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
-            axes = [effect.columns(state, axis, **on_axis(values, axis)) for axis in range(3)]
+            axes = [effect.columns(state, axis, **own) for axis, own in enumerate(_by_axis(values))]
             return self._by_axis([excited(effect, columns) for columns in axes])
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
     def start(self, effect: AnyEffect | Handling, values: Values) -> Array:
         """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
-        if isinstance(effect, Handling):
+        if isinstance(effect, Handling) or not has_start(effect):
             return np.zeros((self.blocks, self.n, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
-            columns = self._by_axis([effect.start_columns(state, axis, **on_axis(values, axis)) for axis in range(3)])
+            each = [effect.start_columns(state, axis, **own) for axis, own in enumerate(_by_axis(values))]
+            columns = self._by_axis(each)
         else:
             columns = self.seen(effect.start_change(self.lot.state, **on_axis(values, 0)))
         # a state that decays before the second dwell leaves a column of one dwell only: it is kept, and this dwell has no
@@ -148,11 +159,14 @@ class Problem:
         """Columns of three axes, each (units or 1, n, p), by block."""
         state = self.lot.state
         shape = state.time.shape
-        axes = [a if a.shape[:-1] == shape else np.broadcast_to(a, (*shape, a.shape[-1])) for a in axes]
         if self.lot.radial:
+            axes = [a if a.shape[:-1] == shape else np.broadcast_to(a, (*shape, a.shape[-1])) for a in axes]
             weighted = [a * self._direction[..., i, None] for i, a in enumerate(axes)]
             return np.concatenate(weighted, axis=-1)
-        return np.stack(axes, axis=1).reshape(self.blocks, self.n, -1)
+        joined = np.empty((shape[0], 3, shape[1], axes[0].shape[-1]))
+        for axis, columns in enumerate(axes):
+            joined[:, axis] = columns
+        return joined.reshape(self.blocks, self.n, -1)
 
     def seen(self, change: Array) -> Array:
         """Changes of force (units or 1, n, 3, q) as measured with every unit's response, by block."""
@@ -219,7 +233,7 @@ class Problem:
             own = (self._columns(effect, values) if known is None else known)[..., :first]
             if start:
                 own = np.concatenate([own, self.start(effect, values)], axis=-1)
-            rows = None if shared else self.rows_of(own)
+            rows = None if shared or self.blocks * self.n <= _FEW else self.rows_of(own)
             every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
             rows_of.append(rows)
         rows = finest_rows(rows_of, radial=self.lot.radial)

@@ -40,7 +40,7 @@ class Readings:
     unit_name: str | None = None
     history_end: float | None = None
 
-    @property
+    @cached_property
     def there(self) -> NDArray[np.bool_]:
         """Which units have which dwells, (units, n)."""
         there: NDArray[np.bool_] = np.all(np.isfinite(self.output), axis=-1)

@@ -148,17 +148,24 @@ def contest(field: Candidates, model: Model, barred: str = "", finalists: int = 
     chosen: dict[str, Term] = {}
     noise = model.noise
     less = noise.shares.times(decisions.LESS_FLICKER, decisions.LESS_WALK)
-    for other in [noise] if less == noise.shares else [noise, model.noise_at(less)]:
-        looked = scanned(field, model.at(other), leave)
+    others = [noise] if less == noise.shares else [noise, model.noise_at(less)]
+    for looked in scanned(field, [model.at(other) for other in others], leave):
         for term, _ in looked[:finalists]:
             chosen.setdefault(term.effect.id, term)
     return ranked([_exact(field, model, term) for term in chosen.values()])
 
 
-def scanned(field: Candidates, space: Space, leave: set[str]) -> list[tuple[Term, float]]:
-    """Candidates at their best grid value with their scores at one noise, best first; without those below their price."""
+def scanned(field: Candidates, spaces: Sequence[Space], leave: set[str]) -> list[list[tuple[Term, float]]]:
+    """For each noise candidates at their best grid value with their scores, best first; without those below their price."""
+    whole, first = field.gains_in(spaces, leave, handling=True), field.primary_gains_in(spaces, leave)
+    return [_best_first(field, *each) for each in zip(spaces, whole, first, strict=True)]
+
+
+def _best_first(
+    field: Candidates, space: Space, whole: dict[str, Gain], first: dict[str, Gain]
+) -> list[tuple[Term, float]]:
+    """The candidates at one noise, from their gains and those of their leading columns."""
     tried: dict[str, tuple[float, Term]] = {}
-    whole, first = field.gains(space, leave, handling=True), field.primary_gains(space, leave)
     for primary, gains in ((False, whole), (True, first)):
         for name, gain in gains.items():
             score, place = _best_of(field, space, name, gain)

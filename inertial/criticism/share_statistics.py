@@ -1,14 +1,14 @@
 """What a model and its measurements say about the shares of the noise: products of its columns at any shares."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.candidate import Candidate, times_rows
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.noise_shares import Shares
 from inertial.criticism.problem import Problem
+from inertial.criticism.products import PIECE
 
 Array = NDArray[np.float64]
 
@@ -21,17 +21,8 @@ VANISHING = 3e-5
 _FAR = 1e3
 """Multiple of the limit, of the squares, above which the eigenvalues of the products of columns decide on their rank."""
 
-_KEPT = 4_000_000
-"""Largest number of values of rows that are kept for models with one more term."""
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """V⁻¹ times the columns of the blocks that share a whitener, those that differ: rows (k, n), and the place of each column."""
-
-    members: NDArray[np.intp]
-    rows: Array
-    places: NDArray[np.intp]
+_KEPT = 1_000_000
+"""Largest number of products that are kept for models with one more term."""
 
 
 class ShareStatistics:
@@ -56,7 +47,7 @@ class ShareStatistics:
         # a combination that vanishes mixes the columns: then all are whitened together
         nested = before is not None and further is not None and self.whole and before.whole
         self._before, self._further = (before, further) if nested else (None, None)
-        self._kept: dict[Shares, list[_Rows]] = {}
+        self._kept: dict[Shares, Array] = {}
 
     @property
     def rank(self) -> int:
@@ -87,8 +78,8 @@ class ShareStatistics:
         return scaled @ np.swapaxes(turn[:, :rank], -1, -2)
 
     @cached_property
-    def _columns(self) -> Array:
-        """Determined columns, and the measurements behind them, (blocks, n, r + 1).
+    def _rows(self) -> Array:
+        """Determined columns, and the measurements behind them, as rows, (blocks, r + 1, n).
 
         Of the measurements a plain fit is taken off before: what the model leaves of them is a millionth of their squares.
         """
@@ -99,17 +90,19 @@ class ShareStatistics:
         unit = own / np.where(size > 0.0, size, 1.0)[:, None, :]
         across = np.swapaxes(unit, -1, -2)
         fitted = unit @ (np.linalg.pinv(across @ unit, rcond=1e-12, hermitian=True) @ (across @ y))
-        return np.concatenate([x, (y - fitted) * there], axis=-1)
+        rows = np.empty((self.problem.blocks, x.shape[-1] + 1, self.problem.n))
+        rows[:, :-1] = np.swapaxes(x, -1, -2)
+        rows[:, -1] = ((y - fitted) * there)[..., 0]
+        return rows
 
     @cached_property
     def _distinct(self) -> tuple[Array, NDArray[np.intp]]:
         """The columns that differ, (rows, n), and where each column of each block is among them, (blocks, r + 1)."""
-        columns = np.swapaxes(self._columns, 0, -1).swapaxes(1, -1)
         blocks = self.problem.blocks
         few: list[Array] = []
         places: list[NDArray[np.intp]] = []
         count = 0
-        for column in columns:
+        for column in np.swapaxes(self._rows, 0, 1):
             rows = self.problem.rows_of(column)
             few.append(column if rows is None else column[np.unique(rows, return_index=True)[1]])
             places.append(count + (np.arange(blocks) if rows is None else rows))
@@ -118,36 +111,38 @@ class ShareStatistics:
 
     def products(self, shares: Shares) -> Array:
         """Products (blocks, r + 1, r + 1) of the determined columns and the measurements with each other."""
+        if shares not in self._kept:
+            made = self._whole(shares) if self._before is None or self._further is None else self._nested(shares)
+            while self._kept and (len(self._kept) + 1) * made.size > _KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[shares] = made
+        return self._kept[shares]
+
+    def _whole(self, shares: Shares) -> Array:
+        """The products of all columns that differ."""
+        covariance = self.problem.covariance
+        columns, places = self._distinct
+        out = np.empty((self.problem.blocks, places.shape[1], places.shape[1]))
+        for members, own, rows in covariance.solved(columns, places, shares):
+            each = np.searchsorted(own, places[members])
+            few = max(PIECE // (each.shape[1] * self.problem.n), 1)
+            for some in (slice(start, start + few) for start in range(0, members.size, few)):
+                out[members[some]] = rows[each[some]] @ np.swapaxes(self._rows[members[some]], -1, -2)
+        out /= covariance.level[:, None, None] ** 2
+        return out
+
+    def _nested(self, shares: Shares) -> Array:
+        """Those of the model without its last term, and those of this term: V⁻¹ is applied to the columns of the term alone."""
         if self._before is None or self._further is None:
-            return self._rows(shares) @ self._columns
-        rows, further = self._before._rows(shares), self._further  # noqa: SLF001  # of its own kind
-        known, across = rows @ self._before._columns, times_rows(rows, further)[:, 0]  # noqa: SLF001
-        own = self.problem.covariance.products(further, shares)[:, 0]
+            return self._whole(shares)
+        known, rows = self._before.products(shares), self._before._rows  # noqa: SLF001  # of its own kind
+        own, across = self.problem.covariance.products_with(self._further, rows, shares)
         # the measurements stay last
         r = known.shape[-1] - 1
         above = np.concatenate([known[:, :r, :r], np.swapaxes(across, -1, -2)[:, :r], known[:, :r, r:]], axis=-1)
         beside = np.concatenate([across[..., :r], own, across[..., r:]], axis=-1)
         last = np.concatenate([known[:, r:, :r], np.swapaxes(across, -1, -2)[:, r:], known[:, r:, r:]], axis=-1)
         return np.concatenate([above, beside, last], axis=1)
-
-    def _rows(self, shares: Shares) -> Array:
-        """Rows (blocks, r + 1, n) that give the products of the determined columns and the measurements with columns in g."""
-        covariance = self.problem.covariance
-        if shares not in self._kept:
-            columns, places = self._distinct
-            kept = [
-                _Rows(members, rows, np.searchsorted(own, places[members]))
-                for members, own, rows in covariance.solved(columns, places, shares)
-            ]
-            size = sum(one.rows.size for one in kept)
-            while self._kept and (len(self._kept) + 1) * size > _KEPT:
-                del self._kept[next(iter(self._kept))]
-            self._kept[shares] = kept
-        out = np.empty((self.problem.blocks, self._distinct[1].shape[1], self.problem.n))
-        for one in self._kept[shares]:
-            out[one.members] = one.rows[one.places]
-        out /= covariance.level[:, None, None] ** 2
-        return out
 
     def at(self, shares: Shares) -> tuple[float, Array] | None:
         """log|HᵀV⁻¹H| and sums of squares (blocks,), by one factorisation; None if columns are collinear."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from inertial.criticism.bases import SEEN
 from inertial.criticism.candidate import Candidate
@@ -18,6 +17,7 @@ from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.penalty import price
 from inertial.criticism.space import Space
+from inertial.distributions import chi2_upper
 
 Array = NDArray[np.float64]
 
@@ -92,14 +92,15 @@ def _squares(piece: Candidate, there: NDArray[np.bool_]) -> Array:
     each = piece.columns**2
     if piece.rows is None:
         return np.einsum("bngp,bn->gp", each, there.astype(np.float64))
-    count = np.zeros(each.shape[:2])
-    np.add.at(count, piece.rows, there)
+    order = np.argsort(piece.rows, kind="stable")
+    first = np.searchsorted(piece.rows[order], np.arange(len(each)))
+    count = np.add.reduceat(there[order].astype(np.float64), first, axis=0)
     return np.einsum("bngp,bn->gp", each, count)
 
 
 def _needed(coefficients: float, looks: int, count: int) -> float:
     """Noncentrality from which an effect with this number of coefficients is detected in the mean."""
-    deviance = max(float(stats.chi2.isf(NAMED_BELOW / max(looks, 1), coefficients)), coefficients)
+    deviance = max(float(chi2_upper(NAMED_BELOW / max(looks, 1), coefficients)), coefficients)
     while deviance - price(deviance, coefficients) < np.log(max(count, 2)):
         deviance *= 1.02
     return max(deviance - coefficients, 1.0)

@@ -19,11 +19,11 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from inertial.criticism.bad_dwells import BadDwell, deletion_residuals
 from inertial.criticism.decisions import HEAVY, TAILS, TAILS_REACH
 from inertial.criticism.model import Model
+from inertial.distributions import chi2_tail, kurtosis_tail, normal_tail, student_tail
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def with_tails(model: Model, removed: Sequence[BadDwell]) -> list[BadDwell]:
 
 def heavy(values: Array) -> bool:
     """Whether values (m,) have heavier tails than a normal distribution."""
-    return values.size >= _FEWEST and float(stats.kurtosistest(values, alternative="greater").pvalue) < HEAVY
+    return values.size >= _FEWEST and kurtosis_tail(values) < HEAVY
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class _Noise:
         for k in range(len(_SHARES)):
             whole = axes * _beyond(k, length / self.scale)
             each = np.stack([_beyond(k, abs(float(v)) / self.scale) for v in by_axis])
-            together = stats.gamma.sf(-np.log(np.maximum(each, 1e-300)).sum(axis=0), axes)
+            together = chi2_tail(-2.0 * np.log(np.maximum(each, 1e-300)).sum(axis=0), 2.0 * axes)
             least = np.minimum(2.0 * dwells * np.minimum(whole, together), 1.0)
             total += float(np.sum(self.weight[k] * least))
         return total
@@ -112,10 +112,10 @@ def _beyond(place: int, z: Array) -> Array:
     """P(|x| > z) of a value of variance one; ``place`` is the index of the share of its heavy tails."""
     share = _SHARES[place]
     if share == 0.0:
-        return 2.0 * stats.norm.sf(z)
+        return 2.0 * normal_tail(z)
     grid, _, distribution = _table(place)
     near = 2.0 * (1.0 - np.interp(z, grid, distribution))
-    return np.where(z < _TAIL, near, 2.0 * stats.t.sf(z / np.sqrt(share / _DOF), _DOF))
+    return np.where(z < _TAIL, near, 2.0 * student_tail(z / np.sqrt(share / _DOF), _DOF))
 
 
 @cache
@@ -124,9 +124,9 @@ def _table(place: int) -> tuple[Array, Array, Array]:
     share, half = _SHARES[place], round(_FURTHEST / _STEP)
     grid = _STEP * np.arange(-half, half + 1)
     edges = np.append(grid - 0.5 * _STEP, grid[-1] + 0.5 * _STEP)
-    mass = np.diff(stats.norm.cdf(edges, scale=max(np.sqrt(1.0 - share), 1e-9)))
+    mass = np.diff(normal_tail(-edges / max(np.sqrt(1.0 - share), 1e-9)))
     if share > 0.0:
-        tails = np.diff(stats.t.cdf(edges / np.sqrt(share / _DOF), _DOF))
+        tails = np.diff(student_tail(-edges / np.sqrt(share / _DOF), _DOF))
         size = 4 * grid.size
         both = np.fft.irfft(np.fft.rfft(mass, size) * np.fft.rfft(tails, size), size)
         mass = np.maximum(both[half : half + grid.size], 1e-300)

@@ -11,7 +11,7 @@ from inertial.criticism.decisions import SHARE_STEP
 Array = NDArray[np.float64]
 
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
-_times = get_blas_funcs(("trmm",), dtype=np.float64)[0]
+_times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
 
 EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
@@ -110,10 +110,23 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     return filled, logdet
 
 
-def applied(lower: Array, series: Array) -> Array:
-    """Series (blocks, m, n) times a lower triangle (n, n), by half of the products, as the matrix is triangular."""
+def applied(lower: Array, series: Array, *, overwrite: bool = False) -> Array:
+    """Series (blocks, m, n) times a lower triangle (n, n), by half of the products, as the matrix is triangular.
+
+    Parameters
+    ----------
+    overwrite : whether the result may take the place of the series
+    """
     flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
-    return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1).T.reshape(series.shape)
+    return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite).T.reshape(series.shape)
+
+
+def solved(lower: Array, series: Array, *, overwrite: bool = False) -> Array:
+    """Series (blocks, m, n) that a lower triangle (n, n) makes the given ones; parameters as of :func:`applied`."""
+    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
+    return _solve(
+        1.0, np.ascontiguousarray(lower).T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite
+    ).T.reshape(series.shape)
 
 
 def applied_back(lower: Array, series: Array) -> Array:

@@ -161,6 +161,14 @@ def excited(effect: "Effect", columns: Array) -> Array:
 
 AnyEffect = SensorEffect | StationEffect
 
+
+def has_start(effect: AnyEffect) -> bool:
+    """Whether an effect has columns for the state of its memory before the first dwell."""
+    if isinstance(effect, SensorEffect):
+        return type(effect).start_columns is not SensorEffect.start_columns
+    return type(effect).start_change is not StationEffect.start_change
+
+
 AXES = ("x", "y", "z")
 
 
@@ -171,9 +179,11 @@ def others(axis: int) -> tuple[int, int]:
 
 def stack(state: State, columns: Sequence[Array]) -> Array:
     """Columns of shape (..., n) as one array (..., n, p), broadcast against the state's force and one another."""
-    shape = np.broadcast_shapes(state.force.shape[:-1], *(c.shape for c in columns))
+    shape = state.force.shape[:-1]
+    if any(column.shape != shape for column in columns):
+        shape = np.broadcast_shapes(shape, *(c.shape for c in columns))
     if len(columns) == 1:
-        return np.broadcast_to(columns[0], shape)[..., None]
+        return (columns[0] if columns[0].shape == shape else np.broadcast_to(columns[0], shape))[..., None]
     stacked = np.empty((*shape, len(columns)))
     for place, column in enumerate(columns):
         stacked[..., place] = column

@@ -30,7 +30,9 @@ class ThermalKink(SensorEffect):
     def columns(self, state: State, axis: int, *, centre: float, width: float, **nonlinear: float) -> Array:
         del axis, nonlinear
         temperature = state.need("temperature", self.id)
-        return stack(state, [width * np.logaddexp(0.0, (temperature - centre) / width)])
+        above = (temperature - centre) / width
+        # np.logaddexp takes ten times as long
+        return stack(state, [width * (np.maximum(above, 0.0) + np.log1p(np.exp(-np.abs(above))))])
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from inertial.distributions import f_tail
 from inertial.errors import NotIdentified
 from inertial.fits.norm_wander import norm_noise
 from inertial.fits.wander import student
@@ -217,7 +217,7 @@ def _harmonics(series: _Series, angle: Array, orders: Sequence[int]) -> float:
     turned, _ = np.linalg.qr(free)
     drop = float(np.sum((turned.T @ series.rest) ** 2))
     rest = max(float(series.rest @ series.rest) - drop, 1e-300)
-    return float(stats.f.sf(drop / waves.shape[1] / (rest / dof), waves.shape[1], dof))
+    return float(f_tail(drop / waves.shape[1] / (rest / dof), waves.shape[1], dof))
 
 
 def _refuse_few(dwells: int, coefficients: int) -> None:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from inertial.design import Values
+from inertial.distributions import chi2_quantile, chi2_upper, normal_tail, student_upper
 from inertial.errors import NotIdentified
 from inertial.fits.generalised import SHARES, Series, Solved
 from inertial.fits.linear import LotFit, fit_lot
@@ -178,7 +178,7 @@ def fit_lot_with_wander(
 
 def lack_of_fit(chi2: Array, dof: int) -> Array:
     """Birge ratio squared of every block, where its scatter is more than noise of the lot's size makes; one elsewhere."""
-    far = stats.chi2.isf(_LACKING / chi2.size, dof)
+    far = chi2_upper(_LACKING / chi2.size, dof)
     return np.where(chi2 <= far, 1.0, chi2 / dof)  # what is no number stays none
 
 
@@ -188,7 +188,7 @@ def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
     The scatter of the samples is a lower bound: where less than it is left, the fit is the weighted one.
     """
     shares, solved = _prudent(series, series.best_shares())
-    middle = stats.chi2.median(series.dof) / np.median(solved.squares)
+    middle = chi2_quantile(0.5, series.dof) / np.median(solved.squares)
     lacking = lack_of_fit(solved.squares * middle, series.dof) > 1.0
     if lacking.any() and not lacking.all():
         series.sound = ~lacking
@@ -228,7 +228,7 @@ def _prudent(series: Series, shares: tuple[float, float]) -> tuple[tuple[float, 
 def _scattered(series: Series, solved: Solved) -> bool:
     """Whether the dwells of the sound blocks scatter by more than their own samples show."""
     dof = int(series.sound.sum()) * series.dof
-    return solved.variance * dof > float(stats.chi2.isf(_LACKING, dof))
+    return solved.variance * dof > float(chi2_upper(_LACKING, dof))
 
 
 def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float:
@@ -240,7 +240,7 @@ def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float
 
 def student(dof: int) -> float:
     """What widens a standard error known from so many degrees of freedom, so that k = 2 covers 95.45 % (JCGM 100, G.3)."""
-    return 0.5 * float(stats.t.isf(stats.norm.sf(2.0), max(dof, 1)))
+    return 0.5 * float(student_upper(normal_tail(2.0), max(dof, 1)))
 
 
 def _covariance(shared: Array, solved: Solved) -> Array:

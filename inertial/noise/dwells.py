@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from inertial.noise.flicker import flicker_of_means
-from inertial.noise.terms import FLICKER_FLOOR
+from inertial.noise.flicker import FLICKER_FLOOR, flicker_of_means
 
 Array = NDArray[np.float64]
 

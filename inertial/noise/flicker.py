@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
+"""sigma = 0.664·B on the flat part of the Allan curve: IEEE Std 952-1997, C.1.1.3."""
+
 RATIO = 2.0
 """Between time constants."""
 

@@ -10,6 +10,7 @@ from inertial.distributions import chi2_quantile, chi2_tail
 from inertial.noise import mixture, profiles
 from inertial.noise.allan import AllanCurve
 from inertial.noise.covariance import sums
+from inertial.noise.flicker import FLICKER_FLOOR
 
 Array = NDArray[np.float64]
 
@@ -28,9 +29,6 @@ UNITS: Mapping[str, str] = {
     "R": "{}/s",
 }
 """Unit of each coefficient for an output in {}; g/√Hz and g·√s are the same, K is often written g/s/√Hz."""
-
-FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
-"""sigma = 0.664·B on the flat part of the curve: IEEE Std 952-1997, C.1.1.3."""
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def refuse_inadequate_import(run: Run) -> None:
     about = run.about
     if about.get("capture") or "dwells" not in run.tables():
         return
-    from pipelines.diagnosis.diagnose import diagnose  # loads scipy.stats, and captured runs do not need it
+    from pipelines.diagnosis.diagnose import diagnose  # loads the search for effects, which captured runs do not need
 
     past = run.table("history") if "history" in run.tables() else None
     effects = list((about.get("recipe") or {}).get("effects", ()))

@@ -130,8 +130,11 @@ def diagnosed(
     """The document of a diagnosis, and its report on request, with the coefficients of a fit if they are given."""
     from threadpoolctl import threadpool_limits
 
+    from pipelines.parallel import keep_memory
+
+    keep_memory()
     with threadpool_limits(1), error_console().status("looking for missing effects"):
-        from pipelines.diagnosis.examination import examination  # loads scipy.stats: after the first line
+        from pipelines.diagnosis.examination import examination  # loads the search for effects: after the first line
 
         made = examination(table, history, judged, left_out)
     if not with_report:

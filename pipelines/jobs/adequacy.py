@@ -79,7 +79,7 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
     InertialError
         An effect is unknown, or the dwells lack a quantity of the model.
     """
-    from inertial.criticism.verdict import judged  # loads scipy.stats: a run without dwells does not need it
+    from inertial.criticism.verdict import judged  # loads the search for effects: a run without dwells does not need it
 
     catalogue.get_all(list(effects))
     measurement, faults, lot = sound_lot(dwells, history, effects)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from inertial.noise.dwells import DwellNoise
-from inertial.noise.terms import FLICKER_FLOOR
+from inertial.noise.flicker import FLICKER_FLOOR
 from stations.plant.preset import load_preset
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from inertial.noise.allan import AllanCurve, overlapping
-from inertial.noise.terms import FLICKER_FLOOR, NoiseTerms, fit_terms, model_deviation
+from inertial.noise.flicker import FLICKER_FLOOR
+from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
 from pipelines.stages.bias_stability import TERM, bias_stability
 from pipelines.stages.coarse_digits import Coarse, remark, without_digits
 from pipelines.stages.static_record import StaticSeries, Warmed, warmed

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inertial.criticism.adequacy import _drops
-from inertial.criticism.bases import SEEN
-from inertial.criticism.candidate import Candidate
+from inertial.criticism.bases import SEEN, eigen
+from inertial.criticism.candidate import Candidate, times_rows
 from inertial.criticism.covariance import Covariance
+from inertial.criticism.noise_draws import Directions
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.space import Space
 from inertial.criticism.tail_areas import log_chi2_tail, log_f_tail
@@ -84,8 +84,10 @@ def test_what_a_candidate_takes_off_draws_is_what_least_squares_takes_off(rng: n
     columns = rng.standard_normal((BLOCKS, N, 4, p))
     columns[2, :, 1, 0] = 3.0 * local[2, :, 1]  # the model has it already
     draws = space.project(rng.standard_normal((BLOCKS, N, 7)))
-    drops = _drops(Candidate(columns, shared=False), space, space.backed(draws))
-    for g, (drop, rank) in enumerate(drops):
+    candidate = Candidate(columns, shared=False)
+    found = Directions.of(space, candidate)
+    drops = found.drops(times_rows(space.backed(draws), candidate))
+    for g, (drop, rank) in enumerate(zip(drops, found.ranks.tolist(), strict=True)):
         expected, seen = np.zeros(7), 0
         white = space.whiten(columns[:, :, g])
         left = space.project(white) / np.linalg.norm(white, axis=1)[:, None]
@@ -95,6 +97,20 @@ def test_what_a_candidate_takes_off_draws_is_what_least_squares_takes_off(rng: n
             seen += int(np.sum(s > SEEN))
         assert rank == seen
         np.testing.assert_allclose(drop, expected, rtol=1e-9)
+
+
+def test_drawn_noise_is_white_again_after_the_whitener(rng: np.random.Generator) -> None:
+    whole, noise = spaces(rng).covariance, Noise(SHARES, rng.uniform(0.8, 1.2, BLOCKS))
+    normal = rng.standard_normal((BLOCKS, 7, N))
+    rows = whole.coloured(noise, normal.copy())
+    assert np.all(rows[~np.broadcast_to(whole.there[:, None], rows.shape)] == 0.0)
+    white = whole.whiten(np.swapaxes(rows, 1, 2), SHARES) / noise.scale[:, None, None]
+    expected = np.where(whole.there[..., None], np.swapaxes(normal, 1, 2), 0.0)
+    np.testing.assert_allclose(white, expected, rtol=1e-9, atol=1e-9)
+    for blocks in (slice(0, 2), slice(2, BLOCKS)):
+        again = whole.white_rows(rows[blocks].copy(), SHARES, blocks)
+        again /= (whole.level * noise.scale)[blocks, None, None]
+        np.testing.assert_allclose(again, np.swapaxes(expected, 1, 2)[blocks], rtol=1e-9, atol=1e-9)
 
 
 def test_processes_by_squares_are_those_by_exponentials() -> None:
@@ -115,3 +131,17 @@ def test_tail_areas_are_those_of_the_distributions() -> None:
         )
         np.testing.assert_allclose(log_chi2_tail(ratio, first), stats.chi2.logsf(ratio, first), rtol=1e-12, atol=1e-12)
     assert log_f_tail(-1e-12, 2, 5) == 0.0
+
+
+def test_eigenvalues_of_two_rows_are_those_of_the_solver(rng: np.random.Generator) -> None:
+    roots = rng.standard_normal((500, 2, 2))
+    roots[:100, 1] = roots[:100, 0] + 1e-3 * rng.standard_normal((100, 2))  # nearly parallel
+    given = [np.zeros((2, 2)), np.eye(2), np.diag([3.0, 1.0]), np.diag([1.0, 3.0]), [[1.0, 1.0], [1.0, 1.0]]]
+    gram = np.concatenate([roots @ np.swapaxes(roots, -1, -2), given])
+    values, vectors = eigen(gram)
+    expected = np.linalg.eigvalsh(gram)
+    np.testing.assert_allclose(values, expected, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(
+        vectors @ np.swapaxes(vectors, -1, -2), np.broadcast_to(np.eye(2), gram.shape), atol=1e-14
+    )
+    np.testing.assert_allclose((vectors * values[:, None]) @ np.swapaxes(vectors, -1, -2), gram, atol=1e-13)

@@ -24,9 +24,9 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 """
 
 
-def faults() -> int:
-    """Pages that a child process is given while it makes arrays of 3 MB and drops them."""
-    done = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True)
+def faults(before: str = "") -> int:
+    """Pages that a child process is given while it makes arrays of 3 MB and drops them; ``before`` is run first."""
+    done = subprocess.run([sys.executable, "-c", before + CODE], capture_output=True, text=True, check=True)
     return int(done.stdout)
 
 
@@ -35,4 +35,11 @@ def test_a_worker_keeps_the_memory_of_its_arrays() -> None:
     plain = faults()
     with one_thread_each():
         kept = faults()
+    assert kept < 0.1 * plain, (kept, plain)
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "gnu_get_libc_version"), reason="no GNU C library")
+def test_a_process_keeps_its_memory_from_when_it_says_so() -> None:
+    plain = faults()
+    kept = faults("from pipelines.parallel import keep_memory\nkeep_memory()\n")
     assert kept < 0.1 * plain, (kept, plain)

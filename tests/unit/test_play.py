@@ -8,12 +8,13 @@ import pytest
 
 from inertial import effects as catalogue
 from inertial import operators
-from inertial.criticism import adequacy, covariance, model, problem, products, share_statistics, space
+from inertial.criticism import adequacy, covariance, model, noise_draws, problem, products, share_statistics, space
 from inertial.criticism.drivers import drivers_of
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.wrong_pose import WrongPose
 from inertial.criticism.lot import Lot
 from inertial.criticism.model import Model
+from inertial.criticism.noise_draws import NoiseDraws
 from inertial.criticism.problem import Problem
 from inertial.criticism.term import Term
 from pipelines.tables.dwells import lot_of, measured
@@ -61,16 +62,36 @@ def test_small_pieces_and_empty_stores_change_no_number(monkeypatch: pytest.Monk
     lot = lot_of(measured(made.dwells, made.history))
     whole = numbers(lot)
     assert whole[0] > np.log(adequacy.CERTAIN_BELOW)  # then noise is drawn
-    for module in (problem, adequacy, space):
+    for module in (problem, noise_draws, space):
         monkeypatch.setattr(module, "_PIECE", 300)
-    for module in (covariance, products):
+    for module in (covariance, products, share_statistics):
         monkeypatch.setattr(module, "PIECE", 300)
     monkeypatch.setattr(problem, "_CACHE", 0)
     monkeypatch.setattr(covariance, "_PRODUCTS", 0)
-    monkeypatch.setattr(share_statistics, "_KEPT", 0)
+    for module in (share_statistics, noise_draws):
+        monkeypatch.setattr(module, "_KEPT", 0)
     monkeypatch.setattr(model, "_SPACES", 0)
     for one, other in zip(numbers(lot), whole, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-8)
+
+
+def test_draws_worked_on_together_are_those_drawn_one_after_the_other() -> None:
+    made = make(World(units=2, poses=18, soaks=(25.0,)), 5_510_000)
+    series = Problem(lot_of(measured(made.dwells, made.history)))
+    base = Model(series, [Term(catalogue.get(name)) for name in ("bias", "scale", "misalignment")])
+    looks = list(Candidates(series, [catalogue.get(name) for name in EFFECTS]).pieces())
+
+    def draws() -> NoiseDraws:
+        return NoiseDraws(base, np.random.default_rng(2))
+
+    single = draws()
+    apart = np.concatenate([single.worst(looks, 7), single.worst(looks, 7)])
+    assert apart.std() > 0.0
+    np.testing.assert_allclose(draws().worst(looks, 7, 2), apart, rtol=1e-9)
+    kept = draws()
+    kept.worst(looks, 7, 2)
+    kept.keep(1)
+    np.testing.assert_allclose(kept.worst(looks, 7)[0], apart[1], rtol=1e-9)
 
 
 @pytest.mark.parametrize("rows", [1, 3, 8, 9, 30])

@@ -1,12 +1,15 @@
 """Faults of a unit's response to gravity: a dead axis, a scale unlike the lot, exchanged or inverted axes."""
 
 from collections.abc import Iterator
+from itertools import permutations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from inertial.criticism.faults.fault import Fault
 from inertial.criticism.readings import Readings
+
+_ORDERS = np.array(list(permutations(range(3))))
+"""All orders of three axes."""
 
 
 def dead(readings: Readings) -> Iterator[Fault]:
@@ -40,7 +43,8 @@ def flipped(readings: Readings) -> Iterator[Fault]:
     """Axes in another order or with another sign: the best signed permutation of the response is not the identity."""
     for unit, fit in enumerate(readings.fits):
         k = fit[:, 1:] / max(float(readings.scale[unit]), 1e-300)
-        rows, columns = linear_sum_assignment(-np.abs(k))
+        rows = np.arange(3)
+        columns = _ORDERS[np.argmax(np.abs(k)[rows, _ORDERS].sum(axis=1))]
         signs = np.sign(k[rows, columns])
         if np.min(np.abs(k[rows, columns])) < 0.6 or (np.array_equal(rows, columns) and np.all(signs > 0)):
             continue

@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from inertial import operators
 from inertial.criticism.handling.base import Array, Handling, Misfit
@@ -75,6 +74,8 @@ class NotSoaked(Handling):
 
     def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
         """With the temperatures of the devices in place of the readings, each unit's time constant found by its own dwells."""
+        from scipy.optimize import minimize_scalar  # noqa: PLC0415  # a quarter of a second, and few lots need it
+
         del size
         each = np.zeros(lot.state.time.shape[0])
         middle, reach = float(np.log(place["tau"])), float(np.log(_SPREAD))

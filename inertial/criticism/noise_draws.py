@@ -1,0 +1,255 @@
+"""Noise drawn from a model's covariance, each draw with shares and variances of its own, and how badly it fits somewhere.
+
+A draw is worked on as rows, (blocks, draws, n): some blocks at a time fit the cache, and no series is turned round.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from inertial.criticism.bases import SEEN, eigen
+from inertial.criticism.candidate import Candidate, times_rows
+from inertial.criticism.decisions import LEAST_SHARE
+from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Noise, Shares
+from inertial.criticism.shares import place_of, shares_at
+from inertial.criticism.space import Space
+from inertial.criticism.tail_areas import log_f_tail
+from inertial.criticism.tails import heavy
+
+Array = NDArray[np.float64]
+
+_PIECE = 150_000
+"""Largest number of values worked on at a time."""
+
+_KEPT = 3_200_000
+"""Largest number of values of bases that are kept for further draws."""
+
+_OFF = (-8, -4, 0, 4, 8)
+"""Eighths of a decade about the fitted shares within which the noise of a draw is estimated."""
+
+
+@dataclass(frozen=True)
+class _Basis:
+    """What the columns of a model span at some shares.
+
+    q : (blocks, n, p), orthonormal, whitened; by_block : (blocks,), degrees of freedom, together ``dof``
+    determinants : logarithms of those of the covariance and of the information
+    """
+
+    shares: Shares
+    q: Array
+    by_block: Array
+    dof: int
+    determinants: float
+
+
+class NoiseDraws:
+    """Draws of the noise of a model; of the model's own residuals in random order where their tails are heavy.
+
+    Parameters
+    ----------
+    rng : the same draws for the same generator, however many are worked on at a time
+    """
+
+    def __init__(self, model: Model, rng: Generator) -> None:
+        self.model, self.rng = model, rng
+        self.lattice, self.start = _lattice(model.noise.shares)
+        left = model.space.residual[model.problem.covariance.there]
+        self.heavy = heavy(left)
+        self._values = left / np.sqrt(np.mean(left**2))
+        self._bases: dict[int, _Basis] = {}
+        self._directions: dict[tuple[int, int], Directions] = {}
+        self._states: list[Mapping[str, object]] = []
+
+    def worst(self, looks: Iterable[Candidate], count: int, batches: int = 1) -> Array:
+        """Smallest log p over all tests of each of so many further draws, (batches, count).
+
+        Parameters
+        ----------
+        looks : the tests, the same for all draws
+        batches : that are drawn one after the other, and worked on together
+        """
+        rows = self._drawn(count, batches)
+        count *= batches
+        chosen = self._estimated(rows)
+        order = np.argsort(chosen, kind="stable")
+        for some in _some_blocks(rows):
+            rows[some] = np.take(rows[some], order, axis=1)
+        places, first = np.unique(chosen[order], return_index=True)
+        groups = [slice(a, b) for a, b in zip(first, [*first[1:], count], strict=True)]
+        total = np.concatenate([self._left(rows, k, own) for k, own in zip(places.tolist(), groups, strict=True)])
+        dof = {k: self._basis(k).dof for k in places.tolist()}
+        worst, spaces = np.zeros(count), dict[int, Space]()
+        for place, candidate in enumerate(looks):
+            along = times_rows(rows, candidate)
+            for k, own in zip(places.tolist(), groups, strict=True):
+                if (place, k) not in self._directions:
+                    if k not in spaces:
+                        spaces[k] = self.model.at(Noise(self._shares(k), self.model.noise.scale))
+                    self._directions[place, k] = Directions.of(spaces[k], candidate)
+                found = self._directions[place, k]
+                for drop, rank in zip(found.drops(along[..., own]), found.ranks.tolist(), strict=True):
+                    after = dof[k] - rank
+                    if rank and after > 0:
+                        ratio = (drop / rank) / (np.maximum(total[own] - drop, 1e-300) / after)
+                        worst[own] = np.minimum(worst[own], log_f_tail(ratio, rank, after))
+        drawn = np.empty(count)
+        drawn[order] = worst
+        return drawn.reshape(batches, -1)
+
+    def keep(self, batches: int) -> None:
+        """Go on as if only the first batches of the last draws had been drawn."""
+        self.rng.bit_generator.state = self._states[batches - 1]
+
+    def _drawn(self, count: int, batches: int) -> Array:
+        """Draws (blocks, batches · count, n) of the noise of the model, g."""
+        problem = self.model.problem
+        rows = np.empty((problem.blocks, batches * count, problem.n))
+        self._states = []
+        for first in range(0, batches * count, count):
+            for some in _some_blocks(rows):
+                white = self._white((len(rows[some]), problem.n, count))
+                rows[some, first : first + count] = np.swapaxes(white, 1, 2)
+            self._states.append(self.rng.bit_generator.state)
+        return problem.covariance.coloured(self.model.noise, rows)
+
+    def _white(self, shape: tuple[int, ...]) -> Array:
+        """White noise of variance one; with heavy tails the residuals of the model in random order."""
+        if self.heavy:
+            return self._values[self.rng.integers(self._values.size, size=shape)]
+        return self.rng.standard_normal(shape)
+
+    def _shares(self, place: int) -> Shares:
+        flicker, walk = self.lattice
+        return shares_at((flicker[place // len(walk)], walk[place % len(walk)]), self.model.noise.shares.own)
+
+    def _basis(self, place: int) -> _Basis:
+        """What the columns of the model span at the shares of a place of the lattice."""
+        if place not in self._bases:
+            shares = self._shares(place)
+            space = self.model.at(Noise(shares, np.ones(self.model.problem.blocks)))
+            determinants = space.logdet + space.information
+            made = _Basis(shares, space.q, space.by_block, space.dof, determinants)
+            while self._bases and (len(self._bases) + 1) * made.q.size > _KEPT:
+                del self._bases[next(iter(self._bases))]
+            self._bases[place] = made
+        return self._bases[place]
+
+    def _estimated(self, rows: Array) -> NDArray[np.intp]:
+        """The place of the lattice with the smallest restricted deviance of each draw, (draws,).
+
+        Descent from the shares that the draws were made with, by the places about the best of each draw.
+        """
+        across, columns = (len(each) for each in self.lattice)
+        deviances = np.full((across * columns, rows.shape[1]), np.inf)
+        done = np.zeros(deviances.shape, dtype=bool)
+        best = np.full(rows.shape[1], self.start)
+        while True:
+            wanted = np.zeros(done.shape, dtype=bool)
+            for draw, place in enumerate(best.tolist()):
+                row, column = divmod(place, columns)
+                near = np.zeros((across, columns), dtype=bool)
+                near[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
+                wanted[:, draw] = near.ravel() & ~done[:, draw]
+            if not wanted.any():
+                return best
+            for place in np.flatnonzero(wanted.any(axis=1)).tolist():
+                draws = np.flatnonzero(wanted[place])
+                deviances[place, draws] = self._deviances(self._basis(place), rows, draws)
+            done |= wanted
+            best = np.argmin(deviances, axis=0)
+
+    def _deviances(self, basis: _Basis, rows: Array, draws: NDArray[np.intp]) -> Array:
+        """Restricted deviance of some draws at some shares, (draws,), each block with its own variance."""
+        covariance = self.model.problem.covariance
+        log_squares = np.zeros(draws.size)
+        for some in _some_blocks(rows):
+            white = covariance.white_rows(np.take(rows[some], draws, axis=1), basis.shares, some)
+            along = white @ basis.q[some]
+            squares = np.einsum("bdn,bdn->bd", white, white) - np.einsum("bdp,bdp->bd", along, along)
+            squares /= covariance.level[some, None] ** 2
+            log_squares += basis.by_block[some] @ np.log(np.maximum(squares, 1e-300))
+        return basis.determinants + log_squares
+
+    def _left(self, rows: Array, place: int, draws: slice) -> Array:
+        """Sums of squares (draws,) of what the model leaves of draws with equal shares, over their estimated variances.
+
+        In place of the draws are afterwards the rows that give their products with columns in g.
+        """
+        covariance, noise, basis = self.model.problem.covariance, self.model.noise, self._basis(place)
+        scale = covariance.level * noise.scale
+        squares = np.empty((len(rows), rows[0, draws].shape[0]))
+        for some in _some_blocks(rows):
+            left = covariance.white_rows(rows[some, draws].copy(), basis.shares, some)
+            left /= scale[some, None, None]
+            q = basis.q[some]
+            left -= (left @ q) @ np.swapaxes(q, -1, -2)
+            squares[some] = np.einsum("bdn,bdn->bd", left, left)
+            rows[some, draws] = covariance.back(left, basis.shares, np.arange(len(rows))[some])
+        dof = basis.by_block[:, None]
+        if np.isfinite(noise.prior):
+            # the centre of the prior is one in units of the fitted scale
+            variance = (squares + noise.prior) / (dof + noise.prior)
+        else:
+            variance = np.broadcast_to(squares.sum(axis=0) / max(float(dof.sum()), 1.0), squares.shape)
+        rows[:, draws] /= (np.sqrt(variance) * scale[:, None])[..., None]
+        return np.sum(squares / variance, axis=0)
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Orthonormal directions of a candidate's columns after the model, for each value of its nonlinear parameters.
+
+    turn : (blocks, grid, p, p), from the products of the columns with a series to those of the directions; one block for
+        coefficients that blocks share; ranks : (grid,)
+    """
+
+    turn: Array
+    ranks: NDArray[np.intp]
+    shared: bool
+
+    @staticmethod
+    def of(space: Space, candidate: Candidate) -> "Directions":
+        """The directions of a candidate in a space."""
+        found = space.products(candidate)
+        own, squares = found.left, found.squares
+        if candidate.shared:
+            own, squares = own.sum(axis=0, keepdims=True), squares.sum(axis=0, keepdims=True)
+        size = np.sqrt(np.where(squares > 0.0, squares, 1.0))
+        values, vectors = eigen(own / (size[..., :, None] * size[..., None, :]))
+        seen = values > SEEN**2
+        vectors = vectors * np.where(seen, 1.0 / np.sqrt(np.where(seen, values, 1.0)), 0.0)[..., None, :]
+        turn = np.swapaxes(vectors, -1, -2) / size[..., None, :]
+        return Directions(turn, seen.sum(axis=(0, 2)), candidate.shared)
+
+    def drops(self, along: Array) -> Array:
+        """Reduction (grid, draws) of the squares of draws, from their products (blocks, grid, p, draws) with the columns."""
+        if self.shared:
+            along = along.sum(axis=0, keepdims=True)
+        if self.turn.shape[-1] == 1:
+            return np.einsum("bg,bgd->gd", self.turn[..., 0, 0] ** 2, along[..., 0, :] ** 2)
+        turned = self.turn @ along
+        return np.einsum("bgpd,bgpd->gd", turned, turned)
+
+
+def _some_blocks(rows: Array) -> list[slice]:
+    """Blocks of rows (blocks, draws, n) that are worked on together."""
+    few = max(_PIECE // max(rows[0].size, 1), 1)
+    return [slice(start, min(start + few, len(rows))) for start in range(0, len(rows), few)]
+
+
+def _lattice(shares: Shares) -> tuple[tuple[list[int | None], list[int | None]], int]:
+    """The lattice about fitted shares, none first, each share in rising order; and the place in it of the fitted ones."""
+    fitted = place_of(shares)
+    rows, columns = (_about(k) for k in fitted)
+    return (rows, columns), rows.index(fitted[0]) * len(columns) + columns.index(fitted[1])
+
+
+def _about(k: int | None) -> list[int | None]:
+    """A share of the lattice, those about it, and none."""
+    near = {LEAST_SHARE, LEAST_SHARE + 8} if k is None else {max(k + d, LEAST_SHARE) for d in _OFF}
+    return [None, *sorted(near)]
