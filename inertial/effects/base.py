@@ -171,9 +171,12 @@ def others(axis: int) -> tuple[int, int]:
 
 def stack(state: State, columns: Sequence[Array]) -> Array:
     """Columns of shape (..., n) as one array (..., n, p), broadcast against the state's force and one another."""
-    shape = np.broadcast_shapes(state.force.shape[:-1], *(c.shape for c in columns))
+    shape = state.force.shape[:-1]
+    if any(column.shape != shape for column in columns):
+        shape = np.broadcast_shapes(shape, *(column.shape for column in columns))
     if len(columns) == 1:
-        return np.broadcast_to(columns[0], shape)[..., None]
+        single = columns[0]
+        return (single if single.shape == shape else np.broadcast_to(single, shape))[..., None]
     stacked = np.empty((*shape, len(columns)))
     for place, column in enumerate(columns):
         stacked[..., place] = column
