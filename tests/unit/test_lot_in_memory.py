@@ -93,9 +93,8 @@ def test_what_a_fit_hands_on_is_what_its_tables_hold(run: Run, more: tuple[str, 
         one, other = getattr(calibration, field.name), getattr(read, field.name)
         assert np.array_equal(one, other) if isinstance(one, np.ndarray) else one == other, field.name
     verified = verify_tables(lot, made["coefficients"], made["covariance"], expected, calibration)
-    for name, own in verify_tables(
-        lot, *(tables[part] for part in ("coefficients", "covariance", "predictions"))
-    ).items():
+    of_tables = verify_tables(lot, tables["coefficients"], tables["covariance"], tables["predictions"])
+    for name, own in of_tables.items():
         pd.testing.assert_frame_equal(verified[name], own, check_exact=True)
 
 
