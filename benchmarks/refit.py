@@ -48,8 +48,8 @@ POLL_S = 0.2
 WARM = 3  # lots before the measurement: imports and first calls
 ROUNDS = 5  # of each lot: other load makes a call slower, never faster
 STEPS = {
-    "table": "reading of nine tables", "archived_job": "job of the run", "fit_tables": "fit", "verify_tables": "verify",
-    "budget": "budget", "grade": "grade", "_side": "errors and outcomes of both sides",
+    "table": "reading of nine tables", "archived_job": "job of the run", "fit_in_memory": "fit", "verify_tables": "verify",
+    "decision_budget": "budget", "grade": "grade", "_side": "errors and outcomes of both sides",
 }  # fmt: skip
 EFFECTS = (
     *("bias", "scale", "misalignment", "bias_temperature", "bias_temperature_quadratic"),

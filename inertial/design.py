@@ -21,7 +21,8 @@ Values = Mapping[str, Mapping[str, Any]]
 
 def on_axis(values: Values, effect: str, axis: int = 0) -> dict[str, float]:
     """The values of an effect that hold for one sensor axis."""
-    return {name: v[axis] if isinstance(v, tuple) else v for name, v in values.get(effect, {}).items()}
+    own = values.get(effect)
+    return {name: v[axis] if isinstance(v, tuple) else v for name, v in own.items()} if own else {}
 
 
 def split(names: Sequence[str]) -> tuple[list[SensorEffect], list[StationEffect]]:
@@ -52,7 +53,8 @@ def local_columns(effects: Sequence[SensorEffect], state: State, values: Values)
     """Columns of the sensor's effects, (..., 3, n, p), g per unit of the coefficient; p counts the same on every axis."""
     axes = [[e.columns(state, axis, **on_axis(values, e.id, axis)) for e in effects] for axis in range(3)]
     # columns that all units share are repeated where others differ from unit to unit
-    *batch, n = np.broadcast_shapes(*{c.shape[:-1] for columns in axes for c in columns})
+    shapes = {c.shape[:-1] for columns in axes for c in columns}
+    *batch, n = shapes.pop() if len(shapes) == 1 else np.broadcast_shapes(*shapes)
     # in memory one column after another: written across the rows of a large lot they take four times as long
     design = np.empty((*batch, 3, sum(c.shape[-1] for c in axes[0]), n))
     for axis, columns in enumerate(axes):

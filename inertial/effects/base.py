@@ -181,9 +181,10 @@ def stack(state: State, columns: Sequence[Array]) -> Array:
     """Columns of shape (..., n) as one array (..., n, p), broadcast against the state's force and one another."""
     shape = state.force.shape[:-1]
     if any(column.shape != shape for column in columns):
-        shape = np.broadcast_shapes(shape, *(c.shape for c in columns))
+        shape = np.broadcast_shapes(shape, *(column.shape for column in columns))
     if len(columns) == 1:
-        return (columns[0] if columns[0].shape == shape else np.broadcast_to(columns[0], shape))[..., None]
+        single = columns[0]
+        return (single if single.shape == shape else np.broadcast_to(single, shape))[..., None]
     stacked = np.empty((*shape, len(columns)))
     for place, column in enumerate(columns):
         stacked[..., place] = column

@@ -21,7 +21,7 @@ from inertial.state import State
 
 Array = NDArray[np.float64]
 
-_PIECE = 128
+_PIECE = 192
 """Units with designs of their own that are solved at a time: their columns stay in the processor's cache."""
 
 _BATCHED = 3

@@ -103,6 +103,7 @@ class LocalColumns:
         count = (
             np.full(residual.shape[:-1], residual.shape[-1])
             if self.weight is None
+            or self.weight.all()  # to count along an axis takes as long as a product of all columns
             else np.count_nonzero(np.broadcast_to(self.weight, residual.shape), axis=-1)
         )
         return np.einsum("...n,...n->...", weighted, weighted), count - self.columns.shape[-1]

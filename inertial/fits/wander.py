@@ -9,6 +9,7 @@ part in the noise, and has its errors widened by its own lack of fit (Birge rati
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,9 @@ _LACKING = 1e-4
 
 _FLICKER, _HALVINGS = 1e4, 24
 """Largest share of flicker over the white variance that is looked at, and steps to find the one that explains the scatter."""
+
+_KEPT_TIMES = 400
+"""Dwells up to which kernels are kept: each has the square of their number."""
 
 _REFUTED = 4.0
 """Deviance by which flicker must be worse than white noise to be out of the question."""
@@ -86,9 +90,21 @@ def walk_kernel(time: Array) -> Array:
 def wander_kernels(time: Array) -> tuple[Array, Array]:
     """Covariances (n, n) of 1/f wander and random walk of variance one at times (n,), s.
 
-    Wander slower than the record is, for the record, the bias itself.
+    Wander slower than the record is, for the record, the bias itself. Those of a short record are kept, because fit and budget of
+    a lot need the same ones.
     """
-    return flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time)
+    if time.size > _KEPT_TIMES:
+        return flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time)
+    return _kept_kernels(np.asarray(time, dtype=np.float64).tobytes())
+
+
+@lru_cache(maxsize=4)
+def _kept_kernels(times: bytes) -> tuple[Array, Array]:
+    time = np.frombuffer(times)
+    kernels = flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time)
+    for kernel in kernels:
+        kernel.setflags(write=False)
+    return kernels
 
 
 def fit_lot_with_wander(
@@ -178,7 +194,7 @@ def fit_lot_with_wander(
 
 def lack_of_fit(chi2: Array, dof: int) -> Array:
     """Birge ratio squared of every block, where its scatter is more than noise of the lot's size makes; one elsewhere."""
-    far = chi2_upper(_LACKING / chi2.size, dof)
+    far = _exceeded(_LACKING / chi2.size, dof)
     return np.where(chi2 <= far, 1.0, chi2 / dof)  # what is no number stays none
 
 
@@ -188,7 +204,7 @@ def _solve(series: Series) -> tuple[tuple[float, float], Solved]:
     The scatter of the samples is a lower bound: where less than it is left, the fit is the weighted one.
     """
     shares, solved = _prudent(series, series.best_shares())
-    middle = chi2_quantile(0.5, series.dof) / np.median(solved.squares)
+    middle = _median(series.dof) / np.median(solved.squares)
     lacking = lack_of_fit(solved.squares * middle, series.dof) > 1.0
     if lacking.any() and not lacking.all():
         series.sound = ~lacking
@@ -228,7 +244,19 @@ def _prudent(series: Series, shares: tuple[float, float]) -> tuple[tuple[float, 
 def _scattered(series: Series, solved: Solved) -> bool:
     """Whether the dwells of the sound blocks scatter by more than their own samples show."""
     dof = int(series.sound.sum()) * series.dof
-    return solved.variance * dof > float(chi2_upper(_LACKING, dof))
+    return solved.variance * dof > _exceeded(_LACKING, dof)
+
+
+@lru_cache(maxsize=1024)
+def _exceeded(probability: float, dof: int) -> float:
+    """The χ² of ``dof`` degrees of freedom that is exceeded with a probability."""
+    return float(chi2_upper(probability, dof))
+
+
+@lru_cache(maxsize=1024)
+def _median(dof: int) -> float:
+    """The median χ² of ``dof`` degrees of freedom."""
+    return float(chi2_quantile(0.5, dof))
 
 
 def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float:
@@ -238,6 +266,7 @@ def _known(series: Series, shares: tuple[float, float], solved: Solved) -> float
     return student(int(series.sound.sum()) * series.dof - solved.shared.size)
 
 
+@lru_cache(maxsize=1024)
 def student(dof: int) -> float:
     """What widens a standard error known from so many degrees of freedom, so that k = 2 covers 95.45 % (JCGM 100, G.3)."""
     return 0.5 * float(student_upper(normal_tail(2.0), max(dof, 1)))

@@ -132,12 +132,22 @@ def true_force(state: State, errors: Errors) -> Array:
     if state.outer is None or state.inner is None:
         raise ValueError("dwells without angles: the station's errors cannot be propagated")
     size = np.linalg.norm(state.force, axis=-1, keepdims=True)
-    alpha, beta = state.outer + errors.outer, state.inner + errors.inner
+    alpha, beta = _of_one(state.outer + errors.outer), _of_one(state.inner + errors.inner)
     up = np.array([errors.level[0], errors.level[1], 1.0])
     c, s = np.cos(errors.orthogonality), np.sin(errors.orthogonality)
     between = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     turned = np.einsum("...ji,j->...i", rotation_x(alpha) @ between @ rotation_z(beta), up)
     return (1.0 + errors.gravity) * size * (turned @ slot_rotation(errors.seat).T)
+
+
+def _of_one(angle: Array) -> Array:
+    """The angles (n,) of one unit where all units (..., n) have the same, as on one table; else as they are."""
+    rows = angle.reshape(-1, angle.shape[-1]) if angle.ndim > 1 else angle
+    return (
+        rows[0]
+        if angle.ndim > 1 and len(rows) and np.array_equal(rows, np.broadcast_to(rows[0], rows.shape))
+        else angle
+    )
 
 
 def slot_rotation(vector: Sequence[float]) -> Array:
@@ -181,7 +191,10 @@ def sensitivity(
         for size, errors in ((one.outer, Errors(outer=1.0)), (one.inner, Errors(inner=1.0))):
             if size > 0.0:
                 change = size * difference(model, state, errors)
-                enter(np.einsum("...nk,nm->...nkm", change, np.eye(change.shape[-2])), one)
+                single = np.zeros((*change.shape, change.shape[-2]))
+                every = np.arange(change.shape[-2])
+                single[..., every, :, every] = np.moveaxis(change, -2, 0)
+                enter(single, one)
     if columns:
         changes = np.concatenate(columns, axis=-1)
     else:

@@ -6,7 +6,6 @@ import ast
 import hashlib
 import json
 from functools import cache
-from importlib.metadata import entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,6 +58,10 @@ def code_hash(modules: Sequence[str]) -> str:
 @cache
 def libraries() -> dict[str, str]:
     """Versions of the libraries that a number may depend on."""
+    from importlib.metadata import (
+        version,
+    )  # with the parser of mail that it imports, a tenth of the time of a short command
+
     return {name: version(name) for name in LIBRARIES}
 
 
@@ -143,5 +146,7 @@ def _running(tree: ast.AST) -> Iterator[ast.AST]:
 
 def _added(group: str) -> dict[str, Path]:
     """Sources of the modules that other packages add under an entry point."""
+    from importlib.metadata import entry_points  # see libraries()
+
     specs = {point.module: find_spec(point.module) for point in entry_points(group=group)}
     return {name: Path(spec.origin) for name, spec in specs.items() if spec is not None and spec.origin is not None}

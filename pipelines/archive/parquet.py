@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 from pipelines.archive.files import hash_of
 from pipelines.archive.store import first_line
 from schemas.errors import ArchiveUnusable
+from schemas.version import VERSION
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
     import pyarrow as pa
 
@@ -41,21 +44,24 @@ def encoded(table: pa.Table) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def decoded(data: bytes) -> pa.Table:
-    """The table that a Parquet file's bytes hold."""
+def decoded(data: bytes, columns: Sequence[str] = ()) -> pa.Table:
+    """The table that a Parquet file's bytes hold, or named columns of it; all columns of a table of an older version."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    file = pq.ParquetFile(pa.BufferReader(data))
+    some = columns and (file.schema_arrow.metadata or {}).get(SCHEMA_MARK) == str(VERSION).encode()
     # one small file: a data set reader with threads would take longer than the reading itself
-    return pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
+    return file.read(columns=list(columns) if some else None, use_threads=False)
 
 
-def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFrame:
+def read_table(path: Place, name: str, expected: str | None = None, columns: Sequence[str] = ()) -> pd.DataFrame:
     """A table of the archive, checked to be complete, written by this archive and unchanged.
 
     Parameters
     ----------
     expected : hash that the manifest gives; None where there is no manifest to compare with.
+    columns : those that the caller reads; all where none is named. A table of an older version has all its columns.
     """
     import pyarrow as pa
 
@@ -68,7 +74,7 @@ def read_table(path: Place, name: str, expected: str | None = None) -> pd.DataFr
             "and it goes on"
         ) from None
     try:
-        table = decoded(data)
+        table = decoded(data, columns)
     except (pa.ArrowInvalid, OSError) as problem:
         raise ArchiveUnusable(
             f"archive: {path} ({len(data)} bytes) is not a whole Parquet file ({first_line(problem)}); {remedy}"

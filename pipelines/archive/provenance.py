@@ -6,7 +6,6 @@ import getpass
 import platform
 from datetime import UTC, datetime
 from functools import cache
-from importlib.metadata import version
 from typing import Any
 
 from pipelines.archive.keys import libraries
@@ -26,4 +25,6 @@ def provenance() -> dict[str, Any]:
 @cache
 def _software() -> dict[str, str]:
     """Versions of the product and of what runs it; read from the installed packages."""
+    from importlib.metadata import version  # here, because a short command that writes nothing does not need it
+
     return {"tumbleline": version("tumbleline"), "python": platform.python_version()}

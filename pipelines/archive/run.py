@@ -14,7 +14,7 @@ from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.version import refuse_newer
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
     import pyarrow as pa
@@ -140,8 +140,13 @@ class Run:
         """Whether the report is there, made with this key."""
         return self.report.is_file() and self._manifest_key("report") == key
 
-    def table(self, name: str) -> pd.DataFrame:
-        """A table of the run, whole and unchanged since it was written."""
+    def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
+        """A table of the run, whole and unchanged since it was written.
+
+        Parameters
+        ----------
+        columns : those that the caller reads; the table may have more. All where none is named
+        """
         path = self.path / f"{name}.parquet"
         if name in PARTS and not path.is_file() and self.records is not None:
             return self.records.gathered(name)
@@ -154,7 +159,7 @@ class Run:
                 f"archive: run {self.id} was imported and has no table '{name}', which a fit of its dwells makes; fit it with "
                 f"'tumbleline rerun {self.id} --effects a,b,c' and name that run"
             )
-        return read_table(path, name, self.manifest(name)["sha256"] if path.is_file() else None)
+        return read_table(path, name, self.manifest(name)["sha256"] if path.is_file() else None, columns)
 
     def manifest(self, name: str) -> dict[str, Any]:
         """The manifest of a table."""

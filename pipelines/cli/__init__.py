@@ -15,6 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from inertial.errors import InertialError
 from pipelines.cli.discovery import find_commands
+from pipelines.cli.given_texts import take_texts_as_given
 from schemas.errors import DONE, UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.log_lines import VARIABLE as LOG
@@ -64,6 +65,7 @@ class _OnDemand(TyperCommand):
         for one in (command, *getattr(command, "commands", {}).values()):
             one.help = flowing(one.help or "")
             _name_arguments_once(one)
+            take_texts_as_given(one)
         command.epilog = _examples(getattr(module, "EXAMPLES", ()), getattr(module, "EPILOG", ()))
         of_subcommands: dict[str, tuple[str, ...]] = getattr(module, "EXAMPLES_OF", {})
         for name, examples in of_subcommands.items():
@@ -99,6 +101,10 @@ def _examples(lines: Sequence[str], before: Sequence[str] = ()) -> str:
 
 class _Commands(TyperGroup):
     """The commands in the parts of the help."""
+
+    def __init__(self, **named: Any) -> None:
+        super().__init__(**named)
+        take_texts_as_given(self)
 
     def list_commands(self, ctx: Context) -> list[str]:
         """Names of the commands."""

@@ -11,6 +11,8 @@ from pipelines.archive.parquet import decoded
 from pipelines.archive.run import START
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
     import pyarrow as pa
 
@@ -37,14 +39,16 @@ class BufferedRun(Run):
         """The content of ``run.json``."""
         return files.read_json(self.path / "run.json")
 
-    def table(self, name: str) -> pd.DataFrame:
-        """A table of the run; the caller may change it.
+    def table(self, name: str, columns: Sequence[str] = ()) -> pd.DataFrame:
+        """A table of the run; the caller may change it. Only whole tables are kept.
 
         A new table also passes through its encoded columns: the memory layout of a stage's table may differ from that of a table
         from a file, and sums over it would differ in their last digits.
         """
         if name not in self._known:
             made = self._made.pop(name, None) or self._adopted(name)
+            if columns and made is None:
+                return super().table(name, columns)
             self._known[name] = super().table(name) if made is None else made.to_pandas(use_threads=False)
         return self._known[name].copy(deep=False)
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from inertial.correction import correct
 from inertial.errors import InertialError
@@ -15,9 +14,9 @@ from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.selection import entry_of
-from pipelines.stages.budget import budget
 from pipelines.stages.budget_terms import BudgetTables
-from pipelines.stages.fit import fit_tables
+from pipelines.stages.decision_budget import decision_budget
+from pipelines.stages.fit import fit_in_memory
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.verify import verify_tables
 from pipelines.tables.calibration import Calibration, read_calibration
@@ -37,6 +36,14 @@ if TYPE_CHECKING:
 
 Sums = dict[str, tuple[float, int]]
 """Sum of squared errors, µg², and their number, by unit."""
+
+
+OLD_TABLES = {
+    **dict.fromkeys(("verdicts", "grades", "coefficients", "covariance", "noise"), ()),
+    "residuals": ("unit", "residual_ug"),
+    "verification": ("unit", "error_ug"),
+}
+"""Tables of a run that a comparison reads, with the columns; all where none is named."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +94,7 @@ def judged(part: Batch) -> list[LotComparison]:
     """Every run of a portion under both models; what cannot be judged says why."""
     archive = Archive(part.archive)
     part.change.use()
-    with threadpool_limits(1):
-        return [_judged(BufferedRun(archive, run_id), part.change) for run_id in part.runs]
+    return [_judged(BufferedRun(archive, run_id), part.change) for run_id in part.runs]
 
 
 def _judged(run: Run, change: ModelChange) -> LotComparison:
@@ -104,30 +110,26 @@ def _both(run: Run, change: ModelChange) -> tuple[Side, Side]:
     if "grades" not in run.tables() or not run.about.get("capture"):
         raise DataRejected(f"run {run.id}: it has no grades to compare with; run it again with limits first")
     job = archived_job(run, change)
-    names = ("verdicts", "grades", "coefficients", "covariance", "residuals", "verification", "noise")
-    old = {name: run.table(name) for name in names}
+    old = {name: run.table(name, columns) for name, columns in OLD_TABLES.items()}
     lot = LotTables(run.table("dwells"), run.table("history"))
-    new = fit_tables(lot, job.recipe.effects)
-    own = _calibration(new)
-    new |= verify_tables(lot, new["coefficients"], new["covariance"], new["predictions"], own)
+    new, expected, own = fit_in_memory(lot, job.recipe.effects)
+    new |= verify_tables(lot, new["coefficients"], new["covariance"], expected, own)
     # the noise is in µg already, and the response by which it was made so hardly depends on the model
     names = ("coefficients", "covariance", "wander", "verification", "verification_poses")
-    stated = budget(
+    stated = decision_budget(
         BudgetTables(
             lot.dwells, lot.history, *(new[name] for name in names), noise=old["noise"], lot=lot, calibration=own
         ),
         budget_terms(job),
-        contributions=False,
     )
     evidence = GradeEvidence(
         old["verdicts"],
         *(new[name] for name in ("coefficients", "covariance", "residuals", "verification", "verification_poses")),
         noise=old["noise"],
-        uncertainties=stated["uncertainties"],
-        budget_covariance=stated["budget_covariance"],
         calibration=own,
+        budget=stated,
     )
-    new |= grade(evidence, job.limits, job.recipe.zero_output)
+    new |= grade(evidence, job.limits, job.recipe.zero_output, figures=False)
     return _side(old, _calibration(old)), _side(new, own)
 
 
@@ -158,8 +160,7 @@ def _sums(table: pd.DataFrame, column: str) -> Sums:
 
 def fresh(tasks: Sequence[FreshTask]) -> list[Fresh]:
     """Errors on the fresh dwells of some runs."""
-    with threadpool_limits(1):
-        return [_fresh(task) for task in tasks]
+    return [_fresh(task) for task in tasks]
 
 
 def _fresh(task: FreshTask) -> Fresh:

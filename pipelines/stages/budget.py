@@ -28,31 +28,32 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-def budget(tables: BudgetTables, terms: BudgetTerms, *, contributions: bool = True) -> dict[str, pd.DataFrame]:
+def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
     """Tables ``budget``, ``uncertainties`` and ``budget_covariance``; without rows where no uncertainty is stated.
 
     ``budget`` has one row per unit, quantity and contribution, ``uncertainties`` one per unit and quantity: value, u of type A
     and B, effective degrees of freedom, k and U, and for verification the part that the station's own verification shows.
-
-    Parameters
-    ----------
-    contributions : whether the table ``budget`` is made, which no decision is based on
     """
     if terms.stated is None or tables.coefficients.empty:
         return empty()
+    lot, calibration, variances = lot_variances(tables, terms)
+    quantities = list(quantities_of(lot, calibration, tables, terms, variances))
+    known = sources(terms.stated)
+    return {
+        **rows_of_quantities(calibration.units, quantities, variances, terms, known),
+        "budget_covariance": covariance_rows(calibration.units, variances.fit.covariance()),
+    }
+
+
+def lot_variances(tables: BudgetTables, terms: BudgetTerms) -> tuple[LotArrays, Calibration, VarianceParts]:
+    """The dwells of a lot with the angles of the table, its calibration, and the influences through its fit."""
     lot = tables.arrays()
     if lot.state.outer is None:  # faces or forces that are known otherwise: as a table would have turned to them
         outer, inner = angles_from_force(lot.state.force)
         lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
     calibration = tables.calibrated()
     at = conditions(lot, tables.dwells, calibration.response, terms)
-    variances = propagate(lot, calibration, tables.wander, terms, at)
-    quantities = list(quantities_of(lot, calibration, tables, terms, variances))
-    known = sources(terms.stated)
-    return {
-        **rows_of_quantities(calibration.units, quantities, variances, terms, known, contributions=contributions),
-        "budget_covariance": covariance_rows(calibration.units, variances.fit.covariance()),
-    }
+    return lot, calibration, propagate(lot, calibration, tables.wander, terms, at)
 
 
 def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> DwellConditions:
@@ -87,7 +88,7 @@ def propagate(
     return VarianceParts(
         fit=fit,
         verification=whole.changes[..., ~used, :, :],
-        visible=design.visible_share(fitted.changes, fit.coefficients),
+        visible_share=lambda: design.visible_share(fitted.changes, fit.coefficients),
     )
 
 

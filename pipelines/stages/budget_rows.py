@@ -93,24 +93,41 @@ def rows_of_quantities(
     variances: VarianceParts,
     terms: BudgetTerms,
     known: Mapping[str, UncertaintySource],
-    *,
-    contributions: bool = True,
 ) -> dict[str, pd.DataFrame]:
-    """Tables ``budget`` (if its ``contributions`` are asked for) and ``uncertainties``; every quantity for all units at once."""
+    """Tables ``budget`` and ``uncertainties``; every quantity for all units at once."""
+    places = groups_of(variances)
+    parts = [_contributions(one, places, variances, known, terms) for one in quantities]
+    return {
+        "budget": _budget_rows(units, quantities, parts),
+        "uncertainties": _sum_rows(units, quantities, parts, terms),
+    }
+
+
+def groups_of(variances: VarianceParts) -> dict[str, NDArray[np.intp]]:
+    """The places among the influences of every contribution, in order."""
     names = np.array(variances.fit.source.contributions, dtype=object)
-    groups = list(dict.fromkeys(names.tolist()))
-    places = {group: np.flatnonzero(names == group) for group in groups}
-    parts = [_contributions(one, groups, places, variances, known, terms) for one in quantities]
-    single = {"budget": _budget_rows(units, quantities, parts)} if contributions else {}
-    return {**single, "uncertainties": _sum_rows(units, quantities, parts, terms)}
+    return {group: np.flatnonzero(names == group) for group in dict.fromkeys(names.tolist())}
+
+
+def combined(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> tuple[Array, Array, Array]:
+    """Standard uncertainty of type A, of type B and of both of a quantity, (units,) each."""
+    noise = np.asarray(one.noise, dtype=float)
+    if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
+        stated = np.zeros_like(noise)
+    else:
+        _, *groups = _parts(one, places).values()
+        stated = np.sqrt(_summed(np.stack(groups, axis=1) ** 2)) if groups else np.zeros_like(noise)
+    return noise, stated, np.hypot(noise, stated)
 
 
 def _contributions(
-    one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]], variances: VarianceParts,
+    one: BudgetQuantity,
+    places: Mapping[str, NDArray[np.intp]],
+    variances: VarianceParts,
     known: Mapping[str, UncertaintySource],
     terms: BudgetTerms,
-) -> _Contributions:  # fmt: skip
-    own = _parts(one, groups, places)
+) -> _Contributions:
+    own = _parts(one, places)
     u = np.ascontiguousarray(np.stack(list(own.values()), axis=1))
     stated, dof, sensitivity = u.copy(), np.full(u.shape, np.inf), np.full(u.shape, np.nan)
     about: dict[str, list[Any]] = {name: [] for name in SAME}
@@ -130,13 +147,13 @@ def _contributions(
     return _Contributions(list(own), u, about, stated, dof, sensitivity)
 
 
-def _parts(one: BudgetQuantity, groups: Sequence[str], places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
-    """Standard uncertainty of every contribution, (units,) each."""
+def _parts(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
+    """Standard uncertainty of every contribution, (units,) each; the noise first."""
     if one.extra:
         return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}
     out = {NOISE: np.asarray(one.noise, dtype=float)}
-    for group in groups:
-        out[group] = np.sqrt(np.sum(np.ascontiguousarray(one.parts[:, places[group]]) ** 2, axis=1))
+    for group, own in places.items():
+        out[group] = np.sqrt(np.sum(np.ascontiguousarray(one.parts[:, own]) ** 2, axis=1))
     return out
 
 

@@ -90,9 +90,10 @@ def influences(
     stability : of the device: whose temperature the user corrects with, and whether its output follows the supply
     """
     inputs: list[InputQuantity] = []
+    known = sources(stated)
     for name, errors, u in _all(stated, at, stability):
         if u > 0.0:
-            entry = sources(stated)[name].entry
+            entry = known[name].entry
             inputs.append(InputQuantity(name, errors, u, entry.scope, entry.dof or float("inf")))
     return inputs, list(_scattered(stated, at))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ from inertial.errors import InertialError
 from inertial.fits.wander import student
 from pipelines.stages.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.stages.noisy_fit import NoisyFit, fitted_with_noise
-from pipelines.tables.calibration import coefficient_rows, covariance_rows
+from pipelines.tables.calibration import Calibration, calibration_of, coefficient_rows, covariance_rows, symmetric
 from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
@@ -48,17 +48,47 @@ def fit_tables(tables: LotTables, effects: Sequence[str]) -> dict[str, pd.DataFr
     if not np.any(tables.dwells["kind"] == "dwell"):
         return _nothing()
     lot = tables.fitted_kinds
+    fitted = _fitted(lot, effects)
+    return {**_rows(lot, fitted), "predictions": _prediction_rows(lot, fitted)}
+
+
+class FittedLot(NamedTuple):
+    """A fit for stages that follow in memory.
+
+    tables : those of :func:`fit` without ``predictions``; expected : its covariances, (units, 3, m, m), µg², for the m dwells for
+    verification; calibration : None where no unit was fitted
+    """
+
+    tables: dict[str, pd.DataFrame]
+    expected: Array
+    calibration: Calibration | None
+
+
+def fit_in_memory(tables: LotTables, effects: Sequence[str]) -> FittedLot:
+    """:func:`fit_tables` with what the stages after it read as arrays: the same numbers."""
+    if not np.any(tables.dwells["kind"] == "dwell"):
+        return FittedLot(_nothing(), np.zeros((0, 3, 0, 0)), None)
+    lot = tables.fitted_kinds
+    fitted = _fitted(lot, effects)
+    made = _rows(lot, fitted)
+    values = symmetric(_predicted(fitted))
+    return FittedLot(made, values, calibration_of(lot.units, fitted.fit, made["coefficients"], made["covariance"]))
+
+
+def _fitted(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
     try:
-        fitted = fitted_with_noise(lot, effects)
+        return fitted_with_noise(lot, effects)
     except InertialError as problem:
         raise DataRejected(str(problem)) from None
+
+
+def _rows(lot: LotArrays, fitted: NoisyFit) -> dict[str, pd.DataFrame]:
     return {
         "coefficients": coefficient_rows(
             lot.units, fitted.fit, fitted.fit.covariance, lot.out_unit, fitted.nonlinear_error
         ),
         "covariance": covariance_rows(lot.units, fitted.fit.covariance),
         "residuals": _residual_rows(lot, fitted),
-        "predictions": _prediction_rows(lot, fitted),
         "wander": _wander_rows(lot, fitted),
     }
 
@@ -86,13 +116,12 @@ def _residual_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
 
 def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
     """Covariance of the expected residuals of the dwells for verification, as a long table of lower triangles."""
-    scale = fitted.per_g
     dwells = lot.dwells[~lot.of_kind("dwell")]
     row, column = np.tril_indices(dwells.size)
     u, a, k = (
         i.ravel() for i in np.meshgrid(np.arange(len(lot.units)), np.arange(3), np.arange(row.size), indexing="ij")
     )
-    values = fitted.predicted * (MICRO / scale[..., None, None]) ** 2
+    values = _predicted(fitted)
     return pd.DataFrame(
         {
             "unit": picked(lot.units, u),
@@ -102,6 +131,11 @@ def _prediction_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:
             "covariance_ug2": values[..., row, column].ravel(),
         }
     )
+
+
+def _predicted(fitted: NoisyFit) -> Array:
+    """Covariance of the expected residuals of the dwells for verification, (units, 3, m, m), µg²."""
+    return fitted.predicted * (MICRO / fitted.per_g[..., None, None]) ** 2
 
 
 def _wander_rows(lot: LotArrays, fitted: NoisyFit) -> pd.DataFrame:

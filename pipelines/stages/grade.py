@@ -19,10 +19,11 @@ from schemas.errors import RecipeInvalid
 from schemas.limits import Limits
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
+    from pipelines.stages.decision_budget import DecisionBudget
     from schemas.recipe import Recipe
 
 NO_GRADE = "none"
@@ -41,6 +42,7 @@ class GradeEvidence:
     uncertainties, budget_covariance : of the uncertainty budget; None, or without rows, where nothing is stated
     full_scale : largest excursion of the output from 0 g by unit, output unit
     calibration : coefficients with their covariance, where other stages have read them already
+    budget : the uncertainty budget in place of its two tables, where they are not made
     """
 
     verdicts: pd.DataFrame
@@ -55,10 +57,13 @@ class GradeEvidence:
     procedure_figures: pd.DataFrame | None = None
     full_scale: Mapping[str, float] = field(default_factory=dict[str, float])
     calibration: Calibration | None = None
+    budget: DecisionBudget | None = None
 
     @property
     def basis(self) -> str:
         """The basis of the uncertainties."""
+        if self.budget is not None:
+            return BUDGET
         return NOISE_ONLY if self.uncertainties is None or self.uncertainties.empty else BUDGET
 
 
@@ -80,7 +85,7 @@ def refuse_limits_without_figures(limits: Limits, recipe: Recipe) -> None:
 
 
 def grade(
-    evidence: GradeEvidence, limits: Limits, zero_g: float = 0.0, *, tumbles: bool = True
+    evidence: GradeEvidence, limits: Limits, zero_g: float = 0.0, *, tumbles: bool = True, figures: bool = True
 ) -> dict[str, pd.DataFrame]:
     """Tables ``figures`` (one row per unit and figure), ``grades`` (one row per unit) and ``lot_risks`` (one per limited figure).
 
@@ -91,10 +96,11 @@ def grade(
     ----------
     zero_g : nominal output at 0 g, output unit.
     tumbles : whether the recipe has the multi-position test; without it a unit has no coefficients, and is not refused for that
+    figures : whether the tables ``figures`` and ``lot_risks`` are made, which no decision reads
     """
     rule = describe_rule(limits)
     guard = limits.guard_factor
-    by_unit = _budget(evidence.uncertainties)
+    budget_of = _budget(evidence)
     coefficients, places = _coefficients(evidence, zero_g)
     residuals, verification, verification_poses, noise = map(
         ByUnit, (evidence.residuals, evidence.verification, evidence.verification_poses, evidence.noise)
@@ -106,7 +112,7 @@ def grade(
         if verdict["refused"] or (coefficients is None and tumbles):
             grade_rows.append(_grade_row(verdict, "refused", NO_GRADE, str(verdict["reason"])))
             continue
-        figures: list[Figure] = []
+        own_figures: list[Figure] = []
         if coefficients is not None:
             own = UnitTables(
                 residuals.of(unit),
@@ -115,35 +121,42 @@ def grade(
                 noise.of(unit),
                 coefficients.of(places[unit]),
                 guard,
-                by_unit.get(unit, {}),
+                budget_of(unit),
                 evidence.full_scale.get(unit, float("nan")),
             )
-            figures += figures_of(own)
-        figures += _of_procedures(evidence.procedure_figures, unit, limits)
+            own_figures += figures_of(own)
+        own_figures += _of_procedures(evidence.procedure_figures, unit, limits)
         decisions = [
             decide(limits, f.name, f.value, f.uncertainty)
-            for f in figures
+            for f in own_figures
             if f.name in limits.figures and not f.why_not
         ]
-        figure_rows += [_figure_row(unit, figure, decisions, limits) for figure in figures if not figure.why_not]
-        grade_rows.append(_decided(verdict, figures, decisions, limits, evidence.basis))
+        if figures:
+            figure_rows += [_figure_row(unit, one, decisions, limits) for one in own_figures if not one.why_not]
+        grade_rows.append(_decided(verdict, own_figures, decisions, limits, evidence.basis))
+    grades = _table(grade_rows).assign(rule=rule, basis=evidence.basis)
+    if not figures:
+        return {"grades": grades}
     figure_table = _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS)
     return {
         "figures": figure_table,
-        "grades": _table(grade_rows).assign(rule=rule, basis=evidence.basis),
+        "grades": grades,
         "lot_risks": lot_risks(figure_table, limits, evidence.uncertainties),
     }
 
 
-def _budget(table: pd.DataFrame | None) -> dict[str, dict[tuple[str, str], BudgetRow]]:
-    """The quantities of the budget by unit."""
+def _budget(evidence: GradeEvidence) -> Callable[[str], Mapping[tuple[str, str], BudgetRow]]:
+    """What gives the quantities of the budget of a unit."""
+    if evidence.budget is not None:
+        return evidence.budget.of
     by_unit: dict[str, dict[tuple[str, str], BudgetRow]] = {}
+    table = evidence.uncertainties
     if table is None:
-        return by_unit
+        return lambda _unit: {}
     columns = (table[name].tolist() for name in ("unit", "quantity", "axis", "value", "u_a", "u_b", "u"))
     for unit, quantity, axis, *numbers in zip(*columns, strict=True):
         by_unit.setdefault(str(unit), {})[str(quantity), str(axis)] = BudgetRow(*numbers)
-    return by_unit
+    return lambda unit: by_unit.get(unit, {})
 
 
 def _stated(table: pd.DataFrame | None, units: int) -> NDArray[np.float64] | None:
@@ -190,7 +203,8 @@ def _coefficients(evidence: GradeEvidence, zero_g: float) -> tuple[LotCoefficien
     if evidence.coefficients.empty:
         return None, {}
     calibration = evidence.calibration or read_calibration(evidence.coefficients, evidence.covariance)
-    stated = _stated(evidence.budget_covariance, len(calibration.units))
+    units = len(calibration.units)
+    stated = _stated(evidence.budget_covariance, units) if evidence.budget is None else evidence.budget.covariance
     return LotCoefficients(calibration, zero_g, stated), {unit: place for place, unit in enumerate(calibration.units)}
 
 

@@ -57,7 +57,7 @@ def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: 
     variances = VarianceParts(
         fit=replace(fitted, source=replace(whole, changes=whole.changes[:, one.design.used])),
         verification=whole.changes[:, ~one.design.used],
-        visible=one.design.visible_share(whole.changes[0]),
+        visible_share=lambda: one.design.visible_share(whole.changes[0]),
     )
     wander = _of(tables.wander, unit)
     part = replace(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from pipelines.tables.frames import ByUnit
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -35,6 +36,13 @@ EFFECTS = {
     "scale_temperature": "ppm/K",
 }
 """Effects whose coefficients have a budget of their own, relative to the scale of their axis."""
+PARTS = {
+    **dict.fromkeys(EFFECTS, "coefficients"),
+    "orthogonality": "angles",
+    "output": "outputs",
+    **dict.fromkeys(("bias_error", "verification_norm", "bias_error_period"), "verification"),
+}
+"""The part of the budget that every quantity is computed in."""
 UNSEEN = 0.1
 """Visible share below which the residuals of a fit show nothing of an influence."""
 
@@ -43,12 +51,17 @@ UNSEEN = 0.1
 class VarianceParts:
     """Influences through a fit, with the part that a verification on the same station shows.
 
-    verification : (..., m, 3, q), J·u at the dwells for verification; visible : (q,), visible share of every influence
+    verification : (..., m, 3, q), J·u at the dwells for verification; visible_share : of :attr:`visible`
     """
 
     fit: Propagated
     verification: Array
-    visible: Array
+    visible_share: Callable[[], Array]
+
+    @cached_property
+    def visible(self) -> Array:
+        """Visible share of every influence, (q,)."""
+        return self.visible_share()
 
 
 @dataclass(frozen=True)
@@ -79,14 +92,37 @@ def quantities_of(
     lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, variances: VarianceParts
 ) -> Iterator[BudgetQuantity]:
     """Every quantity of a budget."""
-    units = len(lot.units)
-    dof = np.full(units, float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
+    for part in dict.fromkeys(PARTS.values()):
+        yield from part_of(part, lot, calibration, tables, terms, variances)
+
+
+def part_of(
+    part: str,
+    lot: LotArrays,
+    calibration: Calibration,
+    tables: BudgetTables,
+    terms: BudgetTerms,
+    variances: VarianceParts,
+    *,
+    decisions: bool = False,
+) -> Iterator[BudgetQuantity]:
+    """The quantities of one part of a budget, a value of :data:`PARTS`.
+
+    Parameters
+    ----------
+    decisions : whether the parts that a verification shows are left out where no decision depends on them
+    """
+    dof = np.full(len(lot.units), float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
     scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))
-    yield from _coefficients(calibration, variances, scale, dof)
-    yield from _angles(calibration, variances, scale, dof)
-    yield from _outputs(lot, calibration, terms, variances, dof)
-    if len(tables.verification):
-        errors = list(_verification(lot, calibration, tables, terms, variances, dof))
+    if part == "coefficients":
+        yield from _coefficients(calibration, variances, scale, dof)
+    elif part == "angles":
+        yield from _angles(calibration, variances, scale, dof)
+    elif part == "outputs":
+        yield from _outputs(lot, calibration, terms, variances, dof)
+    elif part == "verification" and len(tables.verification):
+        split = terms.stability is not None or not decisions  # the error over the period is made of the two parts
+        errors = list(_verification(lot, calibration, tables, terms, variances, dof, split=split))
         yield from errors
         yield from _period(errors, lot, tables, terms, dof)
 
@@ -199,16 +235,23 @@ def _verification(
     terms: BudgetTerms,
     variances: VarianceParts,
     dof: Array,
+    *,
+    split: bool,
 ) -> Iterator[BudgetQuantity]:
-    """RMS error of each axis for the user, and the magnitude at its worst pose."""
+    """RMS error of each axis for the user, and the magnitude at its worst pose.
+
+    Parameters
+    ----------
+    split : whether the part that the station's own verification shows, and that which it cannot, are computed
+    """
     unseen = lot.of_kind("verification")
     columns = design.local_columns(design.split(calibration.effects)[0], lot.state, calibration.nonlinear)
     columns = columns[..., unseen, :]
     force = np.broadcast_to(lot.state.force, (*lot.output.shape[:1], *lot.state.force.shape[-2:]))[:, unseen]
     intrinsic = terms.certificate.frame == "intrinsic"
     true = MICRO * variances.fit.user_errors(columns, force, intrinsic=intrinsic)
-    shown = MICRO * variances.fit.shown_errors(columns, variances.verification)
-    hidden = variances.visible < UNSEEN
+    shown = MICRO * variances.fit.shown_errors(columns, variances.verification) if split else None
+    hidden = variances.visible < UNSEEN if split else None
     rows = tables.verification
     for axis, letter in enumerate(AXES):
         own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
@@ -222,12 +265,15 @@ def _verification(
             noise,
             np.broadcast_to(parts, (len(lot.units), parts.shape[-1])),
             dof,
-            shown=_all(rms_over(shown[..., axis, :]), lot),
-            unseen=_all(rms_over(true[..., axis, :][..., hidden]), lot),
+            shown=None if shown is None else _all(rms_over(shown[..., axis, :]), lot),
+            unseen=None if hidden is None else _all(rms_over(true[..., axis, :][..., hidden]), lot),
         )
     along = norm_errors(true / MICRO, force)
     value, noise = _worst_pose(lot, tables)
     worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
+    if shown is None or hidden is None:
+        yield worst
+        return
     seen = norm_errors(shown / MICRO, force) * MICRO
     yield replace(
         worst,

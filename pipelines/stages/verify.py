@@ -45,13 +45,14 @@ def verify_tables(
     tables: LotTables,
     coefficients: pd.DataFrame,
     covariance: pd.DataFrame,
-    predictions: pd.DataFrame,
+    predictions: pd.DataFrame | Array,
     calibration: Calibration | None = None,
 ) -> dict[str, pd.DataFrame]:
     """:func:`verify` of tables that other stages read as well.
 
     Parameters
     ----------
+    predictions : the table, or the covariances (units, 3, m, m) that it holds, µg²
     calibration : that of the tables, where other stages have read it already
     """
     if not np.any(tables.dwells["kind"] == "verification") or coefficients.empty:
@@ -64,7 +65,8 @@ def verify_tables(
     toward = (corrected / norm[..., None])[:, unseen]
     scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[:, None, :]
     reading = (lot.standard_error / scale)[:, unseen]
-    by_axis, spread = MICRO * (corrected - truth)[:, unseen], _expected(predictions, lot.units)
+    by_axis = MICRO * (corrected - truth)[:, unseen]
+    spread = predictions if isinstance(predictions, np.ndarray) else _expected(predictions, lot.units)
     expected = np.einsum("uja,uajk,uka->ujk", toward, spread, toward)
     of_rms = rms_uncertainty(np.swapaxes(by_axis, 1, 2), spread)[:, None, :] + np.zeros_like(by_axis)
     columns = {

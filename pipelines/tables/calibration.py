@@ -188,6 +188,26 @@ def read_calibration(coefficients: pd.DataFrame, covariance: pd.DataFrame) -> Ca
     return Calibration(units, model, own.reshape(len(units), 3, p), matrix, nonlinear, shared)
 
 
+def calibration_of(
+    units: Sequence[str], fit: LotFit, coefficients: pd.DataFrame, covariance: pd.DataFrame
+) -> Calibration:
+    """The calibration of a fit, as :func:`read_calibration` reads it from the tables of the fit."""
+    if fit.nonlinear or fit.shared.size:
+        return read_calibration(coefficients, covariance)
+    model = tuple(dict.fromkeys(effect for axis in fit.names for effect, _ in axis))
+    values = np.array(fit.coefficients, dtype=np.float64, order="C")
+    return Calibration(tuple(units), model, values, symmetric(fit.covariance), {}, np.zeros(0))
+
+
+def symmetric(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Symmetric matrices (..., p, p) from the lower triangles of others, which is what tables hold."""
+    row, column = np.tril_indices(matrix.shape[-1])
+    out = np.empty(matrix.shape)
+    out[..., row, column] = matrix[..., row, column]
+    out[..., column, row] = matrix[..., row, column]
+    return out
+
+
 def _read_shared(common: pd.DataFrame, model: Sequence[str]) -> tuple[NDArray[np.float64], dict[str, dict[str, Any]]]:
     """Parameters of the station, and nonlinear parameters: a tuple where each axis has its own."""
     shared: list[float] = []

@@ -24,8 +24,9 @@ FEWEST_POINTS = 2
 
 def covariates(frame: pd.DataFrame) -> list[str]:
     """Names of the numeric columns without a fixed meaning: covariates that a missing effect may depend on."""
-    numbers = (name for name in frame.columns if pd.api.types.is_numeric_dtype(frame[name]))
-    return [str(name) for name in numbers if is_covariate(str(name)) and frame[name].dtype != np.bool_]
+    kinds = zip(frame.columns, frame.dtypes, strict=True)
+    numbers = (str(name) for name, kind in kinds if kind != np.bool_ and pd.api.types.is_numeric_dtype(kind))
+    return [name for name in numbers if is_covariate(name)]
 
 
 class DwellTable:
@@ -57,15 +58,18 @@ class DwellTable:
         self.shape = (len(self.units), len(self.numbers))
         self.rows = len(order)
         self.whole = self.rows == self.shape[0] * self.shape[1]
+        self._full_columns: dict[str, bool] = {}
 
     def has(self, *names: str) -> bool:
         """Whether the table has these columns, and a value in each of their rows."""
         return all(name in self.frame.columns and self._full(name) for name in names)
 
     def _full(self, name: str) -> bool:
-        values = self.frame[name].to_numpy()
-        values = values if self._order is None else values[self._order]
-        return not pd.isna(values).any()
+        if name not in self._full_columns:
+            values = self.frame[name].to_numpy()
+            values = values if self._order is None else values[self._order]
+            self._full_columns[name] = not pd.isna(values).any()
+        return self._full_columns[name]
 
     def grid(self, name: str) -> Array:
         """A column of numbers, (units, n); NaN where a unit lacks a dwell."""

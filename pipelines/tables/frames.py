@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -70,7 +70,13 @@ class UnitRows:
 
 def picked(texts: Sequence[str], places: NDArray[np.intp]) -> ExtensionArray:
     """The texts of some indices, (rows,), as a column."""
-    return pd.array(np.asarray(texts, dtype=object), dtype="str").take(places)
+    return _column(tuple(texts)).take(places)
+
+
+@lru_cache(maxsize=64)
+def _column(texts: tuple[str, ...]) -> ExtensionArray:
+    """Texts as a column; the units and poses of a lot are picked many times."""
+    return pd.array(np.asarray(texts, dtype=object), dtype="str")
 
 
 def empty_table(*, texts: str = "", numbers: str = "", whole: str = "", flags: str = "") -> pd.DataFrame:

@@ -33,14 +33,16 @@ def certified(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 
 @pytest.mark.parametrize("form", [["--json"], []], ids=["json", "text"])
-def test_validity_of_a_serial_is_answered_without_numpy(certified: tuple[Path, str], form: list[str]) -> None:
+def test_validity_of_a_serial_is_answered_without_numpy_and_pydantic(
+    certified: tuple[Path, str], form: list[str]
+) -> None:
     root, serial = certified
     day = json.loads(command(["show", serial, "--archive", str(root), "--json"]).stdout)["history"][0]["from"]
     words = ["show", serial, "--at", day, "--archive", str(root), *form]
     alone = subprocess.run([sys.executable, "-c", SHOWN, *words], capture_output=True, text=True, check=True)
     loaded = set(json.loads(alone.stderr.splitlines()[-1]))
     assert "pyarrow.parquet" in loaded
-    assert not {"numpy", "pandas", "scipy", "duckdb", "prefect"} & loaded
+    assert not {"numpy", "pandas", "scipy", "duckdb", "prefect", "pydantic"} & loaded
     here = command(words)  # numpy is loaded here
     assert "numpy" in sys.modules
     assert alone.stdout == here.stdout
