@@ -22,6 +22,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "worlds"), str(HERE.parent)]
 
+import noise_kinds  # noqa: E402
 import numpy as np  # noqa: E402
 from decision_parts import BASE, PARTS, lines, run_of  # noqa: E402
 from noise import Noise  # noqa: E402
@@ -218,6 +219,8 @@ def rises(runs: int, first: int) -> Iterator[str]:
 DERIVED: dict[str, Callable[[int, int], Iterator[str]]] = {
     "SHARE_STEP": shares,
     "PRIOR_DOF": prior_grid,
+    "OWN_SHARES": noise_kinds.own_shares,
+    "LOUDER_BELOW": noise_kinds.louder,
     "MOST_BAD": most_bad,
     "COMMON": common_dwells,
     "NAMED_BELOW": looks,
@@ -229,6 +232,7 @@ DERIVED: dict[str, Callable[[int, int], Iterator[str]]] = {
 """Simulations of a decision alone."""
 
 SAME = {
+    "OWN_SUSPECT": "OWN_SHARES",
     "LEAST_SHARE": "SHARE_STEP",
     "LARGEST_SHARE": "SHARE_STEP",
     "CERTAIN_BELOW": "NAMED_BELOW",

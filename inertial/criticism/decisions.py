@@ -20,13 +20,16 @@ OWN_SUSPECT, OWN_SHARES = 22.0, 20.0
 shares of 1/f and of random walk of its own must fit its residuals better than those of the lot.
 
 Derived: chi-square of three degrees of freedom exceeds 22 with a probability of 7e-5, and of two exceeds 20 with one of 5e-5.
+`python benchmarks/characteristics.py --only OWN_SHARES --runs 10`: axes with shares of their own that need none, and axes of
+telegraph noise of 150 µg that get them.
 """
 
 LOUDER_BELOW = 1e-4
 """Probability of the differences of the scatter of soaks, over units and axes, below which each soak has a noise of its own.
 
 Derived: an F test of means over units and axes within each soak, by whose scatter the means are judged; equal soaks pass for
-different in one lot of ten thousand.
+different in one lot of ten thousand. `python benchmarks/characteristics.py --only LOUDER_BELOW --runs 10`: 0 of 70 lots with equal
+soaks have a noise for each soak, 8 of 10 whose fast noise grows by two between -10 and 60 °C, and 10 of 10 by four.
 """
 
 PRIOR_BETTER = 4.0
