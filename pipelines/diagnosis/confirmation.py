@@ -126,7 +126,7 @@ def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float,
         left = f"with {_TOLD.get(kind, kind)} left out"
         # an error that cannot be stated is none that the fall exceeds
         if not fall > CONFIRMED * error:
-            return f"{left} {fall_of(MICRO * fall, known(MICRO * error))}, not clearly more than its uncertainty"
+            return f"{left} {fall_of(MICRO * fall, known(MICRO * error))}, no clear fall"
         if gain <= LEFT_OUT:
             return f"{left} the log density changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
     return None

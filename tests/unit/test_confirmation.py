@@ -50,7 +50,7 @@ def test_a_fall_within_its_uncertainty_is_not_confirmed_by_a_gain_in_density() -
     assert 0.0 < evidence["fall_ug"] < 2.0 * evidence["fall_u_ug"]
     assert (evidence["confirmed"], evidence["rises"]) == (None, None)
     text = text_of(ROW, evidence)
-    assert "not clearly more than its uncertainty" in text
+    assert "no clear fall" in text
     assert text.count("the error falls by") == 1
 
 

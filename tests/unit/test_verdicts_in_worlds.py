@@ -300,8 +300,8 @@ def warming(dwells: pd.DataFrame) -> None:
 @pytest.mark.parametrize(
     ("units", "spoil", "effect", "reason"),
     [
-        (1, slipped, "outer_encoder_offset", "uncertainty"),
-        (1, slipped, "cross_coupling", "uncertainty"),
+        (1, slipped, "outer_encoder_offset", "no clear fall"),
+        (1, slipped, "cross_coupling", "no clear fall"),
         (4, exchanged, "misalignment_temperature", "left out"),
         (4, exchanged, "scale_temperature_quadratic", "fault|names"),
         (4, misread, "scale_temperature_quadratic", "names soak_thermometer"),
