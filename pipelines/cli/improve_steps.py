@@ -198,11 +198,11 @@ class Improvement:
     def _rows(self, versions: list[Version], noise: float | None, given: ImprovedTables) -> list[dict[str, Any]]:
         """Errors of each version; none where no unit can be judged."""
         from pipelines.cli.compare import compared
-        from pipelines.diagnosis.model_history import evolution
+        from pipelines.diagnosis.model_history import JUDGED, evolution
 
         if noise is None:
             return []
         tables = (given.dwells, given.history, given.fresh, given.fresh_history)
         rows = evolution(versions, lambda effects, before: compared(effects, *tables, before=before))
-        keys = ("version", "added", "fitted_ug", "heldout_ug", "fresh_ug", "fall_ug", "fall_u_ug", "confirmed", "text")
+        keys = ("version", "added", "fitted_ug", "heldout_ug", "fresh_ug", *JUDGED, "text")
         return [{key: row[key] for key in keys} | {"noise_ug": noise, "warnings": row["warnings"]} for row in rows]

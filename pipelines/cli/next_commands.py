@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 PROGRAM = "tumbleline"
 MEASURE_AGAIN = (
-    "Only a second measurement of the same units confirms an effect: give it to history with --fresh{history}."
+    "A second measurement of the same units tells an effect from a fault of this run: give it to history with "
+    "--fresh{history}."
 )
 
 

@@ -19,6 +19,7 @@ from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from inertial.planning.reasons import drivers_of
 from pipelines.diagnosis.confirmation import progress
+from pipelines.diagnosis.doubts import doubt_of_run
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO
@@ -105,9 +106,11 @@ def _compared(
     if before is not None:
         lesser = Model(problem, terms_of(catalogue.get_all(list(before)), problem))
         lot = None if again is None else lot_of(again, like=measurement, square=square)
-        answer["progress"] = progress(lesser, model, out, lot)
+        answer["progress"] = progress(
+            lesser, model, out, lot, lambda: doubt_of_run(measurement, problem.lot, list(before), list(effects))
+        )
         if again is not None and _remember(again, [t for t in model.terms if t.effect.id not in set(before)]):
-            answer["progress"]["confirmed"] = None  # its prediction cannot be computed
+            answer["progress"] |= {"confirmed": None, "reason": "its prediction needs the history of the fresh run"}
     if again is not None:
         answer["warnings"] += [
             f"{name} depends on the temperature between the dwells, and no history of the fresh run was given: its prediction "

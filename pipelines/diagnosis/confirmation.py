@@ -7,50 +7,70 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.criticism.comparison import estimate, residuals_of, rms
-from inertial.criticism.decisions import BLOCKS, LEFT_OUT, RISES
+from inertial.criticism.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
 from inertial.criticism.left_out import left_out
 from inertial.criticism.problem import Problem
 from inertial.criticism.reproduced_change import reproduced_change
 from pipelines.diagnosis.result_rows import known
+from pipelines.procedures.wording import with_uncertainty
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
-    from inertial.criticism.left_out import LeftOut
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    from inertial.criticism.left_out import Kind, LeftOut
     from inertial.criticism.model import Model
     from inertial.criticism.problem import Lot
+    from inertial.criticism.reproduced_change import ReproducedChange
+
+    Array = NDArray[np.float64]
 
 
-def progress(before: Model, after: Model, out: LeftOut, fresh: Lot | None) -> dict[str, Any]:
+_TOLD = {"blocks of time": "stretches of time"}
+"""Kinds of dwells left out in the words of the texts, where these differ."""
+
+
+def progress(
+    before: Model, after: Model, out: LeftOut, fresh: Lot | None, doubt: Callable[[], str | None] = lambda: None
+) -> dict[str, Any]:
     """The evidence on the effects by which two models differ.
 
     Parameters
     ----------
     before, after : fitted to the same dwells; out : of ``after``, on dwells left out
     fresh : the fresh run in the scale of the first; None if there is none
+    doubt : why the run itself may imitate the effects, see :func:`pipelines.diagnosis.doubts.doubt_of_run`; called only
+        without a fresh run, where dwells left out are for the effects
 
     Returns
     -------
-    ``judged_by``; ``confirmed``: true, false (evidence against it), or None (not decided); ``fall_ug`` with its standard error
-    ``fall_u_ug``; on a fresh run ``part`` (λ) with ``part_u``; on dwells left out the gain in ``log_density``
+    ``judged_by``; ``confirmed``: true, false (evidence against it), or None (not decided, for the ``reason``); ``fall_ug`` with
+    its standard error ``fall_u_ug``; on a fresh run ``part`` (λ) with ``part_u``; on dwells left out the gain in ``log_density``
     """
     if fresh is not None:
         return _by_fresh(before, after, out, fresh)
-    return _by_left_out(left_out(before), out)
+    return _by_left_out(left_out(before), out, doubt)
 
 
 def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str, Any]:
     old, new = estimate(before), estimate(after)
     change = reproduced_change(fresh, old, new)
     problem = Problem(fresh)
-    rises = None
+    rises, reason = None, None
     if change.confirmed is True:
         unchanged = tuple(rms(residuals_of(problem, one)) for one in (old, new))
         rises = _rise("the error on the fresh run", *unchanged)
         rises = rises or _rise("the error on dwells left out", *_worst(before, out))
+        reason = rises or _unclear(change)
+    elif change.confirmed is None:
+        reason = "the fresh run does not decide; measure another run"
     return {
         "judged_by": "fresh run",
-        "confirmed": None if rises else change.confirmed,
+        "confirmed": None if reason else change.confirmed,
         "rises": rises,
+        "reason": reason,
         "part": known(change.part),
         "part_u": known(change.error),
         "fall_ug": MICRO * change.fall,
@@ -60,28 +80,62 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
     }
 
 
-def _by_left_out(before: LeftOut, after: LeftOut) -> dict[str, Any]:
-    kinds = set(before.density) & set(after.density)
-    gains = {kind: after.density[kind] - before.density[kind] for kind in kinds}
+def _unclear(change: ReproducedChange) -> str | None:
+    """A fall on the fresh run that is no larger than its uncertainty, as text; None if it is larger, or has none."""
+    if not np.isfinite(change.fall_error) or change.fall > CONFIRMED * change.fall_error:
+        return None
+    return "the fall of the error is not clearly more than its uncertainty"
+
+
+def _by_left_out(before: LeftOut, after: LeftOut, doubt: Callable[[], str | None] = lambda: None) -> dict[str, Any]:
+    kinds: list[Kind] = [kind for kind in before.density if kind in after.density]
+    gains: dict[Kind, float] = {kind: after.density[kind] - before.density[kind] for kind in kinds}
     gain = gains.get("blocks of time")
-    missed = [(before.missed[k], after.missed[k]) for k in sorted(kinds)]
-    falls = [float(np.sqrt(np.nanmean(a**2)) - np.sqrt(np.nanmean(b**2))) for a, b in missed]
-    worst = int(np.argmin(falls)) if falls else 0
-    both = (before.rms(kinds), after.rms(kinds)) if kinds else (float("nan"), float("nan"))
+    falls: dict[Kind, tuple[float, float]] = {kind: _fall(before.missed[kind], after.missed[kind]) for kind in kinds}
+    worst = min(kinds, key=lambda kind: falls[kind][0]) if kinds else None
+    both = (before.rms(set(kinds)), after.rms(set(kinds))) if kinds else (float("nan"), float("nan"))
     convincing = gain is not None and gain > LEFT_OUT
     rises = _rise("the error on dwells left out", *both) if convincing else None
+    # the search for a fault of the run is the longest part: only where it decides
+    against = rises or _disagreement(gains, falls) or doubt() if convincing else _no_gain(gain)
     return {
         "judged_by": "dwells left out",
         # absence of evidence is no evidence: without a fresh run nothing is refuted
-        "confirmed": True if convincing and not rises else None,
+        "confirmed": None if against else True,
         "rises": rises,
+        "reason": against,
         "part": None,
         "part_u": None,
-        "fall_ug": MICRO * falls[worst] if falls else None,
-        "fall_u_ug": known(MICRO * _error(*missed[worst])) if falls else None,
+        "fall_ug": MICRO * falls[worst][0] if worst else None,
+        "fall_u_ug": known(MICRO * falls[worst][1]) if worst else None,
         "estimated_again": None,
         "log_density": gain,
     }
+
+
+def _no_gain(gain: float | None) -> str:
+    if gain is None:
+        return "no judgement is possible"
+    return f"log density {gain:+.1f}, more than {LEFT_OUT:g} is needed"
+
+
+def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float, float]]) -> str | None:
+    """A kind of dwells left out that can judge the effects and is not clearly for them, as text; None if there is none."""
+    for kind, gain in sorted(gains.items(), key=lambda one: falls[one[0]][0]):
+        fall, error = falls[kind]
+        left = f"with {_TOLD.get(kind, kind)} left out"
+        # an error that cannot be stated is none that the fall exceeds
+        if not fall > CONFIRMED * error:
+            return f"{left} {fall_of(MICRO * fall, known(MICRO * error))}, no clear fall"
+        if gain <= LEFT_OUT:
+            return f"{left} the log density changes by {gain:+.1f}, more than {LEFT_OUT:g} is needed"
+    return None
+
+
+def fall_of(fall: float, error: float | None) -> str:
+    """The decrease of an error, µg, with its standard uncertainty, as text."""
+    size = f"{float(f'{abs(fall):.3g}'):g}" if error is None else f"{with_uncertainty(abs(fall), 2.0 * error)} (k = 2)"
+    return f"the error {'falls' if fall >= 0.0 else 'rises'} by {size} µg"
 
 
 def _rise(what: str, before: float, after: float) -> str | None:
@@ -100,14 +154,15 @@ def _worst(before: Model, after: LeftOut) -> tuple[float, float]:
     return first.rms(kinds), after.rms(kinds)
 
 
-def _error(before: np.ndarray, after: np.ndarray) -> float:
-    """Standard error of the decrease of the RMS, by leaving out stretches of time in turn."""
+def _fall(before: Array, after: Array) -> tuple[float, float]:
+    """Decrease of the RMS of dwells left out, g, and its standard error, by leaving out stretches of time in turn."""
     n = before.shape[1]
     stretch = np.arange(n) * min(BLOCKS, n) // n
-    falls = []
-    for k in range(int(stretch.max()) + 1):
-        rest = stretch != k
-        one, other = (np.sqrt(np.nanmean(v[:, rest] ** 2)) for v in (before, after))
-        falls.append(one - other)
+    falls = [_decrease(before[:, stretch != k], after[:, stretch != k]) for k in range(int(stretch.max()) + 1)]
     count = len(falls)
-    return float(np.sqrt((count - 1) / count * np.sum((np.array(falls) - np.mean(falls)) ** 2)))
+    error = float(np.sqrt((count - 1) / count * np.sum((np.array(falls) - np.mean(falls)) ** 2)))
+    return _decrease(before, after), error
+
+
+def _decrease(before: Array, after: Array) -> float:
+    return float(np.sqrt(np.nanmean(before**2)) - np.sqrt(np.nanmean(after**2)))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from pipelines.procedures.wording import with_uncertainty
+from inertial.criticism.decisions import CONFIRMED, LEFT_OUT
+from pipelines.diagnosis.confirmation import fall_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +20,7 @@ FIGURES = {
 }
 """Figures of a version, with their keys in a comparison."""
 
-JUDGED = ("fall_ug", "fall_u_ug", "confirmed")
+JUDGED = ("fall_ug", "fall_u_ug", "confirmed", "reason")
 
 
 class Compare(Protocol):
@@ -44,7 +45,7 @@ def evolution(versions: Sequence[Version], compare: Compare) -> list[dict[str, A
         errors = compare(effects, before if version.added else None)
         progress = errors.get("progress")
         row = {**change_row(version), **{name: errors[key] for name, key in FIGURES.items()}}
-        row |= {name: None if progress is None else progress[name] for name in JUDGED}
+        row |= {name: None if progress is None else progress.get(name) for name in JUDGED}
         text = text_of(row, progress) if before is not None else "the model to begin with"
         rows.append({**row, "text": text, "warnings": errors.get("warnings", [])})
         before = effects
@@ -75,11 +76,15 @@ def text_of(row: dict[str, Any], progress: dict[str, Any] | None) -> str:
         return _by_fresh(progress, fall)
     gain = progress["log_density"]
     if progress["confirmed"]:
-        return f"confirmed on stretches of time left out (log density +{gain:.1f}); {fall}"
-    if progress.get("rises"):
-        return f"not decided by dwells left out: {progress['rises']}; {fall}; a fresh run of the same units decides"
-    why = "no judgement is possible" if gain is None else f"log density {gain:+.1f}, more than 4 is needed"
-    return f"not decided by dwells left out: {why}; {fall}; a fresh run of the same units decides"
+        return f"confirmed on stretches of time left out (log density +{gain:.1f}), and the run shows no fault; {fall}"
+    why = progress.get("reason") or "no judgement is possible"
+    told = why if fall in why else f"{why}; {fall}"
+    decides = "a fresh run of the same units decides"
+    if gain is not None and gain > LEFT_OUT:
+        return (
+            f"holds on stretches of time left out (log density +{gain:.1f}), not decided by this run: {told}; {decides}"
+        )
+    return f"not decided by dwells left out: {told}; {decides}"
 
 
 def _by_fresh(progress: dict[str, Any], fall: str) -> str:
@@ -91,15 +96,12 @@ def _by_fresh(progress: dict[str, Any], fall: str) -> str:
         return f"confirmed: {came}; {fall}"
     if progress["confirmed"] is False:
         return f"refuted: {came}; {fall}"
-    if progress.get("rises"):
-        return f"not decided: {came}, but {progress['rises']}; {fall}"
+    if part > CONFIRMED * error:  # the part alone would confirm it
+        return f"not decided: {came}, but {progress.get('reason')}; {fall}; measure another run"
     return f"not decided: {came}; {fall}; measure another run"
 
 
 def _fall(progress: dict[str, Any]) -> str:
     """The decrease of the error with its uncertainty."""
-    fall, error = progress["fall_ug"], progress["fall_u_ug"]
-    if fall is None:
-        return "the error cannot be judged on dwells left out"
-    size = f"{float(f'{abs(fall):.3g}'):g}" if error is None else f"{with_uncertainty(abs(fall), 2.0 * error)} (k = 2)"
-    return f"the error {'falls' if fall >= 0.0 else 'rises'} by {size} µg"
+    fall = progress["fall_ug"]
+    return "the error cannot be judged on dwells left out" if fall is None else fall_of(fall, progress["fall_u_ug"])

@@ -40,6 +40,59 @@ def test_a_gain_in_density_does_not_confirm_an_error_that_rises() -> None:
     assert (better["confirmed"], better["rises"]) == (True, None)
 
 
+def test_a_fall_within_its_uncertainty_is_not_confirmed_by_a_gain_in_density() -> None:
+    before = missed(1e-4, 100.0)
+    once = before.missed["blocks of time"].copy()
+    once[:, :5] *= 0.5  # one stretch of six has the whole fall
+    after = LeftOut({"blocks of time": once}, {"blocks of time": 134.0})
+    evidence = confirmation._by_left_out(before, after)
+    assert evidence["log_density"] == pytest.approx(34.0)
+    assert 0.0 < evidence["fall_ug"] < 2.0 * evidence["fall_u_ug"]
+    assert (evidence["confirmed"], evidence["rises"]) == (None, None)
+    text = text_of(ROW, evidence)
+    assert "no clear fall" in text
+    assert text.count("the error falls by") == 1
+
+
+@pytest.mark.parametrize(("density", "confirmed"), [(120.0, True), (103.0, None)])
+def test_all_kinds_of_dwells_left_out_that_can_judge_have_to_agree(density: float, confirmed: object) -> None:
+    wide, narrow = missed(1e-4, 100.0), missed(0.5e-4, 150.0)
+    before = LeftOut({**wide.missed, "poses": wide.missed["blocks of time"]}, {**wide.density, "poses": 100.0})
+    after = LeftOut({**narrow.missed, "poses": narrow.missed["blocks of time"]}, {**narrow.density, "poses": density})
+    evidence = confirmation._by_left_out(before, after)
+    assert evidence["confirmed"] is confirmed
+    assert ("with poses left out the log density changes by +3.0" in (evidence["reason"] or "")) is (confirmed is None)
+
+
+def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
+    asked: list[str] = []
+
+    def doubt() -> str:
+        asked.append("searched")
+        return "the run has a data fault: units_swapped"
+
+    assert confirmation._by_left_out(missed(1e-4, 100.0), missed(0.5e-4, 101.0), doubt)["confirmed"] is None
+    assert asked == []  # no search where the dwells left out do not decide
+    evidence = confirmation._by_left_out(missed(1e-4, 100.0), missed(0.5e-4, 150.0), doubt)
+    assert (evidence["confirmed"], evidence["reason"], asked) == (None, doubt(), ["searched", "searched"])
+    assert "holds on stretches of time left out (log density +50.0), not decided by this run" in text_of(ROW, evidence)
+
+
+@pytest.mark.parametrize(("error", "confirmed"), [(1e-5, True), (0.6e-4, None), (float("nan"), True)])
+def test_a_fresh_run_does_not_confirm_a_fall_within_its_uncertainty(
+    error: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(confirmation, "estimate", lambda model: model)
+    monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
+    monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
+    change = ReproducedChange(1.0, 0.1, 2e-4, 1e-4, error, "base")
+    monkeypatch.setattr(confirmation, "reproduced_change", lambda *_: change)
+    monkeypatch.setattr(confirmation, "left_out", lambda _: missed(1e-4, 1.0))
+    evidence = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
+    assert evidence["confirmed"] is confirmed
+    assert ("not clearly more than its uncertainty" in text_of(ROW, evidence)) is (confirmed is None)
+
+
 @pytest.mark.parametrize(("left", "confirmed"), [((2e-4, 1e-4), True), ((2e-4, 0.145), None)])
 def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     left: tuple[float, float], confirmed: object, monkeypatch: pytest.MonkeyPatch

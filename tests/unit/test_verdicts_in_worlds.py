@@ -16,7 +16,6 @@ from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import terms_of
 from inertial.criticism.space import Gain
 from inertial.criticism.unseen import unseen
-from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 
@@ -224,26 +223,6 @@ def test_a_column_of_one_dwell_gains_the_same_without_being_whitened():
 
 def test_a_converter_coarser_than_the_noise_is_a_fault():
     assert {fault["fault"] for fault in said(NULLS["lsb5"], SEED)["blocked_by"]} == {"quantised"}
-
-
-def progress(world: World, effect: str, seed: int, *, fresh: bool = True) -> dict:
-    made = make(world, seed)
-    again = (made.fresh, made.fresh_history) if fresh else (None, None)
-    return compare(made.dwells, [*BASE, effect], made.history, *again, before=BASE)["progress"]
-
-
-def test_a_cubic_is_confirmed_where_units_come_up_elsewhere():
-    evidence = progress(World(units=2, turn_on=300.0, hidden=(("third_order", 2.0),)), "third_order", SEED)
-    assert evidence["confirmed"] is True
-    assert evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
-    assert evidence["fall_ug"] > 3.0 * evidence["fall_u_ug"] > 0.0
-
-
-@pytest.mark.parametrize("effect", ["bias_temperature_quadratic", "aging_log", "thermal_hysteresis", "step_change"])
-def test_slow_effects_that_are_not_there_are_not_confirmed(effect):
-    world = World(units=2, noise=Noise(walk=4.0))
-    assert progress(world, effect, SEED)["confirmed"] is not True
-    assert progress(world, effect, SEED, fresh=False)["confirmed"] is None
 
 
 def test_what_carries_a_verdict_is_listed_and_it_stands_without():

@@ -32,6 +32,7 @@ class LadderRow(TypedDict):
     fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
     fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
     confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
+    reason: NotRequired[Annotated[str | None, "why it is not decided; null: it is, or nothing is judged"]]
     text: Annotated[str, "`confirmed` as a sentence"]
     warnings: list[str]
 

@@ -41,6 +41,7 @@ class Confirmation(TypedDict):
     fall_ug: Annotated[float | None, "decrease of the error, µg"]
     fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
     rises: NotRequired[Annotated[str | None, "the error that rises with the effect; null: none"]]
+    reason: NotRequired[Annotated[str | None, "why it is not decided; null: it is"]]
     estimated_again: Annotated[str | None, "coefficients estimated from the fresh run before it is judged"]
     log_density: Annotated[float | None, "gain in log predictive density of the dwells left out"]
 
@@ -85,6 +86,7 @@ class VersionDocument(TypedDict):
     fall_ug: Annotated[float | None, "decrease of the error by what was added, µg"]
     fall_u_ug: Annotated[float | None, "standard uncertainty of the decrease, µg"]
     confirmed: Annotated[bool | None, "whether data that were not fitted confirm the change; null: cannot be decided"]
+    reason: NotRequired[Annotated[str | None, "why it is not decided; null: it is, or nothing is judged"]]
     text: Annotated[str, "`confirmed` as a sentence"]
     warnings: NotRequired[list[str]]
 
