@@ -31,9 +31,7 @@ _STRIDE = 4
 """Eighths of a decade by which own shares are searched: half decades."""
 
 
-def own_shares(
-    problem: "Problem", series: Array, local: Array, space: "Space"
-) -> tuple[tuple[int, float, float], ...]:
+def own_shares(problem: "Problem", series: Array, local: Array, space: "Space") -> tuple[tuple[int, float, float], ...]:
     """Blocks with shares of their own, and these, for the residuals of a model at the lot's shares.
 
     Parameters

@@ -27,7 +27,7 @@ def dwells_with_a_gain_step(units: int, seed: int) -> tuple[pd.DataFrame, pd.Dat
     """A lot whose last unit reads by :data:`PPM` more from the dwell half-way on; its temperatures; the unit."""
     made = make(World(units=units, noise=Noise(white=25.0, flicker=30.0)), 5_700_000 + seed)
     dwells = made.dwells.copy()
-    unit = sorted(dwells["unit"].unique())[-1]
+    unit = max(dwells["unit"].unique())
     later = (dwells["unit"] == unit) & (dwells["dwell"] >= FROM)
     assert 0.3 < later.sum() / (dwells["unit"] == unit).sum() < 0.7
     dwells.loc[later, ["out_x", "out_y", "out_z"]] *= 1.0 + 1e-6 * PPM
