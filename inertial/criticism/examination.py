@@ -24,7 +24,7 @@ from inertial.criticism.loudness import loudness_of
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import terms_of
+from inertial.criticism.refinement import replaced, terms_of
 from inertial.criticism.search import SearchResult, anything, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.term import Term
@@ -108,7 +108,7 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=searched.base.problem.slope)
-        kept = bad_dwells(Model(whole, searched.model.terms, near=searched.model.noise))
+        kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
         if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
             break
         run.removed = kept

@@ -152,6 +152,24 @@ def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
     return terms
 
 
+def replaced(model: Model) -> Model:
+    """A model with the discrete parameters of its effects at the best of their values beside all its other terms.
+
+    Where dwells were left out, all instants of a step between them are equally good; with the dwells back one is best.
+    """
+    terms = list(model.terms)
+    for place, term in enumerate(model.terms):
+        if isinstance(term.effect, Handling):
+            continue
+        found = [p for p in term.effect.parameters(model.problem.lot.state) if p.choices]
+        rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+        for parameter in found:
+            drop = _varied(rest.at(model.noise), model.problem, terms[place], parameter, parameter.grid()).drop
+            best = _with_value(terms[place], parameter, float(parameter.grid()[int(np.argmax(drop))]))
+            terms[place] = _between_choices(rest.at(model.noise), model.problem, best, parameter)
+    return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
+
+
 def settled(model: Model) -> Model:
     """A model with the nonlinear parameters of its terms at the best fit beside all its other terms, at its own noise.
 

@@ -31,13 +31,13 @@ def run(seed: int, units: int = UNITS, poses: int = POSES) -> tuple[pd.DataFrame
     return made.dwells, made.history
 
 
-def jumping(dwells: pd.DataFrame, dwell: int, seed: int) -> pd.DataFrame:
+def jumping(dwells: pd.DataFrame, dwell: int, seed: int, jump_ug: float = JUMP_UG) -> pd.DataFrame:
     """The dwells with a bias that is another from a dwell on, in every axis of every unit."""
     rng, dwells = np.random.default_rng(seed), dwells.copy()
     for unit in dwells["unit"].unique():
         later = (dwells["unit"] == unit) & (dwells["dwell"] >= dwell)
         for axis in "xyz":
-            dwells.loc[later, f"out_{axis}"] += 1e-6 * JUMP_UG * rng.uniform(0.7, 1.3)
+            dwells.loc[later, f"out_{axis}"] += 1e-6 * jump_ug * rng.uniform(0.7, 1.3)
     return dwells
 
 
@@ -94,3 +94,15 @@ def test_a_pose_missed_right_after_a_step_is_still_told(no_next_measurement: Non
     assert any("step_change" in each for each in effects)
     (wrong,) = (group for group in document["classes"] if group["effects"] == ["wrong_pose"])
     assert wrong["dwells"] == [72]
+
+
+@pytest.mark.parametrize(("dwell", "seed"), [(37, 4), (37, 5), (44, 3), (44, 4), (44, 5)])
+def test_dwells_right_before_the_step_of_one_unit_are_not_told_as_bad(
+    dwell: int, seed: int, no_next_measurement: None
+) -> None:
+    # without them every instant between their neighbours is as good: the step had stood before them and kept them bad
+    plain, history = run(seed, 1, 24)
+    document = diagnose(jumping(plain, dwell, seed, 2.0 * JUMP_UG), history)
+    (group,) = document["classes"]
+    assert group["effects"][0] == "step_change"
+    assert document["removed"] is None or document["removed"]["dwells"] == []
