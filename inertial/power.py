@@ -16,12 +16,17 @@ def switched(state: State) -> list[int]:
     return np.flatnonzero(np.any(off > 0.0, axis=0)).tolist()
 
 
+def since_first(state: State) -> Array:
+    """Seconds since the first dwell in time, (..., n), in whatever order the dwells are given; never negative."""
+    return state.time - state.time.min(axis=-1, keepdims=True)
+
+
 def coldness(state: State, tau: float) -> Array:
     """Part of its warmth that each device lacked when it was last switched on, (..., n): one for the first time.
 
     A device cools without power as it warms with it, with ``tau`` s: off for less, it begins where it has not cooled to.
     """
-    since = state.time - state.time[..., :1] if state.since_power is None else state.since_power
+    since = since_first(state) if state.since_power is None else state.since_power
     lacking = np.ones(np.broadcast_shapes(state.time.shape, since.shape))
     cycles = switched(state)
     if not cycles or state.power_off is None:
@@ -40,7 +45,8 @@ def coldness(state: State, tau: float) -> Array:
 def running(state: State) -> Array:
     """Seconds since the first power-on that go on counting while the devices are off, (..., n)."""
     if state.since_power is None:
-        return state.time - state.time[..., :1]
+        return since_first(state)
     if not switched(state):
         return state.since_power
-    return state.since_power[..., :1] + state.time - state.time[..., :1]
+    since = since_first(state)
+    return since + np.where(since == 0.0, state.since_power, np.inf).min(axis=-1, keepdims=True)

@@ -46,6 +46,9 @@ def times_rows(rows: Array, candidate: Candidate) -> Array:
     flat = candidate.columns.reshape(count, n, grid * p)
     if candidate.rows is None:
         product = rows @ flat
+    elif blocks != count * int(np.bincount(candidate.rows, minlength=count).min()):
+        # some blocks of a row are missing: they have a whitener of their own
+        product = rows @ flat[candidate.rows]
     else:
         # the blocks of each row beside each other: one product of matrices for all of them
         order = np.argsort(candidate.rows, kind="stable")

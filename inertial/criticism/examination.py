@@ -24,7 +24,7 @@ from inertial.criticism.loudness import loudness_of
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import terms_of
+from inertial.criticism.refinement import replaced, terms_of
 from inertial.criticism.search import SearchResult, anything, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.term import Term
@@ -116,7 +116,7 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
             break
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=searched.base.problem.slope)
-        kept = bad_dwells(Model(whole, searched.model.terms, near=searched.model.noise))
+        kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
         if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
             break
         run.removed = kept
@@ -145,18 +145,19 @@ def mended(run: ExaminedRun) -> EffectSearch:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
         part = _part(fields, base)
-        searched = search(part.field, part.base, stop=part.imitates)
+        searched, of = search(part.field, part.base, stop=part.imitates), part.field
         if searched.handling is None and part.field is not fields:
             part.base.problem.forget()
             part.base.forget()
             searched = replace(search(fields, base, stop=part.imitates, start=searched.added), ladder=searched.ladder)
+            of = fields
         if part.field is not fields:
             base.forget()
         if searched.handling is None or len(run.handled) >= _MENDED:
             return EffectSearch(base, fields, part, searched)
         if _drifts(run, part, searched.handling):
             continue
-        _mend(run, part.field, searched, searched.handling)
+        _mend(run, of, searched, searched.handling)
 
 
 def _drifts(run: ExaminedRun, part: "LotPart", term: Term) -> bool:
@@ -266,17 +267,21 @@ class LotPart:
 
 
 def _part(field: Candidates, base: Model) -> LotPart:
+    """Some units of a large lot, without those that have a handling error of their own in the model; a small lot as a whole."""
     lot = field.problem.lot
-    if lot.state.time.shape[0] <= _MANY:
+    count = lot.state.time.shape[0]
+    if count <= _MANY:
         return LotPart(field, base)
-    pick = np.linspace(0, lot.state.time.shape[0] - 1, _ENOUGH).round().astype(int)
+    own = {
+        int(np.mean(t.keywords["unit"])) for t in base.terms if isinstance(t.effect, Handling) and "unit" in t.keywords
+    }
+    sound = [unit for unit in range(count) if unit not in own]
+    pick = np.array(sound)[np.linspace(0, len(sound) - 1, min(_ENOUGH, len(sound))).round().astype(int)]
     slope = field.problem.slope
     problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])
     problem.covariance.like(field.problem.covariance)
-    terms = [t for t in base.terms if not isinstance(t.effect, Handling)]
-    return LotPart(
-        Candidates(problem, field.effects, [a for a in field.handling if a.fewest_units > 1]), Model(problem, terms)
-    )
+    terms = [t for t in base.terms if not (isinstance(t.effect, Handling) and "unit" in t.keywords)]
+    return LotPart(Candidates(problem, field.effects, [a for a in field.handling if a.in_part]), Model(problem, terms))
 
 
 def worst(before: LeftOut, after: LeftOut) -> tuple[float, float]:

@@ -27,8 +27,11 @@ def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term
     space = model.at(noise)
     if isinstance(term.effect, Handling):
         return _placed(space, model.problem, term)
-    state = model.problem.lot.state
-    continuous = [p for p in term.effect.parameters(state) if not p.choices]
+    parameters = term.effect.parameters(model.problem.lot.state)
+    for parameter in parameters:
+        if parameter.every:
+            term = _between_choices(space, model.problem, term, parameter)
+    continuous = [p for p in parameters if not p.choices]
     for parameter in continuous:
         term = _refine_one(space, model.problem, term, parameter)
     if not axes or term.shared or model.problem.lot.radial:
@@ -48,6 +51,22 @@ def _placed(space: Space, problem: Problem, term: Term) -> Term:
     pieces = list(problem.pieces(term.effect, near))
     drop = np.concatenate([space.gain(replace(p, key=None)).drop for p in pieces])
     return Term(term.effect, tuple(near[int(np.argmax(drop))].items()))
+
+
+def _between_choices(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
+    """The best of all values of a discrete parameter near its own: between the neighbouring choices of its grid."""
+    value = float(np.mean(term.keywords[parameter.name]))
+    values = parameter.between(value)
+    while values.size:
+        step = -(-values.size // _PLACES)
+        some = values[::step]
+        best = int(np.argmax(_varied(space, problem, term, parameter, some).drop))
+        value = float(some[best])
+        if step == 1:
+            break
+        middle = step * best
+        values = values[max(middle - step + 1, 0) : middle + step]
+    return _with_value(term, parameter, value)
 
 
 def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
@@ -131,6 +150,24 @@ def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
         best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
         terms[place] = refine(rest, best, rest.noise)
     return terms
+
+
+def replaced(model: Model) -> Model:
+    """A model with the discrete parameters of its effects at the best of their values beside all its other terms.
+
+    Where dwells were left out, all instants of a step between them are equally good; with the dwells back one is best.
+    """
+    terms = list(model.terms)
+    for place, term in enumerate(model.terms):
+        if isinstance(term.effect, Handling):
+            continue
+        found = [p for p in term.effect.parameters(model.problem.lot.state) if p.choices]
+        rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+        for parameter in found:
+            drop = _varied(rest.at(model.noise), model.problem, terms[place], parameter, parameter.grid()).drop
+            best = _with_value(terms[place], parameter, float(parameter.grid()[int(np.argmax(drop))]))
+            terms[place] = _between_choices(rest.at(model.noise), model.problem, best, parameter)
+    return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
 
 
 def settled(model: Model) -> Model:

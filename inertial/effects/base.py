@@ -22,6 +22,7 @@ class Nonlinear:
     scale : spacing of the starting grid
     points : size of the starting grid
     choices : for a discrete parameter, its values (bounds and points are then theirs)
+    every : where ``choices`` are only some of its values, all of them in order; a search begins at the choices and ends at these
     """
 
     name: str
@@ -31,6 +32,14 @@ class Nonlinear:
     scale: Literal["log", "linear", "inverse"] = "log"
     points: int = 10
     choices: tuple[float, ...] = ()
+    every: tuple[float, ...] = ()
+
+    def between(self, value: float) -> Array:
+        """All values between the neighbours of a value among the choices, in order; none where the choices are all."""
+        known, every = np.array(self.choices), np.array(self.every)
+        below, above = known[known < value], known[known > value]
+        low, high = (float(v) for v in (max(below, default=-np.inf), min(above, default=np.inf)))
+        return every[(every > low) & (every < high)]
 
     def grid(self) -> Array:
         """Starting values, (points,), in ``unit``."""

@@ -8,6 +8,9 @@ import numpy as np
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
 from inertial.state import State
 
+_GAPS = 120
+"""Gaps between dwells at which a search begins; in a longer run it ends at the best gap near the best of them."""
+
 
 class StepChange(SensorEffect):
     """Bias that jumps once."""
@@ -36,9 +39,14 @@ class StepChange(SensorEffect):
         between = 0.5 * (times[1:] + times[:-1])[1:-1]
         if between.size < 1:
             return (replace(self.nonlinear[0], choices=(float(np.mean(times)),)),)
-        pick = np.unique(np.linspace(0, between.size - 1, min(between.size, 120)).round().astype(int))
+        pick = np.unique(np.linspace(0, between.size - 1, min(between.size, _GAPS)).round().astype(int))
+        some = tuple(between[pick].tolist())
         return (
             replace(
-                self.nonlinear[0], low=float(between[0]), high=float(between[-1]), choices=tuple(between[pick].tolist())
+                self.nonlinear[0],
+                low=float(between[0]),
+                high=float(between[-1]),
+                choices=some,
+                every=tuple(between.tolist()) if between.size > pick.size else (),
             ),
         )

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
-from inertial.power import coldness
+from inertial.power import coldness, since_first
 from inertial.state import State
 
 
@@ -24,7 +24,7 @@ class WarmUp(SensorEffect):
 
     def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
         del axis, nonlinear
-        since = state.time - state.time[..., :1] if state.since_power is None else state.since_power
+        since = since_first(state) if state.since_power is None else state.since_power
         return stack(state, [coldness(state, tau) * np.exp(-since / tau)])
 
     def names(self, axis: int) -> tuple[str, ...]:

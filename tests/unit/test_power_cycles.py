@@ -14,6 +14,7 @@ from inertial.criticism.menus import TableReach, courses
 from inertial.criticism.problem import Lot
 from inertial.criticism.proposals import Proposal
 from inertial.frames import force_from_angles
+from inertial.planning.drivers import drivers_of
 from inertial.planning.reasons import begins_again
 from inertial.planning.sequences import SequenceStep, StationPace, extended
 from inertial.power import coldness, switched
@@ -51,6 +52,29 @@ def test_a_device_that_was_off_for_long_is_cold_and_one_that_was_off_for_a_momen
         cold = coldness(state, 500.0)
         assert cold[0, :40] == pytest.approx(1.0)
         assert cold[0, 40:] == pytest.approx(expected, abs=0.02)
+
+
+# how cold a device was when it was switched on again depends on all cycles before, in their order: no warm-up after a cycle
+@pytest.mark.parametrize(
+    ("name", "powered", "off"),
+    [
+        ("warm_up", True, None), ("warm_up", False, None),
+        ("aging_log", True, None), ("aging_log", False, None), ("aging_log", True, 300.0),
+    ],
+)  # fmt: skip
+def test_time_is_counted_from_the_first_dwell_in_whatever_order_dwells_are_given(name, powered, off):
+    # it had been counted from the dwell given first: below zero for all others, where a logarithm has no value
+    state = run_of() if off is None else switched_off(run_of(), off)
+    state = replace(state, time=state.time + 40.0 * np.arange(3)[:, None])
+    if not powered:
+        state = replace(state, since_power=None, power_off=None)
+    turned = {k: getattr(state, k)[:, ::-1] for k in ("time", "since_power", "force") if getattr(state, k) is not None}
+    effect = catalogue.get(name)
+    here = effect.columns(state, 0, tau=500.0)
+    backward = effect.columns(replace(state, **turned, memory={}), 0, tau=500.0)
+    assert np.isfinite(here).all()
+    assert backward[:, ::-1] == pytest.approx(here)
+    assert drivers_of(state, effect) <= {"time", "since_power"}
 
 
 def test_coldness_through_two_cycles_is_that_of_a_body_that_warms_and_cools():

@@ -34,6 +34,7 @@ class Handling(Effect):
     Attributes
     ----------
     fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
+    in_part : whether some units of a large lot stand for it: it is the same for all, and mended without a look at each
     """
 
     scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -41,6 +42,7 @@ class Handling(Effect):
     typical_ug: ClassVar[tuple[float, float]] = (0.0, float("inf"))
     simplicity: ClassVar[int] = 0
     fewest_units: ClassVar[int] = 2
+    in_part: ClassVar[bool] = True
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:

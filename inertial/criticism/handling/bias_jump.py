@@ -28,6 +28,7 @@ class BiasJump(Handling):
     breaker: ClassVar[str] = "the same poses once more: telegraph noise jumps back, a changed unit stays as it is"
     hides_behind: ClassVar[tuple[str, ...]] = ("step_change",)
     fewest_units: ClassVar[int] = 1
+    in_part: ClassVar[bool] = False
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every axis of every unit at every place in time; none where only a norm is known."""

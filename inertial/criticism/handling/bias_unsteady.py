@@ -26,6 +26,7 @@ class BiasUnsteady(Handling):
     breaker: ClassVar[str] = "the same soaks once more: an effect of the temperature returns, an unsteady bias does not"
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_quadratic", "thermal_hysteresis")
     fewest_units: ClassVar[int] = 1
+    in_part: ClassVar[bool] = False
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every axis of every unit; none where only a norm is known, or with less than three soaks."""

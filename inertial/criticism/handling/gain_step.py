@@ -18,6 +18,7 @@ class GainStep(Handling):
     equation: ClassVar[str] = "g·f·H(t − t0), one unit"
     breaker: ClassVar[str] = "another slot or another reader for the unit"
     fewest_units: ClassVar[int] = 1
+    in_part: ClassVar[bool] = False
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every unit at every place in time."""

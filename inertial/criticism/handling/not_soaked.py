@@ -31,6 +31,7 @@ class NotSoaked(Handling):
     breaker: ClassVar[str] = "soaks until the outputs stand still, or the devices' own thermometers"
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_lag",)
     fewest_units: ClassVar[int] = 1
+    in_part: ClassVar[bool] = False
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Time constants, where the temperature changes."""

@@ -16,6 +16,7 @@ class TableSlip(Handling):
     equation: ClassVar[str] = "(∂f/∂α·εα + ∂f/∂β·εβ)·H(t − t0)"
     breaker: ClassVar[str] = "home the table, and measure a pose of the first half once more"
     hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset",)
+    fewest_units: ClassVar[int] = 1
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every place in time; none if the angles are unknown."""

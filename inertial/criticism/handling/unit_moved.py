@@ -19,6 +19,7 @@ class UnitMoved(Handling):
     breaker: ClassVar[str] = "seat the unit again, and measure a pose of the first half once more"
     hides_behind: ClassVar[tuple[str, ...]] = ("misalignment_temperature",)
     fewest_units: ClassVar[int] = 1
+    in_part: ClassVar[bool] = False
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every unit at every place in time."""

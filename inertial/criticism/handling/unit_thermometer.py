@@ -20,6 +20,7 @@ class UnitThermometer(Exchangeable):
     breaker: ClassVar[str] = "a second thermometer, or a soak at a fourth temperature"
     hides_behind: ClassVar[tuple[str, ...]] = ("scale_temperature_quadratic", "bias_temperature_quadratic")
     fewest_units: ClassVar[int] = 1
+    in_part: ClassVar[bool] = False
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every soak of every unit, if there are more than two soaks."""
