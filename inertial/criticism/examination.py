@@ -87,6 +87,13 @@ class ExaminedRun:
         """Handling errors that are searched."""
         return [a for a in alternatives() if a.id not in self.barred]
 
+    def listen(self) -> None:
+        """Estimate the noise of each soak again: an error that was corrected is none of it."""
+        self.lot = replace(self.lot, loudness=None)
+        loudness = loudness_of(self.model())
+        if loudness is not None:
+            self.lot = replace(self.lot, loudness=loudness)
+
     def model(self) -> Model:
         """The model that is judged, in the lot without its bad dwells; the same object while nothing changes."""
         parts: list[object] = [self.lot, *self.removed, *self.beside]
@@ -106,9 +113,7 @@ class ExaminedRun:
 def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSearch]":
     """A run without bad dwells and handling errors, and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects))
-    loudness = loudness_of(run.model())
-    if loudness is not None:
-        run.lot = replace(lot, loudness=loudness)
+    run.listen()
     run.removed = bad_dwells(run.model())
     searched = mended(run)
     for _ in range(_TURNS):
@@ -198,6 +203,8 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
         run.beside.append(term)
     else:
         run.lot = lot
+    if run.lot.loudness is not None:
+        run.listen()
 
 
 def _misfit(model: Model, richer: Model) -> Misfit:

@@ -26,6 +26,9 @@ _LEFT = 0.25
 _TOGETHER = 4
 """Units from which on their median at a dwell is what they do together."""
 
+_DRIFTS = 16
+"""Dwells of a soak from which on a curved drift over it is taken off."""
+
 _FEWEST = 4
 """Dwells of a soak from which on it has a scatter."""
 
@@ -62,13 +65,14 @@ def _of_soak(model: Model, places: NDArray[np.intp]) -> Array:
     problem, covariance = model.problem, model.problem.covariance
     there = covariance.there[:, places]
     force = np.broadcast_to(problem.lot.state.force, (*problem.lot.state.time.shape, 3))[:, places]
+    time = problem.lot.state.time[:, places]
     left = np.full((problem.blocks, places.size), np.nan)
     expected = np.full(problem.blocks, np.nan)
     for block in range(problem.blocks):
         own = there[block]
         if np.count_nonzero(own) < _FEWEST:
             continue
-        x = _columns(force[block // 3][own])
+        x = _columns(force[block // 3][own], time[block // 3][own])
         if x is None:
             continue
         q = np.linalg.qr(x)[0]
@@ -94,11 +98,16 @@ def _of_soak(model: Model, places: NDArray[np.intp]) -> Array:
     return np.where((count >= _FEWEST) & (expected > 0.0), ratio, np.nan)
 
 
-def _columns(force: Array) -> Array | None:
-    """Columns (k, p) of a soak: products of force up to the largest degree that leaves enough; None where none does."""
+def _columns(force: Array, time: Array) -> Array | None:
+    """Columns (k, p) of a soak: a drift, and products of force up to the largest degree that leaves enough; None where none does.
+
+    A device that had not soaked drifts over the soak: that is no noise.
+    """
     best = None
+    since = (time - time.min()) / max(float(np.ptp(time)), 1e-9)
+    drift = [since, since**2, since**3] if len(time) >= _DRIFTS else [since] if len(time) > 2 * _FEWEST else []
     for degree in (1, 2, 3):
-        columns = [np.ones(len(force))]
+        columns = [np.ones(len(force)), *drift]
         for order in range(1, degree + 1):
             columns += [
                 np.prod(force[:, list(which)], axis=1) for which in combinations_with_replacement(range(3), order)
