@@ -16,7 +16,7 @@ from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.freedom import refuse_without_freedom
 from inertial.criticism.handling import alternatives
-from inertial.criticism.handling.base import Exchangeable, Handling, Misfit
+from inertial.criticism.handling.base import Exchangeable, Handling, Misfit, soaks
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
@@ -73,6 +73,7 @@ class ExaminedRun:
     """A lot under examination: the corrections so far, and the terms that stay in the model beside the judged effects.
 
     barred : alternatives that only imitate a drift, and are not searched again
+    soak : (n,), number of the soak of each dwell, as measured
     """
 
     lot: Lot
@@ -81,6 +82,7 @@ class ExaminedRun:
     handled: list[Named] = field(default_factory=list[Named])
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
     barred: set[str] = field(default_factory=set[str])
+    soak: NDArray[np.intp] | None = None
     _made: tuple[list[object], Model] | None = None
 
     def alternatives(self) -> list[Handling]:
@@ -90,7 +92,9 @@ class ExaminedRun:
     def listen(self) -> None:
         """Estimate the noise of each soak again: an error that was corrected is none of it."""
         self.lot = replace(self.lot, loudness=None)
-        loudness = loudness_of(self.model())
+        if self.soak is None:
+            self.soak = soaks(self.lot.state)  # a correction of temperatures changes none of the soaks
+        loudness = loudness_of(self.model(), self.soak)
         if loudness is not None:
             self.lot = replace(self.lot, loudness=loudness)
 

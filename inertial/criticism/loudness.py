@@ -33,12 +33,17 @@ _FEWEST = 4
 """Dwells of a soak from which on it has a scatter."""
 
 
-def loudness_of(model: Model) -> Array | None:
-    """Standard deviation of the noise of each dwell over the lot's, (n,), mean square one; None where soaks do not differ."""
+def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | None:
+    """Standard deviation of the noise of each dwell over the lot's, (n,), mean square one; None where soaks do not differ.
+
+    Parameters
+    ----------
+    soak : (n,), number of the soak of each dwell, where the temperatures of the model are not those that tell it
+    """
     problem = model.problem
     if problem.lot.radial or problem.n > LONGEST or problem.lot.state.temperature is None:
         return None
-    soak = soaks(problem.lot.state)
+    soak = soaks(problem.lot.state) if soak is None else soak
     members = [np.flatnonzero(soak == k) for k in range(int(soak.max()) + 1)]
     members = [places for places in members if places.size >= _FEWEST]
     if len(members) < 2:
