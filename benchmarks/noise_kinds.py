@@ -12,7 +12,7 @@ sys.path[:0] = [str(HERE), str(HERE / "worlds"), str(HERE.parent)]
 from decision_parts import run_of  # noqa: E402
 from noise import Noise  # noqa: E402
 from scipy import stats  # noqa: E402
-from tables import NULLS  # noqa: E402
+from tables import NOISES, NULLS  # noqa: E402
 from world import World  # noqa: E402
 
 SEED = 43_700_000
@@ -46,5 +46,9 @@ def louder(runs: int, first: int) -> Iterator[str]:
         (("hot_x2",), "lots whose fast noise grows by two"),
         (("hot_x4",), "lots whose fast noise grows by four"),
     ):
-        lots = [loudness_of(run_of(NULLS[name], SEED + first + seed).model()) for name in names for seed in range(runs)]
+        lots = [
+            loudness_of(run_of({**NULLS, **NOISES}[name], SEED + first + seed).model())
+            for name in names
+            for seed in range(runs)
+        ]
         yield f"{told}: {rate(sum(one is not None for one in lots), len(lots))} have a noise for each soak"

@@ -33,6 +33,8 @@ NULLS: dict[str, World] = {
     "lengths": World(durations=(2.0, 60.0)),
     "rest20": World(rest=20.0),
     "lsb5": World(noise=Noise(white=50.0, flicker=5.0), lsb=5.0),
+}
+NOISES: dict[str, World] = {
     "hot_x2": World(noise=Noise(hot=100.0)),
     "hot_x4": World(noise=Noise(hot=50.0)),
     "hot_x4_one_unit": World(units=1, noise=Noise(hot=50.0)),
@@ -42,6 +44,8 @@ NULLS: dict[str, World] = {
     "telegraph_3000s": World(noise=Noise(telegraph=(150.0, 3000.0, 0.3))),
     "telegraph_two_units": World(units=2, noise=Noise(telegraph=(150.0, 900.0, 0.5))),
 }
+"""Noise that differs within a run: louder in the heat, or axes that jump between two levels, which is told as a jump."""
+
 FAULTS: dict[str, World] = {
     "dwell_0.3mg": World(fault="bad_dwell", amount=0.3),
     "dwell_0.5mg": World(fault="bad_dwell", amount=0.5),
@@ -92,7 +96,7 @@ HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name 
 HIDDEN |= {f"adc_nonlinearity_{size:g}": World(hidden=(("adc_nonlinearity", size),)) for size in (1.0, 2.0, 5.0)}
 HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
 HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
-TABLES = {"nulls": NULLS, "faults": FAULTS, "small": SMALL, "hidden": HIDDEN}
+TABLES = {"nulls": NULLS, "noises": NOISES, "faults": FAULTS, "small": SMALL, "hidden": HIDDEN}
 WRONG = (
     "bias_temperature_quadratic", "scale_temperature_quadratic", "aging_linear", "aging_log", "step_change", "warm_up",
     "thermal_hysteresis", "third_order", "cross_coupling",

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from inertial.criticism.comparison import estimate
 from inertial.criticism.decisions import LOUDER_BELOW
 from inertial.criticism.handling.base import soaks
 from inertial.criticism.model import Model
@@ -48,7 +49,11 @@ def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | N
     members = [places for places in members if places.size >= _FEWEST]
     if len(members) < 2:
         return None
-    ratios = np.stack([_of_soak(model, places) for places in members], axis=1)
+    fitted = estimate(model)
+    series = problem.y - np.einsum("bnp,bp->bn", model.local, fitted.local)
+    if model.shared.shape[-1]:
+        series = series - model.shared @ fitted.shared
+    ratios = np.stack([_of_soak(model, series, places) for places in members], axis=1)
     ratios = ratios[np.isfinite(ratios).all(axis=1)]
     if len(ratios) < 2:
         return None
@@ -65,7 +70,7 @@ def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | N
     return loud / np.sqrt(np.mean(loud**2))
 
 
-def _of_soak(model: Model, places: NDArray[np.intp]) -> Array:
+def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
     """Logarithm (blocks,) of the robust variance of a soak's residuals over that of the model's noise; NaN if none."""
     problem, covariance = model.problem, model.problem.covariance
     there = covariance.there[:, places]
@@ -81,7 +86,7 @@ def _of_soak(model: Model, places: NDArray[np.intp]) -> Array:
         if x is None:
             continue
         q = np.linalg.qr(x)[0]
-        y = problem.y[block, places[own]]
+        y = series[block, places[own]]
         left[block, own] = y - q @ (q.T @ y)
         v = covariance.of_dwells(block, model.noise, places[own])
         expected[block] = (np.trace(v) - np.trace(q.T @ v @ q)) / np.count_nonzero(own)

@@ -16,7 +16,7 @@ from pipelines.tables.dwells import lot_of, measured
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
 
 from noise import Noise
-from tables import NULLS
+from tables import NOISES, NULLS
 from world import World, make
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
@@ -66,7 +66,7 @@ def test_equal_axes_have_the_shares_of_their_lot() -> None:
 
 
 def test_noise_that_grows_with_temperature_is_known_for_each_soak() -> None:
-    run = run_of(NULLS["hot_x4"], 0)
+    run = run_of(NOISES["hot_x4"], 0)
     loud = loudness_of(run.model())
     assert loud is not None
     warm = np.median(run.lot.state.temperature, axis=0)
@@ -84,7 +84,7 @@ def test_soaks_of_equal_noise_are_not_told_apart(name: str) -> None:
 def test_noise_that_grows_with_temperature_is_no_physics() -> None:
     # what is slower than a soak does not grow with it: of lots whose fast noise grows fourfold, one of sixteen is still misjudged
     names_ = ("hot_x2", "hot_x4", "hot_x4_one_unit", "hot_white_x4")
-    made = [make(NULLS[name], SEED + 40 + seed) for name in names_ for seed in range(3)]
+    made = [make(NOISES[name], SEED + 40 + seed) for name in names_ for seed in range(3)]
     named = [physics_alone(diagnose(one.dwells, one.history)) for one in made]
     assert sum(bool(one) for one in named) <= 1
 
@@ -92,7 +92,7 @@ def test_noise_that_grows_with_temperature_is_no_physics() -> None:
 @pytest.mark.parametrize("name", ["telegraph_200s", "telegraph_900s", "telegraph_3000s", "telegraph_two_units"])
 @pytest.mark.parametrize("seed", range(3))
 def test_telegraph_noise_of_some_axes_is_no_physics(name: str, seed: int) -> None:
-    made = make(NULLS[name], SEED + 60 + seed)
+    made = make(NOISES[name], SEED + 60 + seed)
     assert physics_alone(diagnose(made.dwells, made.history)) == []
 
 
