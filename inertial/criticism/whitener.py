@@ -37,7 +37,7 @@ class DwellProfile:
 
     def louder(self, kernel: Array) -> Array:
         """A covariance of wander (n, n), as loud as the dwells."""
-        if isinstance(self.loudness, float):
+        if not isinstance(self.loudness, np.ndarray):
             return kernel
         return kernel * (self.loudness[:, None] * self.loudness)
 

@@ -141,7 +141,7 @@ def _grade(job: Job, run: Run) -> Tables:
     readings = run.table("readings").drop_duplicates("unit")
     full_scale = dict(zip(readings["unit"].astype(str), readings["full_scale"].astype(float), strict=True))
     tables = {name: run.table(name) for name in _EVIDENCE}
-    evidence = GradeEvidence(**tables, full_scale=full_scale, calibration=None)
+    evidence = GradeEvidence(**tables, full_scale=full_scale, calibration=None, budget=None)
     return grade(evidence, job.limits, job.recipe.zero_output, tumbles=job.recipe.tumbles)
 
 
