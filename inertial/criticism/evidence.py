@@ -37,7 +37,7 @@ POWER = 0.5
 """Detection probability of the smallest cubic term."""
 
 _LEVEL = 0.05
-_LARGEST = 1.0  # g/g³
+_SMALLEST, _LARGEST = 1e-9, 1.0  # g/g³
 
 
 @dataclass(frozen=True)
@@ -187,6 +187,6 @@ def _cubic(model: Model, field: Candidates) -> float | None:
     def excess(size: float) -> float:
         return float(noncentral_f_tail(limit, rank, left, size**2 * float(power.min()))) - POWER
 
-    if not power.size or excess(_LARGEST) <= 0.0:
+    if not power.size or excess(_LARGEST) <= 0.0 or excess(_SMALLEST) >= 0.0:
         return None
-    return root(excess, 1e-9, _LARGEST)
+    return root(excess, _SMALLEST, _LARGEST)

@@ -12,7 +12,6 @@ from inertial.criticism.left_out import left_out
 from inertial.criticism.problem import Problem
 from inertial.criticism.reproduced_change import reproduced_change
 from pipelines.diagnosis.result_rows import known
-from pipelines.procedures.wording import with_uncertainty
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -134,6 +133,8 @@ def _disagreement(gains: Mapping[Kind, float], falls: Mapping[Kind, tuple[float,
 
 def fall_of(fall: float, error: float | None) -> str:
     """The decrease of an error, µg, with its standard uncertainty, as text."""
+    from pipelines.procedures.wording import with_uncertainty  # its room loads every procedure
+
     size = f"{float(f'{abs(fall):.3g}'):g}" if error is None else f"{with_uncertainty(abs(fall), 2.0 * error)} (k = 2)"
     return f"the error {'falls' if fall >= 0.0 else 'rises'} by {size} µg"
 

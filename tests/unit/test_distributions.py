@@ -111,3 +111,12 @@ def test_a_diagnosis_loads_no_library_that_it_does_not_need(tmp_path: Path) -> N
     assert status in {"0", "1"}
     assert "scipy.linalg" in loaded
     assert not set(loaded) & {"scipy.stats", "scipy.optimize", "scipy.sparse", "scipy.signal", "matplotlib"}
+
+
+@pytest.mark.parametrize("noncentrality", [1e3, 1e5, 1e6, 1e8, 1e12])
+@pytest.mark.parametrize("dof", [10, 105, 500])
+def test_a_large_noncentrality_is_exceeded_for_certain(noncentrality: float, dof: int) -> None:
+    # of a plan without much noise: the smallest detected cubic was no number, and the diagnosis ended with a defect
+    tail = float(own.noncentral_f_tail(2.5, 24, dof, noncentrality))
+    assert tail == pytest.approx(1.0, abs=1e-6)
+    assert np.isnan(own.noncentral_f_tail(2.5, 24, dof, np.nan))
