@@ -136,21 +136,25 @@ def _coarse_step(readings: Readings, unit: int, axis: int) -> float | None:
 
 def _without_drivers(readings: Readings, unit: int, there: NDArray[np.bool_], values: Array) -> Array:
     """Values of the dwells that are there, less their mean and what follows the temperature or the time."""
-    drivers = [readings.time[unit]]
-    drivers += [v[unit] for v in (readings.temperature, readings.chamber) if v is not None]
-    columns = [np.ones(values.size)]
-    for driver in drivers:
+    warm = readings.temperature if readings.temperature is not None else readings.chamber
+    drivers = [readings.time[unit], *([] if warm is None else [warm[unit]])]
+    unit_ranges: list[Array] = []
+    for driver in reversed(drivers):
         own = driver[there]
         if np.isfinite(own).all() and np.ptp(own) > 0.0:
-            unit_range = 2.0 * (own - own.min()) / np.ptp(own) - 1.0
-            columns += [unit_range**k for k in range(1, _DEGREE + 1)]
-    x = np.stack(columns, axis=1)
+            unit_ranges.append(2.0 * (own - own.min()) / np.ptp(own) - 1.0)
+    powers = [own**k for k in range(1, _DEGREE + 1) for own in unit_ranges]
+    # few dwells: many columns would take up the steps of a converter, too
+    x = np.stack([np.ones(values.size), *powers[: values.size // _DWELLS_EACH]], axis=1)
     left: Array = values - x @ np.linalg.lstsq(x, values, rcond=1e-9)[0]
     return left
 
 
 _DEGREE = 4
 """Degree of the polynomial of a driver that the scatter of dwells may follow."""
+
+_DWELLS_EACH = 8
+"""Dwells for each column of these."""
 
 _MOST_STEPS = 20_000
 """Steps over the range of the means beyond which the step cannot be estimated from these dwells."""
