@@ -24,7 +24,7 @@ sys.path[:0] = [str(HERE), str(HERE / "worlds"), str(HERE.parent)]
 
 import noise_kinds  # noqa: E402
 import numpy as np  # noqa: E402
-from decision_parts import BASE, PARTS, lines, run_of  # noqa: E402
+from decision_parts import BASE, PARTS, lines, rate, run_of  # noqa: E402
 from noise import Noise  # noqa: E402
 from scipy import stats  # noqa: E402
 from search_parts import SEARCH_PARTS  # noqa: E402
@@ -37,12 +37,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 SEED = 66_000_000
-
-
-def rate(hits: int, runs: int) -> str:
-    """A rate with its Clopper-Pearson interval."""
-    limits = stats.binomtest(hits, runs).proportion_ci(0.95, "exact")
-    return f"{hits} of {runs} [{limits.low:.2g}, {limits.high:.2g}]"
 
 
 def shares(runs: int, first: int) -> Iterator[str]:

@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from decisions import changed
+from scipy import stats
 from tables import HIDDEN, NULLS
 from world import World, make
 
@@ -32,6 +33,12 @@ FACTORS = (0.5, 1.0, 2.0)
 
 
 @lru_cache(maxsize=32)
+def rate(hits: int, runs: int) -> str:
+    """A rate with its Clopper-Pearson interval."""
+    limits = stats.binomtest(hits, runs).proportion_ci(0.95, "exact")
+    return f"{hits} of {runs} [{limits.low:.2g}, {limits.high:.2g}]"
+
+
 def run_of(world: World, seed: int) -> ExaminedRun:
     """A lot with its model, bad dwells left out."""
     from inertial.criticism.bad_dwells import bad_dwells

@@ -9,20 +9,13 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE / "worlds"), str(HERE.parent)]
 
-from decision_parts import run_of  # noqa: E402
+from decision_parts import rate, run_of  # noqa: E402
 from noise import Noise  # noqa: E402
-from scipy import stats  # noqa: E402
 from tables import NOISES, NULLS  # noqa: E402
 from world import World  # noqa: E402
 
 SEED = 43_700_000
 EQUAL = ("B30", "K4", "white", "B300", "t3", "units_spread", "rest20")
-
-
-def rate(hits: int, runs: int) -> str:
-    """A rate with its Clopper-Pearson interval."""
-    low, high = stats.binomtest(hits, runs).proportion_ci(0.95, "exact")
-    return f"{hits} of {runs} [{low:.4f}, {high:.4f}] (95 %)"
 
 
 def own_shares(runs: int, first: int) -> Iterator[str]:

@@ -334,8 +334,8 @@ class Covariance:
         """Covariance (k, k), g², of some dwells of a block."""
         place, steps = self.group_of(block)
         kernel = self._kernels[place]
-        covariance = np.diag(kernel.white**2)
-        for share, each in zip((noise.shares.flicker, noise.shares.walk), self._wander or (), strict=False):
+        covariance, shares = np.diag(kernel.white**2), noise.shares.of_block(block)
+        for share, each in zip((shares.flicker, shares.walk), self._wander or (), strict=False):
             covariance = covariance + share * 10.0 ** (steps / SHARE_STEP) * kernel.louder(each[place])
         return covariance[np.ix_(dwells, dwells)] * float(self.level[block] * noise.scale[block]) ** 2
 

@@ -178,12 +178,13 @@ def _drifts(run: ExaminedRun, part: "LotPart", term: Term) -> bool:
     before = [t for t in run.beside if t.effect.id == term.effect.id and "unit" not in t.keywords]
     if not before or "unit" in term.keywords:
         return False
-    others = [t for t in part.base.terms if all(t is not one for one in before)]
+    keys = {t.key for t in before}
+    others = [t for t in part.base.terms if t.key not in keys]
     base = Model(part.field.problem, others, near=part.base.noise)
     if better_curve(base, [*before, term], part.suspected) is None:
         return False
     run.barred.add(term.effect.id)
-    run.beside = [t for t in run.beside if t not in before]
+    run.beside = [t for t in run.beside if t.key not in keys]
     run.handled = [one for one in run.handled if one.effects.members[0].term.effect.id != term.effect.id]
     return True
 

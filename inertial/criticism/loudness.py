@@ -11,13 +11,13 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc
 
 from inertial.criticism.comparison import estimate
 from inertial.criticism.decisions import LOUDER_BELOW
 from inertial.criticism.handling.base import soaks
 from inertial.criticism.model import Model
 from inertial.criticism.noise import LONGEST
+from inertial.distributions import f_tail
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | N
     between = len(ratios) * float(np.sum(each.mean(axis=0) ** 2)) / (len(members) - 1)
     dof = (len(ratios) - 1) * (len(members) - 1)
     inside = float(np.sum((each - each.mean(axis=0)) ** 2)) / dof
-    if fdtrc(len(members) - 1, dof, between / max(inside, 1e-12)) > LOUDER_BELOW:
+    if float(f_tail(between / max(inside, 1e-12), len(members) - 1, dof)) > LOUDER_BELOW:
         return None
     loud = np.ones(problem.n)
     for places, value in zip(members, by_soak, strict=True):

@@ -24,6 +24,10 @@ class Shares(NamedTuple):
         """Those of the lot, without blocks that have their own."""
         return Shares(self.flicker, self.walk)
 
+    def of_block(self, block: int) -> "Shares":
+        """Those of one block: its own, or the lot's."""
+        return next((Shares(flicker, walk) for own, flicker, walk in self.own if own == block), self.common)
+
     def pick(self, blocks: list[int]) -> "Shares":
         """The shares of some blocks, numbered as they are given."""
         if not self.own:

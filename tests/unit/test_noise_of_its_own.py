@@ -41,6 +41,7 @@ def physics_alone(document: dict) -> list[list[str]]:
 def test_shares_of_some_blocks_keep_those_of_their_own() -> None:
     shares = Shares(1.0, 2.0, own=((1, 10.0, 20.0), (4, 30.0, 0.0)))
     assert shares.common == Shares(1.0, 2.0)
+    assert (shares.of_block(4), shares.of_block(0)) == (Shares(30.0, 0.0), Shares(1.0, 2.0))
     assert shares.pick([4, 0, 1]) == Shares(1.0, 2.0, own=((0, 30.0, 0.0), (2, 10.0, 20.0)))
     assert shares.pick([0, 2]) == Shares(1.0, 2.0)
     assert shares.times(2.0, 3.0) == Shares(2.0, 6.0, own=((1, 20.0, 60.0), (4, 60.0, 0.0)))

@@ -51,4 +51,7 @@ class BiasUnsteady(Handling):
         """The axis and its changes."""
         del lot
         by_soak = ", ".join(f"{1e6 * v:+.0f}" for v in size)
-        return f"the bias of axis {AXES[int(place['axis'])]} of the unit is another in every soak ({by_soak} µg to the first)"
+        axis = AXES[int(place["axis"])]
+        return (
+            f"the bias of axis {axis} of the unit differs from soak to soak ({by_soak} µg relative to the first soak)"
+        )
