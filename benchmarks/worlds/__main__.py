@@ -1,4 +1,4 @@
-"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults small hidden loop scenes part --runs 10`.
+"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults small hidden outside loop scenes part --runs 10`.
 
 Prints for every world how many runs were called inadequate, named physics, and told the fault that was made, each with its 95 %
 Clopper-Pearson interval. `--seeds development` are for setting constants, `judging` (the default) only for measuring.
@@ -27,6 +27,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
 
 import part  # noqa: E402
+from physics import OUTSIDE  # noqa: E402
 from scipy import stats  # noqa: E402
 from tables import LOOP, RIGHT, TABLES, WRONG  # noqa: E402
 from world import Made, World, make  # noqa: E402
@@ -78,7 +79,8 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         "found": all(any(_agrees(told, *one) for one in said) for told in made.faults) if made.faults else None,
         "false": [(sorted(one[0]), *one[1:]) for one in said if not any(_agrees(told, *one) for told in made.faults)],
         "first": bool(groups) and bool(own & set(groups[0]["effects"])),
-        "held": all(any(name in g["effects"] for g in groups) for name in own) if own else None,
+        "outside": bool(own & set(OUTSIDE)),
+        "held": all(any(name in g["effects"] for g in groups) for name in own) if own - set(OUTSIDE) else None,
         "alone": len(physics) == len(own) and not any(g.get("scope") in DATA for g in groups) if own else None,
         "p": document["error"]["p_value"],
         "hidden": [list(own)],
@@ -194,6 +196,9 @@ def _line(name: str, rows: list[dict[str, Any]]) -> str:
         parts.append(
             f"in class {interval(sum(r['held'] for r in whole), n)}, exact {sum(r['held'] and r['alone'] for r in whole)}"
         )
+    if whole[0]["outside"]:
+        parts.append(f"a fault told {interval(sum(bool(_other(r)) for r in whole), n)}")
+        parts.append(f"unexplained {interval(sum(r['unexplained'] for r in whole), n)}")
     told = Counter("+".join("|".join(e) for e in r["named"]) or "-" for r in whole)
     faults = Counter(b[0] for r in whole for b in r["blocked"])
     parts.append("; ".join(f"{k} ×{v}" for k, v in told.most_common(6)) + (f" {dict(faults)}" if faults else ""))

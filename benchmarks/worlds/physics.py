@@ -187,6 +187,65 @@ def converter(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     return lambda s: size * np.sin(2.0 * np.pi * s.output / period + phase)
 
 
+def _of_scale(course: Callable[[Any], Floats]) -> Callable[..., Effect]:
+    """Scale factors that follow a course in time or temperature, (units, n)."""
+
+    def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+        del scene
+        size = _sizes(rng, units)[..., 0]
+        return lambda s: size[:, None] * course(s)[..., None] * s.force
+
+    return draw
+
+
+def _of_axes(course: Callable[[Any], Floats]) -> Callable[..., Effect]:
+    """Axes of each unit that turn by a course in time or temperature, (units, n)."""
+
+    def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+        del scene
+        size = _sizes(rng, units, 2)
+
+        def effect(s: Any) -> Floats:
+            f, now = s.force, course(s)
+            return np.stack([
+                now * (size[:, i, :1] * f[:, (i + 1) % 3] + size[:, i, 1:] * f[:, (i + 2) % 3]) for i in range(3)
+            ], axis=-1)  # fmt: skip
+
+        return effect
+
+    return draw
+
+
+def fixture_bends(rng: np.random.Generator, units: int, scene: Any) -> Effect:
+    """A fixture of two metals that turns all units by the square of the temperature's distance from that of its assembly."""
+    del scene
+    way = rng.standard_normal(3)
+
+    def effect(s: Any) -> Floats:
+        bend = ((s.chamber - 25.0) / 35.0) ** 2  # (units, n)
+        return bend[..., None] * np.cross(way, s.force)[None]
+
+    return effect
+
+
+def _warming(s: Any) -> Floats:
+    """What is still missing after power-on, (1, n)."""
+    return np.exp(-s.start / 1500.0)[None]
+
+
+def _warm(s: Any) -> Floats:
+    return (s.temperature - 25.0) / 35.0
+
+
+OUTSIDE: dict[str, Callable[..., Effect]] = {
+    "scale_warms_up": _of_scale(_warming),
+    "axes_warm_up": _of_axes(_warming),
+    "axes_bend_with_heat": _of_axes(lambda s: _warm(s) ** 2),
+    "cubic_with_heat": _of_temperature(lambda w, f: w * f**3),
+    "fixture_bends": fixture_bends,
+}
+"""Physics that the catalogue does not have."""
+
 PHYSICS: dict[str, Callable[..., Effect]] = {
     "third_order": _of_force(lambda f: f**3),
     "odd_quadratic": _of_force(lambda f: f * np.abs(f)),
@@ -204,4 +263,5 @@ PHYSICS: dict[str, Callable[..., Effect]] = {
     "creep_after_move": creep_after_move,
     "level_error": level_error,
     "adc_nonlinearity": converter,
+    **OUTSIDE,
 }

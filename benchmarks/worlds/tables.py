@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import physics
 from noise import Noise
 from world import World
 
@@ -70,6 +71,7 @@ FAULTS |= {
     "dwell_and_pose": World(fault="bad_dwell", amount=1.0, beside=(("wrong_pose", 0.1),)),
     "dwell_and_thermometer": World(fault="bad_dwell", amount=1.0, beside=(("thermometer", 0.5),)),
     "moved_and_thermometer": World(fault="unit_moved", amount=0.2, beside=(("thermometer", 0.5),)),
+    "slip_and_moved": World(fault="table_slip", amount=0.7, beside=(("unit_moved", 0.5),)),
     "pose_and_moved": World(fault="wrong_pose", amount=0.1, beside=(("unit_moved", 0.2),)),
 }
 """What goes wrong, one at a time and two at once."""
@@ -96,7 +98,10 @@ HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name 
 HIDDEN |= {f"adc_nonlinearity_{size:g}": World(hidden=(("adc_nonlinearity", size),)) for size in (1.0, 2.0, 5.0)}
 HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
 HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
-TABLES = {"nulls": NULLS, "noises": NOISES, "faults": FAULTS, "small": SMALL, "hidden": HIDDEN}
+OUTSIDE = {f"{name}_{size:g}": World(hidden=((name, size),)) for size in (1.0, 2.0, 5.0) for name in physics.OUTSIDE}
+OUTSIDE |= {f"{name}_2_two_units": World(units=2, hidden=((name, 2.0),)) for name in physics.OUTSIDE}
+"""Physics outside the catalogue: to be told unexplained, with what it follows, and no effect or fault in its place."""
+TABLES = {"outside": OUTSIDE, "nulls": NULLS, "noises": NOISES, "faults": FAULTS, "small": SMALL, "hidden": HIDDEN}
 WRONG = (
     "bias_temperature_quadratic", "scale_temperature_quadratic", "aging_linear", "aging_log", "step_change", "warm_up",
     "thermal_hysteresis", "third_order", "cross_coupling",

@@ -30,40 +30,49 @@ class CurveFit:
     cost: float
 
 
-def fit_curve(model: Model, driver: str, candidate: Candidate) -> CurveFit:
-    """The best common curve of a driver added to a model, with the noise estimated again."""
+def fit_curve(model: Model, driver: str, candidate: Candidate, ways: int = 1) -> CurveFit:
+    """The best common curve of a driver added to a model, with the noise estimated again.
+
+    Parameters
+    ----------
+    ways : ways in which each block feels the curve, with a size for each: the candidate's columns are those of the curve for the
+        first way, then those for the second
+    """
     if candidate.shared:
         fitted = model.with_shared_curves(candidate.of_blocks[:, :, 0, :])
         return CurveFit(driver, fitted, fitted.space.shared_rank, cost_of_model(fitted))
     noise, fitted, rank = model.noise, model, 0
     for _ in range(2):
-        column, rank = _curve(model.at(noise), candidate)
-        fitted = model.with_curves(column)
+        columns, rank = _curve(model.at(noise), candidate, ways)
+        fitted = model.with_curves(columns)
         noise = fitted.noise
-    shape = rank - model.problem.blocks
+    shape = rank - ways * model.problem.blocks
     return CurveFit(driver, fitted, rank, cost_of_model(fitted) + PER_COEFFICIENT * shape)
 
 
-def _curve(space: Space, candidate: Candidate) -> tuple[Array, int]:
-    """Column (blocks, n, 1) of the common curve that reduces the residual most, and its number of coefficients."""
-    whole = candidate.of_blocks[:, :, 0, :]
-    white = space.whiten(whole)
-    free = space.project(white)
-    even = _evened(np.einsum("bnp,bnr->pr", free, free), np.sqrt(np.einsum("bnp,bnp->p", white, white)))
-    whole, free = whole @ even, free @ even
+def _curve(space: Space, candidate: Candidate, ways: int) -> tuple[Array, int]:
+    """Columns (blocks, n, ways) of the common curve that reduces the residual most, and its number of coefficients."""
+    flat = candidate.of_blocks[:, :, 0, :]
+    blocks, n = flat.shape[:2]
+    white = space.whiten(flat)
+    whole, white, free = (a.reshape(blocks, n, ways, -1) for a in (flat, white, space.project(white)))
+    even = _evened(np.einsum("bnwp,bnwr->pr", free, free), np.sqrt(np.einsum("bnwp,bnwp->p", white, white)))
+    whole = whole @ even
+    free = (free @ even).reshape(blocks, n, -1)
     gram = np.swapaxes(free, -1, -2) @ free
-    right = np.einsum("bnp,bn->bp", free, space.residual)
-    ridge = 1e-9 * np.eye(gram.shape[-1])
+    right = np.einsum("bnq,bn->bq", free, space.residual)
     own = np.linalg.solve(gram + 1e-6 * np.eye(gram.shape[-1]), right[..., None])[..., 0]
-    shape = np.linalg.svd(own, full_matrices=False)[2][0].astype(
-        np.float64
-    )  # the leading direction of the blocks' own curves
+    count = even.shape[-1]
+    gram, right = gram.reshape(blocks, ways, count, ways, count), right.reshape(blocks, ways, count)
+    # the leading direction of the own curves of every block and way
+    shape = np.linalg.svd(own.reshape(-1, count), full_matrices=False)[2][0].astype(np.float64)
     for _ in range(_TURNS):
-        inner = np.einsum("p,bpr,r->b", shape, gram, shape)
-        size = np.where(inner > 1e-12, np.einsum("bp,p->b", right, shape) / np.where(inner > 1e-12, inner, 1.0), 0.0)
-        shape = np.linalg.solve(np.einsum("b,bpr->pr", size**2, gram) + ridge, np.einsum("b,bp->p", size, right))
+        inner = np.einsum("p,bwpvr,r->bwv", shape, gram, shape) + 1e-12 * np.eye(ways)
+        size = np.linalg.solve(inner, (right @ shape)[..., None])[..., 0]
+        together = np.einsum("bw,bwpvr,bv->pr", size, gram, size) + 1e-9 * np.eye(count)
+        shape = np.linalg.solve(together, np.einsum("bw,bwp->p", size, right))
         shape /= max(float(np.linalg.norm(shape)), 1e-300)
-    return (whole @ shape)[..., None], len(right) + shape.size - 1
+    return whole @ shape, blocks * ways + count - 1
 
 
 def _evened(gram: Array, size: Array) -> Array:

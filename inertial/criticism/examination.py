@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial import effects as catalogue
-from inertial.criticism import decisions
 from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.decisions import CLASS_WIDTH, RISES
+from inertial.criticism.drift import Drift, one_drift
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.freedom import refuse_without_freedom
@@ -20,23 +19,20 @@ from inertial.criticism.handling.base import Exchangeable, Handling, Misfit, soa
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.left_out import LeftOut, left_out
+from inertial.criticism.lot_part import LotPart, part_of
 from inertial.criticism.loudness import loudness_of
 from inertial.criticism.model import Model
-from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import replaced, terms_of
-from inertial.criticism.search import SearchResult, anything, judge, search
+from inertial.criticism.search import SearchResult, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.term import Term
 from inertial.criticism.turn_on import with_turn_on
-from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 
 Array = NDArray[np.float64]
 
-_MANY = 32  # largest number of units of a lot that is searched completely
-_ENOUGH = 24  # units, distributed over a larger lot, that are searched
 _MENDED = 6  # largest number of handling errors reported for one run
 _TURNS = 3  # searches after which single dwells are not tested again
 
@@ -73,6 +69,7 @@ class ExaminedRun:
     """A lot under examination: the corrections so far, and the terms that stay in the model beside the judged effects.
 
     barred : alternatives that only imitate a drift, and are not searched again
+    drift : the last drift that had looked like them; then curves of every kind are suspected
     soak : (n,), number of the soak of each dwell, as measured
     """
 
@@ -82,6 +79,7 @@ class ExaminedRun:
     handled: list[Named] = field(default_factory=list[Named])
     removed: list[BadDwell] = field(default_factory=list[BadDwell])
     barred: set[str] = field(default_factory=set[str])
+    drift: Drift | None = None
     soak: NDArray[np.intp] | None = None
     _made: tuple[list[object], Model] | None = None
 
@@ -97,6 +95,23 @@ class ExaminedRun:
         loudness = loudness_of(self.model(), self.soak)
         if loudness is not None:
             self.lot = replace(self.lot, loudness=loudness)
+
+    def comes_again(self, term: Term) -> bool:
+        """Whether a sudden change of the whole lot was found before."""
+        return "unit" not in term.keywords and any(
+            t.effect.id == term.effect.id and "unit" not in t.keywords for t in self.beside
+        )
+
+    def withdraw(self, part: LotPart, further: Sequence[Term]) -> bool:
+        """Withdraw sudden changes that are one drift, with what was found beside them; whether there were any."""
+        drift = one_drift(part, self.beside, further)
+        if drift is None:
+            return False
+        self.drift = drift
+        self.barred |= drift.imitated
+        self.beside = [t for t in self.beside if t.effect.id not in drift.imitated]
+        self.handled = [one for one in self.handled if one.effects.members[0].term.effect.id not in drift.imitated]
+        return True
 
     def model(self) -> Model:
         """The model that is judged, in the lot without its bad dwells; the same object while nothing changes."""
@@ -139,7 +154,7 @@ class EffectSearch:
 
     base: Model
     field: Candidates
-    part: "LotPart"
+    part: LotPart
     result: SearchResult
 
     @property
@@ -153,7 +168,7 @@ def mended(run: ExaminedRun) -> EffectSearch:
     while True:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
-        part = _part(fields, base)
+        part = part_of(fields, base, wide=run.drift is not None)
         searched, of = search(part.field, part.base, stop=part.imitates), part.field
         if searched.handling is None and part.field is not fields:
             part.base.problem.forget()
@@ -163,30 +178,12 @@ def mended(run: ExaminedRun) -> EffectSearch:
         if part.field is not fields:
             base.forget()
         if searched.handling is None or len(run.handled) >= _MENDED:
+            if run.withdraw(part, searched.added):
+                continue
             return EffectSearch(base, fields, part, searched)
-        if _drifts(run, part, searched.handling):
+        if run.comes_again(searched.handling) and run.withdraw(part, [searched.handling]):
             continue
         _mend(run, of, searched, searched.handling)
-
-
-def _drifts(run: ExaminedRun, part: "LotPart", term: Term) -> bool:
-    """Whether a sudden change of the whole lot that comes a second time is one drift; then neither change is told any more.
-
-    One step of the reader's reference is an event. Two of them, one after the other, are what a scale factor that changes
-    slowly looks like, and a smooth curve of one driver explains it better.
-    """
-    before = [t for t in run.beside if t.effect.id == term.effect.id and "unit" not in t.keywords]
-    if not before or "unit" in term.keywords:
-        return False
-    keys = {t.key for t in before}
-    others = [t for t in part.base.terms if t.key not in keys]
-    base = Model(part.field.problem, others, near=part.base.noise)
-    if better_curve(base, [*before, term], part.suspected) is None:
-        return False
-    run.barred.add(term.effect.id)
-    run.beside = [t for t in run.beside if t.key not in keys]
-    run.handled = [one for one in run.handled if one.effects.members[0].term.effect.id != term.effect.id]
-    return True
 
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
@@ -252,48 +249,6 @@ def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
     effects = [e for e in catalogue.catalogue().values() if e.id not in set(held)]
     names = [name for name, values in state.covariates.items() if varies(values)]
     return [*effects, *(Covariate(name) for name in names if f"{COVARIATE_PREFIX}{name}" not in set(held))]
-
-
-@dataclass(frozen=True)
-class LotPart:
-    """The part of a lot that the search for effects needs: effects common to a large lot are visible in two dozen units."""
-
-    field: Candidates
-    base: Model
-
-    @cached_property
-    def suspected(self) -> list[Suspect]:
-        """Curves of every driver."""
-        return suspects(self.field.problem)
-
-    def imitates(self, chosen: Sequence[Term]) -> bool:
-        """Whether a curve of one driver is better than the chosen effects: by far, or with no further effect left."""
-        instead = better_curve(self.base, chosen, self.suspected)
-        if instead is None:
-            return False
-        fit = instead[0]
-        problem = self.field.problem
-        effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
-        by_far = effects - fit.cost > decisions.DECISIVE * (cost_of_model(self.base) - fit.cost)
-        return by_far or not anything(self.field, fit.model)
-
-
-def _part(field: Candidates, base: Model) -> LotPart:
-    """Some units of a large lot, without those that have a handling error of their own in the model; a small lot as a whole."""
-    lot = field.problem.lot
-    count = lot.state.time.shape[0]
-    if count <= _MANY:
-        return LotPart(field, base)
-    own = {
-        int(np.mean(t.keywords["unit"])) for t in base.terms if isinstance(t.effect, Handling) and "unit" in t.keywords
-    }
-    sound = [unit for unit in range(count) if unit not in own]
-    pick = np.array(sound)[np.linspace(0, len(sound) - 1, min(_ENOUGH, len(sound))).round().astype(int)]
-    slope = field.problem.slope
-    problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])
-    problem.covariance.like(field.problem.covariance)
-    terms = [t for t in base.terms if not (isinstance(t.effect, Handling) and "unit" in t.keywords)]
-    return LotPart(Candidates(problem, field.effects, [a for a in field.handling if a.in_part]), Model(problem, terms))
 
 
 def worst(before: LeftOut, after: LeftOut) -> tuple[float, float]:

@@ -247,12 +247,14 @@ class Space:
 
     def _gain_along(self, along: Array, seen: NDArray[np.bool_]) -> Gain:
         rank = seen.sum(axis=(0, 2))
-        by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])
+        onto = along[..., 0] if self.targets.shape[-1] == 1 else along @ np.concatenate([[1.0], -self.shared_sizes])
+        by_block = np.einsum("bgr,bgr->bg", onto, onto)
         if self.targets.shape[-1] == 1:
             return Gain(by_block.sum(axis=0), rank, by_block)
+        # the common columns are fitted again beside the candidate: the blocks share in all of the reduction
         taken = np.einsum("bgrt,bgrs->gts", along, along)
         drop = np.array([self.rss - schur(self.gram - t) for t in taken])
-        return Gain(drop, rank, by_block)
+        return Gain(drop, rank, by_block * (drop / np.maximum(by_block.sum(axis=0), 1e-300)))
 
     def _gain_shared(self, found: Products, *, one_unit: bool) -> Gain:
         """Gain of columns whose coefficients all blocks share, or the three of each unit: units in turn, all values of each."""

@@ -12,7 +12,7 @@ from inertial.criticism.candidate import Candidate
 from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import curve, quantities, varies
 from inertial.criticism.model import Model
-from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
+from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
 from inertial.criticism.problem import Problem
 from inertial.criticism.term import Term
 from inertial.effects.covariate import COVARIATE_PREFIX
@@ -37,11 +37,17 @@ class Suspect:
     """A driver, and columns flexible enough for any smooth dependence on it.
 
     values : (blocks, n), the driver itself, 0 … 1 over the run; None if it is not a single quantity
+    ways : ways in which each block feels the dependence, as for :func:`inertial.criticism.curves.fit_curve`
     """
 
     driver: str
     candidate: Candidate
     values: Array | None = None
+    ways: int = 1
+
+    def fitted(self, model: Model) -> CurveFit:
+        """The best curve of the driver beside a model."""
+        return fit_curve(model, self.driver, self.candidate, self.ways)
 
 
 def suspects(problem: Problem) -> list[Suspect]:
@@ -49,9 +55,9 @@ def suspects(problem: Problem) -> list[Suspect]:
     state = problem.lot.state
     suspected: list[Suspect] = []
     for name, values, _ in quantities(state):
-        if varies(values) and not (name == "chamber_C" and _alike_to(values, state.temperature)):
+        if varies(values) and not (name == "chamber_C" and alike(values, state.temperature)):
             knots = _TIME_KNOTS if is_clock(name) else _KNOTS
-            each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
+            each = unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
             suspected.append(Suspect(name, _alike(problem, curve(values, knots)), each))
             # levels in time, one for each soak, could follow any memory of temperature: a dependence on time is smooth
             steps = None if is_clock(name) else _levels(values)
@@ -62,7 +68,7 @@ def suspects(problem: Problem) -> list[Suspect]:
                 suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS)))))
     if not problem.lot.radial:
         own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
-        suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
+        suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), unit_range(own)))
         suspected += _table(problem)
     suspected += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
     return suspected
@@ -74,15 +80,17 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.noise))
     bare = cost_of_model(base)
     promising = [s for s in _promising(base, field) if s.driver not in held]
-    fits = [fit_curve(base, s.driver, s.candidate) for s in promising]
-    fits += [f for s in promising[:_SHARPEST] if (f := _sharp(base, s)) is not None]
+    fits = [(s.fitted(base), s) for s in promising]
+    fits += [(f, s) for s in promising[:_SHARPEST] if (f := _sharp(base, s)) is not None]
     if not fits:
         return None
-    best = min(fits, key=lambda f: f.cost)
+    best, suspect = min(fits, key=lambda pair: pair[0].cost)
     kept: list[Term] = []
     if len(chosen) > 1:
+        # the first two of its driver: a dependence of the bias, and levels
+        alike = [s for s in field if s.driver == suspect.driver and s.ways == 1][:2] if suspect.ways == 1 else [suspect]
         best, kept = _with_others(
-            base, chosen, field, best, max(decisions.OTHERS, decisions.OTHERS_SHARE * (bare - best.cost))
+            base, chosen, alike, best, max(decisions.OTHERS, decisions.OTHERS_SHARE * (bare - best.cost))
         )
     replaced = len(chosen) - len(kept)
     doubt = decisions.DOUBT.get(replaced, 0.0)
@@ -94,6 +102,13 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     return (best, kept) if replaced and best.cost + doubt < whole else None
 
 
+def log_p_of_curve(base: Model, fit: CurveFit, looks: int) -> float:
+    """Logarithm of the probability that noise beside a model follows one of so many curves as much."""
+    before = base.at(fit.model.noise)
+    drop = max(before.rss - fit.model.space.rss, 0.0)
+    return log_p_value(before, drop, fit.rank) + float(np.log(looks))
+
+
 def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
     """The suspects whose own curves, block by block, reduce the residual most; the others cannot be best."""
     space = base.space
@@ -103,16 +118,15 @@ def _promising(base: Model, field: Sequence[Suspect]) -> list[Suspect]:
 
 
 def _with_others(
-    base: Model, chosen: Sequence[Term], field: Sequence[Suspect], best: CurveFit, worth: float
+    base: Model, chosen: Sequence[Term], suspect: Sequence[Suspect], best: CurveFit, worth: float
 ) -> tuple[CurveFit, list[Term]]:
     """The best curve with the effects that it does not replace: no functions of its own driver, and above their price."""
-    suspect = [s for s in field if s.driver == best.driver]
     kept: list[Term] = []
     for term in chosen:
         if _function_of(base, term, suspect[0]):
             continue
         beside = Model(base.problem, [*base.terms, *kept, term], near=base.noise)
-        tried = [fit_curve(beside, s.driver, s.candidate) for s in suspect[:2]]
+        tried = [s.fitted(beside) for s in suspect]
         tried += [f for s in suspect[:1] if (f := _sharp(beside, s)) is not None]
         again = min(tried, key=lambda f: f.cost)
         if again.cost < best.cost - worth:
@@ -165,12 +179,12 @@ def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
     return column
 
 
-def _unit_range(values: Array) -> Array:
+def unit_range(values: Array) -> Array:
     """Values over the run's range, 0 … 1."""
     return (values - values.min()) / max(float(np.ptp(values)), 1e-12)
 
 
-def _alike_to(values: Array, other: Array | None) -> bool:
+def alike(values: Array, other: Array | None) -> bool:
     """Whether two quantities are equivalent: after a soak the chamber's temperature is the sensor's."""
     return other is not None and float(np.corrcoef(values.ravel(), other.ravel())[0, 1]) > 0.98
 

@@ -14,15 +14,16 @@ from inertial.criticism.comparison import rms as rms_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, drivers_of
 from inertial.criticism.evidence import GROSS, not_judged
-from inertial.criticism.examination import EffectSearch, ExaminedRun, LotPart, examined
+from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.likelihood import shared_noise
+from inertial.criticism.lot_part import LotPart
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot
 from inertial.criticism.search import SearchResult
 from inertial.criticism.tails import with_tails
-from inertial.criticism.unknown import better_curve
+from inertial.criticism.unknown import better_curve, log_p_of_curve
 from inertial.probability import passes
 
 
@@ -91,8 +92,11 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     if unjudged:
         # data that cannot judge the model cannot identify missing effects either
         searched = SearchResult(base, (), searched.ladder)
-    sound = passed is True and not searched.added
+    # a drift can hide where adequacy does not look
+    sound = passed is True and not searched.added and run.drift is None
     final, unexplained = (searched.model, None) if sound or unjudged else _beyond(search.part, base, searched, drivers)
+    if unexplained is None and run.drift is not None and not unjudged:
+        unexplained = Unexplained(run.drift.driver, "curve", run.drift.log_p)
     return Verdict(
         run=run,
         search=search,
@@ -128,12 +132,11 @@ def _beyond(
     part: LotPart, base: Model, searched: SearchResult, drivers: list[Driver]
 ) -> tuple[Model, Unexplained | None]:
     """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
-    instead = better_curve(part.base, searched.added, part.suspected) if searched.added else None
+    suspected = part.suspected(searched.added)
+    instead = better_curve(part.base, searched.added, suspected) if searched.added else None
     if instead is not None:
         fit, kept = instead
-        before = part.base.at(fit.model.noise)
-        drop = max(before.rss - fit.model.space.rss, 0.0)
-        log_p = log_p_value(before, drop, fit.rank) + float(np.log(len(part.suspected)))
+        log_p = log_p_of_curve(part.base, fit, len(suspected))
         return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
     final = searched.model
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]

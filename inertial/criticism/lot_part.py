@@ -1,0 +1,78 @@
+"""The part of a lot in which effects are searched, and the curves that are suspected in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from inertial.criticism import decisions
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.model import Model
+from inertial.criticism.penalty import cost_of_model
+from inertial.criticism.problem import Problem
+from inertial.criticism.search import anything
+from inertial.criticism.term import Term
+from inertial.criticism.unknown import Suspect, better_curve, suspects
+from inertial.criticism.wide_suspects import wide_suspects
+
+_MANY = 32  # largest number of units of a lot that is searched completely
+_MANY_EFFECTS = 3  # chosen effects from which on curves of every kind are suspected
+_ENOUGH = 24  # units, distributed over a larger lot, that are searched
+
+
+@dataclass(frozen=True)
+class LotPart:
+    """The part of a lot that the search for effects needs: effects common to a large lot are visible in two dozen units.
+
+    wide : whether curves of every kind are suspected from the first
+    """
+
+    field: Candidates
+    base: Model
+    wide: bool = False
+
+    def suspected(self, chosen: Sequence[Term]) -> list[Suspect]:
+        """Curves of every driver; of every kind beside many effects, or where a drift had looked like sudden changes."""
+        return self.every_suspect if self.wide or len(chosen) >= _MANY_EFFECTS else self._plain
+
+    @cached_property
+    def _plain(self) -> list[Suspect]:
+        return suspects(self.field.problem)
+
+    @cached_property
+    def every_suspect(self) -> list[Suspect]:
+        """Curves of every driver and of every kind."""
+        return [*self._plain, *wide_suspects(self.field.problem)]
+
+    def imitates(self, chosen: Sequence[Term]) -> bool:
+        """Whether a curve of one driver is better than the chosen effects: by far, or with no further effect left."""
+        instead = better_curve(self.base, chosen, self.suspected(chosen))
+        if instead is None:
+            return False
+        fit = instead[0]
+        problem = self.field.problem
+        effects = cost_of_model(Model(problem, [*self.base.terms, *chosen], near=fit.model.noise))
+        by_far = effects - fit.cost > decisions.DECISIVE * (cost_of_model(self.base) - fit.cost)
+        return by_far or not anything(self.field, fit.model)
+
+
+def part_of(field: Candidates, base: Model, *, wide: bool) -> LotPart:
+    """Some units of a large lot, without those that have a handling error of their own in the model; a small lot as a whole."""
+    lot = field.problem.lot
+    count = lot.state.time.shape[0]
+    if count <= _MANY:
+        return LotPart(field, base, wide)
+    own = {
+        int(np.mean(t.keywords["unit"])) for t in base.terms if isinstance(t.effect, Handling) and "unit" in t.keywords
+    }
+    sound = [unit for unit in range(count) if unit not in own]
+    pick = np.array(sound)[np.linspace(0, len(sound) - 1, min(_ENOUGH, len(sound))).round().astype(int)]
+    slope = field.problem.slope
+    problem = Problem(lot.units(pick.tolist()), slope=None if slope is None else slope[pick])
+    problem.covariance.like(field.problem.covariance)
+    terms = [t for t in base.terms if not (isinstance(t.effect, Handling) and "unit" in t.keywords)]
+    return LotPart(
+        Candidates(problem, field.effects, [a for a in field.handling if a.in_part]), Model(problem, terms), wide
+    )
