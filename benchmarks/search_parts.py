@@ -55,7 +55,9 @@ def curve(world: World, seed: int) -> Counts:
     from inertial.criticism.unknown import better_curve
 
     part, result = searched(world, seed)
-    return int(bool(result.added) and better_curve(part.base, result.added, part.suspected(result.added)) is not None), 1
+    return int(
+        bool(result.added) and better_curve(part.base, result.added, part.suspected(result.added)) is not None
+    ), 1
 
 
 def ended(world: World, seed: int) -> Counts:

@@ -1,4 +1,4 @@
-"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults small hidden outside loop scenes part --runs 10`.
+"""Verdicts in worlds that nobody prepared: `python benchmarks/worlds nulls faults small hidden outside loop part --runs 10`.
 
 Prints for every world how many runs were called inadequate, named physics, and told the fault that was made, each with its 95 %
 Clopper-Pearson interval. `--seeds development` are for setting constants, `judging` (the default) only for measuring.

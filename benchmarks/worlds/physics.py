@@ -218,7 +218,7 @@ def _of_axes(course: Callable[[Any], Floats]) -> Callable[..., Effect]:
 
 def fixture_bends(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """A fixture of two metals that turns all units by the square of the temperature's distance from that of its assembly."""
-    del scene
+    del units, scene
     way = rng.standard_normal(3)
 
     def effect(s: Any) -> Floats:

@@ -13,7 +13,7 @@ from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.comparison import rms as rms_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE
-from inertial.criticism.drivers import Misfit, drivers_of, places
+from inertial.criticism.drivers import Misfit, looks_of, places
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates
@@ -123,7 +123,7 @@ def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> Carrie
         error[one.unit, one.dwell] = np.inf
     problem = Problem(replace(lot, error=error), slope=base.problem.slope)
     model = Model(problem, base.terms, near=base.noise)
-    return CarriedEvidence(dwells, adequacy(Candidates(problem, fields.effects), drivers_of(problem), model, rng))
+    return CarriedEvidence(dwells, adequacy(Candidates(problem, fields.effects), looks_of(problem), model, rng))
 
 
 def _classes(field: Candidates, base: Model, final: Model) -> list[EffectClass]:

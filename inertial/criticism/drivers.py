@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 _KNOTS = 5
 _TIME_KNOTS = 8
+_BENT_KNOTS = 3
+_TRANSFER_KNOTS = 4
 _DIGITS = 6
 """Decimals to which logarithms of probabilities and shares are compared."""
 
@@ -72,6 +74,52 @@ def drivers_of(problem: Problem) -> list[Driver]:
     if np.any(np.abs(approach) > 0.1):
         drivers.append(Driver("approach", partial(_by_axis, problem, approach), None))
     return drivers
+
+
+def looks_of(problem: Problem) -> list[Driver]:
+    """The drivers, and where the axes or the transfer curve follow one: that a fixture bends shows in no bias.
+
+    Axes with time and the temperature of the units, the transfer curve with the temperature: each look costs power in all others.
+    """
+    looks = drivers_of(problem)
+    if problem.lot.radial:
+        return looks
+    state = problem.lot.state
+    for name, values in (("unit_C", state.temperature), ("time_s", state.time)):
+        if values is not None and varies(values):
+            looks.append(Driver(name, partial(_across_axes, problem, curve(values, _BENT_KNOTS)), None))
+    if state.temperature is not None and varies(state.temperature):
+        looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), None))
+    return looks
+
+
+def _across_axes(problem: Problem, columns: Array) -> Candidate:
+    return Candidate(across(problem, columns)[:, :, None, :], shared=False)
+
+
+def _transfer_curve(problem: Problem, values: Array) -> Candidate:
+    return Candidate(transfer(problem, values, _TRANSFER_KNOTS)[:, :, None, :], shared=False)
+
+
+def transfer(problem: Problem, values: Array, knots: int) -> Array:
+    """A curve of the force along each axis times a quantity (units or 1, n), (blocks, n, d)."""
+    along = _along(problem).reshape(problem.blocks, problem.n)
+    middle = 0.5 * (float(np.max(values)) + float(np.min(values)))
+    each = np.repeat(np.broadcast_to(values - middle, (problem.blocks // 3, problem.n)), 3, axis=0)
+    return curve(along, knots) * (each / max(float(np.ptp(values)), 1e-12))[..., None]
+
+
+def _along(problem: Problem) -> Array:
+    """The force along each axis, (units, 3, n), g."""
+    along = np.stack([problem.lot.state.along(axis) for axis in range(3)], axis=1)
+    return np.broadcast_to(along, (problem.blocks // 3, 3, problem.n))
+
+
+def across(problem: Problem, columns: Array) -> Array:
+    """Columns (units or 1, n, d) times the forces across each axis, (blocks, n, 2 d): those of one way, then of the other."""
+    along = _along(problem)
+    wide = [np.roll(along, -way, axis=1)[..., None] * columns[:, None] for way in (1, 2)]
+    return np.concatenate([w.reshape(problem.blocks, problem.n, -1) for w in wide], axis=-1)
 
 
 def quantities(state: State) -> list[tuple[str, Array, int]]:
@@ -155,7 +203,8 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
             axes = _axes(problem, gain.by_block[:, 0], rank, floor_variance)
             misfits.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
     # two clocks of a run explain the same: their order is not that of rounding errors
-    return sorted(misfits, key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
+    misfits.sort(key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
+    return list({p.driver: p for p in reversed(misfits)}.values())[::-1]
 
 
 def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tuple[str, ...]:

@@ -57,7 +57,7 @@ def suspects(problem: Problem) -> list[Suspect]:
     for name, values, _ in quantities(state):
         if varies(values) and not (name == "chamber_C" and alike(values, state.temperature)):
             knots = _TIME_KNOTS if is_clock(name) else _KNOTS
-            each = unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
+            each = _unit_range(values if problem.lot.radial else np.repeat(values, 3, axis=0))
             suspected.append(Suspect(name, _alike(problem, curve(values, knots)), each))
             # levels in time, one for each soak, could follow any memory of temperature: a dependence on time is smooth
             steps = None if is_clock(name) else _levels(values)
@@ -68,7 +68,7 @@ def suspects(problem: Problem) -> list[Suspect]:
                 suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS)))))
     if not problem.lot.radial:
         own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
-        suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), unit_range(own)))
+        suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
         suspected += _table(problem)
     suspected += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
     return suspected
@@ -179,7 +179,7 @@ def _narrowed(model: Model, z: Array, centre: float, width: float) -> Array:
     return column
 
 
-def unit_range(values: Array) -> Array:
+def _unit_range(values: Array) -> Array:
     """Values over the run's range, 0 … 1."""
     return (values - values.min()) / max(float(np.ptp(values)), 1e-12)
 

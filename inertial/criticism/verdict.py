@@ -12,7 +12,7 @@ from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.comparison import rms as rms_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
-from inertial.criticism.drivers import Driver, drivers_of
+from inertial.criticism.drivers import Driver, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
 from inertial.criticism.heldout import fit_rms
@@ -23,7 +23,7 @@ from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
 from inertial.criticism.problem import Lot
 from inertial.criticism.search import SearchResult
 from inertial.criticism.tails import with_tails
-from inertial.criticism.unknown import better_curve, log_p_of_curve
+from inertial.criticism.unknown import Suspect, better_curve, log_p_of_curve
 from inertial.probability import passes
 
 
@@ -80,7 +80,7 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     """
     run, search = examined(lot, effects)
     base, searched = search.base, search.result
-    drivers = drivers_of(base.problem)
+    drivers = looks_of(base.problem)
     log_p = adequacy(search.field, drivers, base, rng)
     removed = tuple(with_tails(searched.model, run.removed)) if run.removed else ()
     named_data = bool(run.handled) or any(not d.tail for d in removed)
@@ -133,18 +133,33 @@ def _beyond(
 ) -> tuple[Model, Unexplained | None]:
     """The confirmed effects, and the remaining driver: effects that only imitate a curve of one driver are removed."""
     suspected = part.suspected(searched.added)
-    instead = better_curve(part.base, searched.added, suspected) if searched.added else None
+    instead = _instead(part, base, searched, suspected)
     if instead is not None:
-        fit, kept = instead
-        log_p = log_p_of_curve(part.base, fit, len(suspected))
-        return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
+        return instead
     final = searched.model
     convincing = [d for d in drivers if _convincing(final, d, len(drivers))]
     if not convincing:
         return final, None
+    if searched.added and len(suspected) < len(part.every_suspect):
+        # what the effects leave follows a driver: they may be pieces of a dependence of another kind
+        instead = _instead(part, base, searched, part.every_suspect)
+        if instead is not None:
+            return instead
     best = max(convincing, key=lambda d: _worth(final, d))
     shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
     return final, Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))))
+
+
+def _instead(
+    part: LotPart, base: Model, searched: SearchResult, suspected: Sequence[Suspect]
+) -> tuple[Model, Unexplained] | None:
+    """The model with a curve in place of effects that only imitate it, less the curve; None if there is none."""
+    instead = better_curve(part.base, searched.added, suspected) if searched.added else None
+    if instead is None:
+        return None
+    fit, kept = instead
+    log_p = log_p_of_curve(part.base, fit, len(suspected))
+    return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:

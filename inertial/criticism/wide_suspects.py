@@ -4,14 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.candidate import Candidate
-from inertial.criticism.drivers import curve, quantities, varies
+from inertial.criticism.drivers import across, curve, quantities, transfer, varies
 from inertial.criticism.handling.base import by_block, rotated_force
 from inertial.criticism.problem import Problem
-from inertial.criticism.unknown import Suspect, alike, unit_range
+from inertial.criticism.unknown import Suspect, alike
+from inertial.quantities import is_clock
 
 Array = NDArray[np.float64]
 
 _KNOTS = 6  # of a smooth curve over a driver
+_TURNED_KNOTS = 2  # of the same for the fixture's rotation, whose every column has three coefficients of the whole lot
 _FORCE_KNOTS = 7  # of the same over the force along an axis
 _LEAST = 3  # columns of a curve; fewer are a line, or levels that handling errors already are
 
@@ -24,9 +26,6 @@ def wide_suspects(problem: Problem) -> list[Suspect]:
     if problem.lot.radial:
         return []
     state = problem.lot.state
-    along = np.stack([state.along(axis) for axis in range(3)], axis=1)  # (units, 3, n)
-    along = np.broadcast_to(along, (problem.blocks // 3, 3, problem.n))
-    transfer = curve(along.reshape(problem.blocks, problem.n), _FORCE_KNOTS)
     rotated = rotated_force(problem.lot)
     suspected: list[Suspect] = []
     for name, values, _ in quantities(state):
@@ -35,19 +34,11 @@ def wide_suspects(problem: Problem) -> list[Suspect]:
         own = curve(values, _KNOTS)  # (units or 1, n, d)
         if own.shape[-1] < _LEAST - 1:
             continue
-        across = np.concatenate([_times(own, np.roll(along, -way, axis=1)) for way in (1, 2)], axis=-1)
-        suspected.append(Suspect(name, Candidate(across[:, :, None, :], shared=False), ways=2))
-        turned = rotated[..., :, None] * own[:, :, None, None, :]
+        suspected.append(Suspect(name, Candidate(across(problem, own)[:, :, None, :], shared=False), ways=2))
+        turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
         whole = np.broadcast_to(turned, (problem.blocks // 3, *turned.shape[1:]))
         columns = by_block(whole.reshape(*whole.shape[:3], -1))
         suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=True)))
-        each = np.repeat(np.broadcast_to(unit_range(values), (problem.blocks // 3, problem.n)), 3, axis=0)
-        columns = transfer * (each[..., None] - 0.5)
+        columns = transfer(problem, values, _FORCE_KNOTS)
         suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=False)))
     return suspected
-
-
-def _times(columns: Array, along: Array) -> Array:
-    """Columns (units or 1, n, d) times the forces (units, 3, n), (blocks, n, d)."""
-    wide = along[..., None] * columns[:, None]
-    return wide.reshape(-1, *wide.shape[2:])
