@@ -1,0 +1,112 @@
+"""Physics that the catalogue lacks is told unexplained: no effect, and no sudden change of handling, stands in its place."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inertial.criticism.curves import fit_curve
+from inertial.criticism.drivers import across, curve, transfer
+from inertial.criticism.examination import ExaminedRun
+from inertial.criticism.wide_suspects import wide_suspects
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.tables.dwells import lot_of, measured
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
+
+from physics import OUTSIDE
+from tables import FAULTS
+from world import World, make
+
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
+BASE = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
+SEED = 6_400_000
+
+
+def said(world: World, seed: int) -> dict:
+    made = make(world, SEED + seed)
+    return diagnose(made.dwells, made.history)
+
+
+def run_of(world: World, seed: int) -> ExaminedRun:
+    made = make(world, SEED + seed)
+    return ExaminedRun(lot_of(measured(made.dwells, made.history), square=False), BASE)
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_what_is_of_no_catalogue_is_unexplained(name: str) -> None:
+    document = said(World(hidden=((name, 2.0),)), 1)
+    assert document["adequate"] is False
+    # a dwell in which it is largest may stand out by itself
+    assert [group["effects"] for group in document["classes"] if group["effects"] != ["bad_dwell"]] == []
+    assert document["unexplained"]["driver"] in {"unit_C", "chamber_C", "time_s"}
+
+
+@pytest.mark.parametrize("name", ["fixture_bends", "axes_bend_with_heat", "cubic_with_heat"])
+def test_no_effect_is_so_large_that_the_model_is_adequate(name: str) -> None:
+    # axes and transfer curves that follow the temperature show in no bias; an excess of them had counted as noise
+    assert said(World(hidden=((name, 8.0),)), 2)["adequate"] is False
+
+
+def test_an_adequate_model_stays_adequate() -> None:
+    documents = [said(World(), seed) for seed in range(10, 16)]
+    assert [d["adequate"] for d in documents].count(True) >= 5
+    assert all(d["classes"] == [] for d in documents)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_unit_that_moves_after_the_table_slipped_is_told(seed: int) -> None:
+    world = FAULTS["slip_and_moved"]
+    made = make(world, SEED + 20 + seed)
+    document = diagnose(made.dwells, made.history)
+    moved = next(fault for fault in made.faults if "unit_moved" in fault.names)
+    told = {group["effects"][0]: group for group in document["classes"]}
+    assert set(told) == {"table_slip", "unit_moved"}
+    assert told["unit_moved"]["units"] == list(moved.units)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_two_units_that_moved_are_no_drift(seed: int) -> None:
+    made = make(World(fault="unit_moved", amount=0.5, beside=(("unit_moved", 0.5),)), SEED + 30 + seed)
+    document = diagnose(made.dwells, made.history)
+    told = sorted(group["units"] for group in document["classes"] if group["effects"][0] == "unit_moved")
+    assert told == sorted(list(fault.units) for fault in made.faults)
+    assert document["unexplained"] is None
+
+
+def test_a_curve_across_the_axes_has_the_shape_of_the_truth() -> None:
+    world = World(hidden=(("axes_warm_up", 20.0),))
+    run = run_of(world, 40)
+    model = run.model()
+    time = run.lot.state.time
+    suspect = next(s for s in wide_suspects(model.problem) if s.driver == "time_s" and s.ways == 2)
+    fit = fit_curve(model, suspect.driver, suspect.candidate, suspect.ways)
+    # two sizes for each block; of the shape's columns those that the times of the soaks part
+    assert 2 <= fit.rank - 2 * model.problem.blocks + 1 <= curve(time, 6).shape[-1]
+    bias_only = fit_curve(model, "time_s", next(s for s in wide_suspects(model.problem) if s.ways == 1).candidate)
+    assert fit.cost < bias_only.cost - 1000.0
+    # with the truth itself as the only column the cost is the same, within the price of the shape
+    course = np.exp(-time / 1500.0)[..., None]
+    exact = model.with_curves(across(model.problem, course))
+    assert fit.model.space.rss == pytest.approx(exact.space.rss, rel=0.1)
+
+
+def test_columns_across_the_axes_are_products_of_forces() -> None:
+    problem = run_of(World(units=2), 50).model().problem
+    state = problem.lot.state
+    values = np.broadcast_to(state.time, (2, problem.n))
+    columns = across(problem, values[..., None])
+    for unit in range(2):
+        for axis in range(3):
+            block = columns[3 * unit + axis]
+            for way in (1, 2):
+                other = state.along((axis + way) % 3)
+                expected = values[unit] * np.broadcast_to(other, (2, problem.n))[unit]
+                np.testing.assert_allclose(block[:, way - 1], expected, rtol=1e-12)
+    own = transfer(problem, values, 4)
+    assert own.shape[:2] == (problem.blocks, problem.n)
+    middle = 0.5 * (values.min() + values.max())
+    before = np.abs(values - middle) < 1e-9
+    assert not np.any(own.reshape(2, 3, problem.n, -1)[np.repeat(before[:, None], 3, axis=1)])
