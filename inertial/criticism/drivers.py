@@ -87,39 +87,53 @@ def looks_of(problem: Problem) -> list[Driver]:
     state = problem.lot.state
     for name, values in (("unit_C", state.temperature), ("time_s", state.time)):
         if values is not None and varies(values):
-            looks.append(Driver(name, partial(_across_axes, problem, curve(values, _BENT_KNOTS)), None))
+            looks.append(Driver(name, partial(_across_axes, problem, values), None))
     if state.temperature is not None and varies(state.temperature):
         looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), None))
     return looks
 
 
-def _across_axes(problem: Problem, columns: Array) -> Candidate:
-    return Candidate(across(problem, columns)[:, :, None, :], shared=False)
+def _across_axes(problem: Problem, values: Array) -> Candidate:
+    along, values = _typical(problem, values)
+    return _of_axes(problem, across(along, curve(values, _BENT_KNOTS)))
 
 
 def _transfer_curve(problem: Problem, values: Array) -> Candidate:
-    return Candidate(transfer(problem, values, _TRANSFER_KNOTS)[:, :, None, :], shared=False)
+    along, values = _typical(problem, values)
+    return _of_axes(problem, transfer(along, values, _TRANSFER_KNOTS))
 
 
-def transfer(problem: Problem, values: Array, knots: int) -> Array:
-    """A curve of the force along each axis times a quantity (units or 1, n), (blocks, n, d)."""
-    along = _along(problem).reshape(problem.blocks, problem.n)
-    middle = 0.5 * (float(np.max(values)) + float(np.min(values)))
-    each = np.repeat(np.broadcast_to(values - middle, (problem.blocks // 3, problem.n)), 3, axis=0)
-    return curve(along, knots) * (each / max(float(np.ptp(values)), 1e-12))[..., None]
+def _of_axes(problem: Problem, columns: Array) -> Candidate:
+    """Columns (blocks or 3, n, d), the same for all units where they are of three axes."""
+    rows = None if len(columns) == problem.blocks else np.arange(problem.blocks) % 3
+    return Candidate(columns[:, :, None, :], shared=False, rows=rows)
 
 
-def _along(problem: Problem) -> Array:
+def _typical(problem: Problem, values: Array) -> tuple[Array, Array]:
+    """Forces and a quantity of one unit for all, where the forces are the same: a look needs no more."""
+    along = forces_along(problem)
+    same = bool(np.all(along == along[:1]))
+    return (along[:1], values.mean(axis=0, keepdims=True)) if same else (along, values)
+
+
+def forces_along(problem: Problem) -> Array:
     """The force along each axis, (units, 3, n), g."""
     along = np.stack([problem.lot.state.along(axis) for axis in range(3)], axis=1)
     return np.broadcast_to(along, (problem.blocks // 3, 3, problem.n))
 
 
-def across(problem: Problem, columns: Array) -> Array:
-    """Columns (units or 1, n, d) times the forces across each axis, (blocks, n, 2 d): those of one way, then of the other."""
-    along = _along(problem)
+def transfer(along: Array, values: Array, knots: int) -> Array:
+    """A curve of forces (units, 3, n) along each axis times a quantity (units or 1, n), (3 units, n, d)."""
+    middle = 0.5 * (float(np.max(values)) + float(np.min(values)))
+    each = (values - middle) / max(float(np.ptp(values)), 1e-12)
+    columns = curve(along, knots) * each[:, None, :, None]
+    return columns.reshape(-1, *columns.shape[2:])
+
+
+def across(along: Array, columns: Array) -> Array:
+    """Columns (units or 1, n, d) times the forces (units, 3, n) across each axis, (3 units, n, 2 d): one way, then the other."""
     wide = [np.roll(along, -way, axis=1)[..., None] * columns[:, None] for way in (1, 2)]
-    return np.concatenate([w.reshape(problem.blocks, problem.n, -1) for w in wide], axis=-1)
+    return np.concatenate([w.reshape(-1, *w.shape[2:]) for w in wide], axis=-1)
 
 
 def quantities(state: State) -> list[tuple[str, Array, int]]:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.candidate import Candidate
-from inertial.criticism.drivers import across, curve, quantities, transfer, varies
+from inertial.criticism.drivers import across, curve, forces_along, quantities, transfer, varies
 from inertial.criticism.handling.base import by_block, rotated_force
 from inertial.criticism.problem import Problem
 from inertial.criticism.unknown import Suspect, alike
@@ -26,6 +26,7 @@ def wide_suspects(problem: Problem) -> list[Suspect]:
     if problem.lot.radial:
         return []
     state = problem.lot.state
+    along = forces_along(problem)
     rotated = rotated_force(problem.lot)
     suspected: list[Suspect] = []
     for name, values, _ in quantities(state):
@@ -34,11 +35,11 @@ def wide_suspects(problem: Problem) -> list[Suspect]:
         own = curve(values, _KNOTS)  # (units or 1, n, d)
         if own.shape[-1] < _LEAST - 1:
             continue
-        suspected.append(Suspect(name, Candidate(across(problem, own)[:, :, None, :], shared=False), ways=2))
+        suspected.append(Suspect(name, Candidate(across(along, own)[:, :, None, :], shared=False), ways=2))
         turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
         whole = np.broadcast_to(turned, (problem.blocks // 3, *turned.shape[1:]))
         columns = by_block(whole.reshape(*whole.shape[:3], -1))
         suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=True)))
-        columns = transfer(problem, values, _FORCE_KNOTS)
+        columns = transfer(along, values, _FORCE_KNOTS)
         suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=False)))
     return suspected

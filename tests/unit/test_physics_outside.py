@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inertial.criticism.curves import fit_curve
-from inertial.criticism.drivers import across, curve, transfer
+from inertial.criticism.drivers import across, curve, forces_along, transfer
 from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.wide_suspects import wide_suspects
 from pipelines.diagnosis.diagnose import diagnose
@@ -41,7 +41,7 @@ def test_what_is_of_no_catalogue_is_unexplained(name: str) -> None:
     assert document["adequate"] is False
     # a dwell in which it is largest may stand out by itself
     assert [group["effects"] for group in document["classes"] if group["effects"] != ["bad_dwell"]] == []
-    assert document["unexplained"]["driver"] in {"unit_C", "chamber_C", "time_s"}
+    assert document["unexplained"]["driver"] in {"unit_C", "chamber_C", "time_s", "since_power_s"}
 
 
 @pytest.mark.parametrize("name", ["fixture_bends", "axes_bend_with_heat", "cubic_with_heat"])
@@ -89,7 +89,7 @@ def test_a_curve_across_the_axes_has_the_shape_of_the_truth() -> None:
     assert fit.cost < bias_only.cost - 1000.0
     # with the truth itself as the only column the cost is the same, within the price of the shape
     course = np.exp(-time / 1500.0)[..., None]
-    exact = model.with_curves(across(model.problem, course))
+    exact = model.with_curves(across(forces_along(model.problem), course))
     assert fit.model.space.rss == pytest.approx(exact.space.rss, rel=0.1)
 
 
@@ -97,7 +97,7 @@ def test_columns_across_the_axes_are_products_of_forces() -> None:
     problem = run_of(World(units=2), 50).model().problem
     state = problem.lot.state
     values = np.broadcast_to(state.time, (2, problem.n))
-    columns = across(problem, values[..., None])
+    columns = across(forces_along(problem), values[..., None])
     for unit in range(2):
         for axis in range(3):
             block = columns[3 * unit + axis]
@@ -105,7 +105,7 @@ def test_columns_across_the_axes_are_products_of_forces() -> None:
                 other = state.along((axis + way) % 3)
                 expected = values[unit] * np.broadcast_to(other, (2, problem.n))[unit]
                 np.testing.assert_allclose(block[:, way - 1], expected, rtol=1e-12)
-    own = transfer(problem, values, 4)
+    own = transfer(forces_along(problem), values, 4)
     assert own.shape[:2] == (problem.blocks, problem.n)
     middle = 0.5 * (values.min() + values.max())
     before = np.abs(values - middle) < 1e-9
