@@ -79,12 +79,15 @@ def better_curve(base: Model, chosen: Sequence[Term], field: Sequence[Suspect]) 
     held = {t.effect.id.removeprefix(COVARIATE_PREFIX) for t in chosen}
     whole = cost_of_model(Model(base.problem, [*base.terms, *chosen], near=base.noise))
     bare = cost_of_model(base)
-    promising = [s for s in _promising(base, field) if s.driver not in held]
+    every = _promising(base, field)
+    promising = [s for s in every if s.driver not in held]
     fits = [(s.fitted(base), s) for s in promising]
     fits += [(f, s) for s in promising[:_SHARPEST] if (f := _sharp(base, s)) is not None]
     if not fits:
         return None
     best, suspect = min(fits, key=lambda pair: pair[0].cost)
+    if any(s.fitted(base).cost <= best.cost for s in every if s.driver in held):
+        return None  # the recorded column that the effects hold already, in a shape of its own
     kept: list[Term] = []
     if len(chosen) > 1:
         # the first two of its driver: a dependence of the bias, and levels

@@ -13,10 +13,12 @@ from inertial.criticism.wide_suspects import wide_suspects
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
+_ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(_ROOT / "benchmarks" / "worlds"), str(_ROOT / "tests" / "blind")]
 
 from physics import OUTSIDE
 from tables import FAULTS
+from truth import case
 from world import World, make
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
@@ -54,6 +56,14 @@ def test_an_adequate_model_stays_adequate() -> None:
     documents = [said(World(), seed) for seed in range(10, 16)]
     assert [d["adequate"] for d in documents].count(True) >= 5
     assert all(d["classes"] == [] for d in documents)
+
+
+@pytest.mark.parametrize("index", [0, 2])
+def test_a_recorded_column_is_not_told_as_a_curve_of_time(index: int) -> None:
+    # a humidity that wanders slowly, with an effect that saturates: a curve of time follows it nearly as well
+    run = case("covariate_curve", index, 8080)
+    document = diagnose(run.dwells, run.history if run.sealed.spec.history else None)
+    assert document["unexplained"]["driver"] == "humidity_pct"
 
 
 @pytest.mark.parametrize("seed", range(2))
