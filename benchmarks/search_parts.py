@@ -14,8 +14,8 @@ from tables import HIDDEN, NULLS
 from world import World
 
 if TYPE_CHECKING:
-    from inertial.criticism.examination import LotPart
     from inertial.criticism.field import Candidates
+    from inertial.criticism.lot_part import LotPart
     from inertial.criticism.model import Model
     from inertial.criticism.search import Rival, SearchResult
 
@@ -35,7 +35,7 @@ def candidates(world: World, seed: int) -> tuple[Candidates, Model]:
 @lru_cache(maxsize=32)
 def searched(world: World, seed: int) -> tuple[LotPart, SearchResult]:
     """The effects that a search finds in a lot, without a curve that ends it."""
-    from inertial.criticism.examination import LotPart
+    from inertial.criticism.lot_part import LotPart
     from inertial.criticism.search import search
 
     field, model = candidates(world, seed)

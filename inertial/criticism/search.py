@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from inertial.criticism import decisions
 from inertial.criticism.decisions import MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import Handling
+from inertial.criticism.handling.base import Handling, OfOneDwell
 from inertial.criticism.likelihood import Ratio, likelihood_ratio, weighed
 from inertial.criticism.model import Model
 from inertial.criticism.noise_shares import Noise
@@ -17,6 +17,7 @@ from inertial.criticism.penalty import cost_of_model, fall
 from inertial.criticism.refinement import refine
 from inertial.criticism.space import Gain, Space
 from inertial.criticism.term import Term
+from inertial.criticism.whole_dwell import only_tilted
 
 Array = NDArray[np.float64]
 
@@ -222,10 +223,17 @@ def _moved(before: Term, after: Term) -> bool:
 
 
 def judge(field: Candidates, model: Model, term: Term) -> Rival:
-    """A term added to a model, with the noise estimated again; no gain if a handling error cannot have its size."""
-    if isinstance(term.effect, Handling) and not term.effect.possible(model.with_term(term).shared_sizes(term)):
+    """A term added to a model, with the noise estimated again; no gain for a handling error that cannot be it."""
+    if isinstance(term.effect, Handling) and not _possible(model, term, term.effect):
         return Rival(term, 0.0, 0, 0.0, 0.0)
     return min((_judged(field, model, each) for each in _begun(model, term)), key=lambda r: r.cost)
+
+
+def _possible(model: Model, term: Term, effect: Handling) -> bool:
+    """Whether a handling error can have its size, and one of a single dwell leaves nothing else of the dwell."""
+    if not effect.possible(model.with_term(term).shared_sizes(term)):
+        return False
+    return not isinstance(effect, OfOneDwell) or only_tilted(model, term)
 
 
 def _judged(field: Candidates, model: Model, term: Term) -> Rival:

@@ -66,6 +66,23 @@ def test_a_recorded_column_is_not_told_as_a_curve_of_time(index: int) -> None:
     assert document["unexplained"]["driver"] == "humidity_pct"
 
 
+def test_dwells_in_which_the_supply_sags_are_no_wrong_poses() -> None:
+    # each unit and axis is pushed by its own amount: the mean of the lot looks like two wrong angles
+    run = case("withheld", 4, 8080)
+    assert run.sealed.spec.effects == ("withheld:brownout",)
+    document = diagnose(run.dwells, run.history)
+    assert document["classes"] == []
+    assert document["unexplained"]["driver"] == "supply_V"
+
+
+@pytest.mark.parametrize("degrees", [0.1, 2.0, 20.0])
+def test_a_wrong_pose_is_told_however_far_it_is_off(degrees: float) -> None:
+    made = make(World(fault="wrong_pose", amount=degrees), SEED + 70)
+    document = diagnose(made.dwells, made.history)
+    assert [group["effects"][0] for group in document["classes"]] == ["wrong_pose"]
+    assert tuple(document["classes"][0]["dwells"]) == made.faults[0].dwells
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_a_unit_that_moves_after_the_table_slipped_is_told(seed: int) -> None:
     world = FAULTS["slip_and_moved"]
