@@ -71,6 +71,11 @@ FAULTS |= {
     "dwell_and_thermometer": World(fault="bad_dwell", amount=1.0, beside=(("thermometer", 0.5),)),
     "moved_and_thermometer": World(fault="unit_moved", amount=0.2, beside=(("thermometer", 0.5),)),
     "pose_and_moved": World(fault="wrong_pose", amount=0.1, beside=(("unit_moved", 0.2),)),
+    "swapped": World(differ=0.2, fault="units_swapped"),
+    "swapped_thermometers": World(differ=0.2, fault="units_swapped", amount=1.0),
+    "swapped_alike": World(differ=0.02, fault="units_swapped"),
+    "swapped_two_units": World(units=2, differ=0.2, fault="units_swapped"),
+    "swapped_many_units": World(units=32, differ=0.2, fault="units_swapped"),
 }
 """What goes wrong, one at a time and two at once."""
 

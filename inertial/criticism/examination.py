@@ -191,14 +191,16 @@ def _drifts(run: ExaminedRun, part: "LotPart", term: Term) -> bool:
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
     """Remove a handling error from a run, and record it."""
-    model = searched.model.with_term(term)
-    group = class_of(fields, model, term)
-    problem = fields.problem
     alternative, place = term.effect, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
     if not isinstance(alternative, Handling):
         raise TypeError(term.effect.id)
+    place = alternative.placed(run.lot, **place)
+    term = Term(alternative, tuple(place.items()))
+    model = searched.model.with_term(term)
+    group = class_of(fields, model, term)
+    problem = fields.problem
     size = model.shared_sizes(term)
-    units = (int(place["unit"]),) if "unit" in place else ()
+    units = alternative.units(**place)
     evidence, dwells = _happened(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)

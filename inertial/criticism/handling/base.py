@@ -46,7 +46,12 @@ class Handling(Effect):
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """The places of the search: values of ``unit``, ``dwell``, ``soak`` or ``pose``; units in order."""
+        """The places of the search: values of ``unit``, ``other``, ``dwell``, ``soak`` or ``pose``; units in order."""
+
+    def looks(self, lot: "Lot", places: int) -> int:
+        """Number of places that are paid for: those of the search, unless residuals have chosen them among more."""
+        del lot
+        return places
 
     @abstractmethod
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
@@ -74,6 +79,11 @@ class Handling(Effect):
         low, high = max(1, int(place["dwell"]) - step + 1), min(n - 1, int(place["dwell"]) + step - 1)
         return [{**place, "dwell": float(k)} for k in range(low, high + 1)]
 
+    def placed(self, lot: "Lot", **place: float) -> dict[str, float]:
+        """The place once more in a lot with the dwells that were left out of the search."""
+        del lot
+        return place
+
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """The lot without it; None if only its term in the model removes it."""
         del lot, size, place
@@ -88,6 +98,10 @@ class Handling(Effect):
         """Places of the affected dwells: the first after a change, or each one that is wrong."""
         del lot
         return [int(place["dwell"])] if "dwell" in place else []
+
+    def units(self, **place: float) -> tuple[int, ...]:
+        """The affected units; none where all are."""
+        return tuple(int(place[name]) for name in ("unit", "other") if name in place)
 
     def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
