@@ -100,6 +100,15 @@ def wrong_pose(scene: Any, readings: Floats, noise: Floats, amount: float, rng: 
     return scene, None, readings, noise, Told(("wrong_pose",), (), (dwell,))
 
 
+def pose_off(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """The table stands ``amount`` degrees off in every dwell of one pose, for all units."""
+    chosen, way = int(rng.integers(noise.shape[1])), rng.uniform(0.0, 2.0 * np.pi)
+    here = np.linalg.norm(scene.force - scene.force[chosen], axis=-1) < 1e-6
+    off = np.radians(amount) * here
+    scene = replace(scene, outer=scene.outer + np.cos(way) * off, inner=scene.inner + np.sin(way) * off)
+    return scene, None, readings, noise, Told(("pose_off",), (), tuple(np.flatnonzero(here).tolist()))
+
+
 def table_slip(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
     """The table slips on its drives by ``amount`` mrad in the middle third of the run."""
     n = noise.shape[1]
@@ -133,6 +142,7 @@ FAULTS: dict[str, Callable[..., Done]] = {
     "units_swapped": units_swapped,
     "thermometer": thermometer,
     "wrong_pose": wrong_pose,
+    "pose_off": pose_off,
     "table_slip": table_slip,
     "unsoaked": unsoaked,
 }

@@ -190,6 +190,12 @@ def tilts(state: State) -> Array:
     return np.stack([by_outer, by_inner], axis=-1)
 
 
+def poses(lot: "Lot") -> NDArray[np.intp]:
+    """Number of the pose of each dwell, (n,)."""
+    force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
+    return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)
+
+
 def soaks(state: State) -> NDArray[np.intp]:
     """Number of the soak of each dwell, (n,); all zero at constant temperature."""
     return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
