@@ -7,6 +7,7 @@ from inertial.criticism import decisions
 from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
+from inertial.criticism.jumps import jumps_instead
 from inertial.criticism.model import Model
 from inertial.criticism.search import Rival, judge, judge_refined, ranked, scanned, size_of
 from inertial.criticism.term import Term
@@ -70,6 +71,12 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     near = [t for t in near if term.effect.id not in t.effect.after]
     judged = [judge_refined(field, rest, t, model.noise) for t in near]
     judged = ranked([own, *judged])
+    jumps = jumps_instead(field, rest, judged[0])
+    if jumps is not None and not any(r.term.effect.id == jumps.terms[0].effect.id for r in judged):
+        judged.append(
+            Rival(jumps.terms[0], judged[0].drop, judged[0].rank, judged[0].cost - jumps.ahead, judged[0].log_p)
+        )
+        judged.sort(key=lambda r: r.cost)
     best = judged[0]
     members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + CLASS_WIDTH)
     return EffectClass(members, best.log_p, size_of(rest, best.term))

@@ -1,6 +1,6 @@
 """A run under examination: bad dwells and handling errors are removed before effects are judged."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -19,13 +19,14 @@ from inertial.criticism.handling import alternatives
 from inertial.criticism.handling.base import Exchangeable, Handling, Misfit, soaks
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
+from inertial.criticism.jumps import jumps_instead
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.loudness import loudness_of
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.refinement import replaced, terms_of
-from inertial.criticism.search import SearchResult, anything, judge, search
+from inertial.criticism.search import Rival, SearchResult, anything, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.term import Term
 from inertial.criticism.turn_on import with_turn_on
@@ -154,19 +155,32 @@ def mended(run: ExaminedRun) -> EffectSearch:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
         part = _part(fields, base)
-        searched, of = search(part.field, part.base, stop=part.imitates), part.field
-        if searched.handling is None and part.field is not fields:
+        searched, of = search(part.field, part.base, part.imitates, _jumps_in(part.field)), part.field
+        if not searched.handling and part.field is not fields:
             part.base.problem.forget()
             part.base.forget()
-            searched = replace(search(fields, base, stop=part.imitates, start=searched.added), ladder=searched.ladder)
-            of = fields
+            whole = search(fields, base, part.imitates, _jumps_in(fields), start=searched.added)
+            searched, of = replace(whole, ladder=searched.ladder), fields
         if part.field is not fields:
             base.forget()
-        if searched.handling is None or len(run.handled) >= _MENDED:
+        if not searched.handling or len(run.handled) >= _MENDED:
             return EffectSearch(base, fields, part, searched)
-        if _drifts(run, part, searched.handling):
+        if _drifts(run, part, searched.handling[0]):
             continue
-        _mend(run, of, searched, searched.handling)
+        for term in searched.handling:
+            others = [other for other in searched.handling if other is not term]
+            beside = Model(of.problem, [*searched.model.terms, *others], near=searched.model.noise)
+            _mend(run, of, replace(searched, model=beside if others else searched.model), term)
+
+
+def _jumps_in(fields: Candidates) -> Callable[[Model, Rival], tuple[Term, ...]]:
+    """The jumps of single axes that explain more than an effect."""
+
+    def instead(model: Model, rival: Rival) -> tuple[Term, ...]:
+        jumps = jumps_instead(fields, model, rival)
+        return jumps.terms if jumps is not None and jumps.ahead > 0.0 else ()
+
+    return instead
 
 
 def _drifts(run: ExaminedRun, part: "LotPart", term: Term) -> bool:

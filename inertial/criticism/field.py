@@ -75,6 +75,10 @@ class Candidates:
                     each[effect.id] = gain
         return gains
 
+    def gain_of(self, space: Space, effect: AnyEffect | Handling) -> Gain:
+        """Gain of one candidate, whether the model holds it or not."""
+        return self._gain([space], effect, None)[0]
+
     def _gain(self, spaces: Sequence[Space], effect: AnyEffect | Handling, first: int | None) -> list[Gain]:
         if isinstance(effect, OfOneDwell) and not self.problem.lot.radial:
             places = np.array([int(place["at"]) for place in self.grids[effect.id]])

@@ -34,6 +34,7 @@ class Handling(Effect):
     Attributes
     ----------
     fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
+    of_one_axis : whether it concerns the bias of one axis of one unit, at an ``axis``
     in_part : whether some units of a large lot stand for it: it is the same for all, and mended without a look at each
     """
 
@@ -43,6 +44,7 @@ class Handling(Effect):
     simplicity: ClassVar[int] = 0
     fewest_units: ClassVar[int] = 2
     in_part: ClassVar[bool] = True
+    of_one_axis: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:

@@ -27,6 +27,7 @@ class BiasUnsteady(Handling):
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_quadratic", "thermal_hysteresis")
     fewest_units: ClassVar[int] = 1
     in_part: ClassVar[bool] = False
+    of_one_axis: ClassVar[bool] = True
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every axis of every unit; none where only a norm is known, or with less than three soaks."""
