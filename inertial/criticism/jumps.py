@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from inertial.criticism.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import EDGE, Handling
+from inertial.criticism.handling.base import Handling
 from inertial.criticism.handling.bias_jump import BiasJump
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import freedom, price
@@ -73,7 +73,7 @@ def jumps_instead(field: Candidates, model: Model, rival: Rival) -> Jumps | None
         if gain > 0.0:
             together += gain
             terms += one.terms
-    ahead = together - score
+    ahead = float(together - score)
     return Jumps(tuple(terms), ahead) if terms and ahead > -CLASS_WIDTH else None
 
 
@@ -117,7 +117,7 @@ def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handli
             block = int(3 * place["unit"] + place["axis"])
             score = drop - price(drop, rank) - paid
             if block not in best or score > best[block].score:
-                best[block] = _OfAxis(score, (Term(alternative, tuple(place.items())),))
+                best[block] = _OfAxis(float(score), (Term(alternative, tuple(place.items())),))
     return best
 
 
@@ -129,7 +129,7 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
     if jump is not None:
         unit, axis = divmod(block, 3)
         for drop, dwells in _several(space, block):
-            chosen = float(np.log(comb(space.q.shape[1] - 2 * EDGE + 1, len(dwells)) * axes))
+            chosen = float(np.log(comb(space.q.shape[1] - 1, len(dwells)) * axes))
             places = ({"unit": float(unit), "axis": float(axis), "dwell": float(k)} for k in dwells)
             terms = tuple(Term(jump, tuple(place.items())) for place in places)
             tried.append(_OfAxis(drop - price(drop, len(dwells)) - 2.0 * chosen, terms))
@@ -139,7 +139,7 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
 def _several(space: Space, block: int) -> Iterator[tuple[float, list[int]]]:
     """Reductions of the deviance by two jumps of a block and more, each with its dwells: two at a time, or one."""
     n = space.q.shape[1]
-    dwells, one = np.arange(EDGE, n - EDGE + 1), np.array([block])
+    dwells, one = np.arange(1, n), np.array([block])
     steps = (np.arange(n)[:, None] >= dwells).astype(np.float64)[None]
     white = space.project(space.covariance.whiten(steps, space.noise.shares, one) / space.noise.scale[block], one)[0]
     gram, along = white.T @ white, white.T @ space.residual[block]
