@@ -93,14 +93,14 @@ def _evenness(drops: Array) -> float:
     """Twice the logarithm of the probability that so few of several reductions have so much of them; zero where that is usual.
 
     Coefficients from one normal distribution have reductions of chi-square of one degree of freedom each: those of the m largest
-    and of the others have an F distribution, one for each of the possible choices.
+    and of the others have an F distribution, one for each of the possible choices. Noise alone gives one to each.
     """
     ordered = np.sort(drops)[::-1]
     count = ordered.size
     unlikely = 0.0
     for m in range(1, count):
         top, rest = float(ordered[:m].sum()), float(ordered[m:].sum())
-        ratio = (top / m) / max(rest / (count - m), 1e-9 * top, 1e-300)
+        ratio = (top / m) / max(rest / (count - m), 1.0)
         chances = float(np.log(comb(count, m) * count))
         unlikely = min(unlikely, 2.0 * (float(log_f_tail(ratio, m, count - m)) + chances))
     return unlikely
