@@ -11,6 +11,8 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.bases import SEEN
+from inertial.criticism.candidate import Candidate
 from inertial.criticism.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
@@ -60,7 +62,7 @@ def jumps_instead(field: Candidates, model: Model, rival: Rival) -> Jumps | None
         return None
     space = model.at(model.with_term(rival.term).noise)
     # the variances are those with the effect, or with jumps in its place, in the model: at them deviances are sums of squares
-    drops = space.gain(rival.term.candidate(model.problem)).by_block[:, 0]
+    drops = _drops(space, rival.term.candidate(model.problem))
     score = _score(drops, rival)
     largest = np.argsort(drops)[::-1][:_AXES]
     if _BEYOND * float(drops[largest].sum()) < score - CLASS_WIDTH:
@@ -75,6 +77,20 @@ def jumps_instead(field: Candidates, model: Model, rival: Rival) -> Jumps | None
             terms += one.terms
     ahead = float(together - score)
     return Jumps(tuple(terms), ahead) if terms and ahead > -CLASS_WIDTH else None
+
+
+def _drops(space: Space, candidate: Candidate) -> Array:
+    """Reduction of the residuals of each block by an effect, (blocks,), beside the terms that blocks share."""
+    white = space.whiten(candidate.of_blocks[:, :, 0, :])
+    columns = space.project(white)
+    before, size = (np.sqrt(np.einsum("bnp,bnp->bp", each, each)) for each in (white, columns))
+    columns = columns * np.where(size > SEEN * before, 1.0 / np.where(size > 0.0, size, 1.0), 0.0)[:, None, :]
+    inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=SEEN**2, hermitian=True)
+    along = np.einsum("bnp,bn->bp", columns, space.residual)
+    drops = np.einsum("bp,bpq,bq->b", along, inverse, along)
+    # with their coefficients estimated again the effect explains more
+    whole, total = float(space.gain(candidate).drop[0]), max(float(drops.sum()), 1e-300)
+    return drops * max(whole / total, 1.0)
 
 
 def _score(drops: Array, rival: Rival) -> float:
