@@ -25,7 +25,7 @@ from inertial.criticism.loudness import loudness_of
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import replaced, terms_of
+from inertial.criticism.refinement import better_placed, replaced, terms_of
 from inertial.criticism.search import Rival, SearchResult, anything, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.term import Term
@@ -48,7 +48,7 @@ class Named:
 
     heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN if none can
     units, dwells : that an alternative of scope "data" concerns, none for all units; evidence : its description
-    carried : the dwells of largest influence
+    carried : the dwells of largest influence; term : the alternative in the model, if it stays there
     """
 
     effects: EffectClass
@@ -59,6 +59,7 @@ class Named:
     dwells: tuple[int, ...] = ()
     evidence: str = ""
     carried: CarriedEvidence = field(default_factory=CarriedEvidence)
+    term: Term | None = None
 
     @property
     def predicts(self) -> bool:
@@ -127,11 +128,28 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=searched.base.problem.slope)
         kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
-        if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
+        same = {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}
+        if same and not _placed_again(run, searched.model):
             break
         run.removed = kept
         searched = mended(run)
     return run, searched
+
+
+def _placed_again(run: ExaminedRun, model: Model) -> bool:
+    """Whether a change during the run is at another dwell now that the bad dwells beside it are known; then it is moved there."""
+    moved = False
+    for at, one in enumerate(run.handled):
+        best = None if one.term is None else better_placed(model, one.term)
+        if one.term is None or best is None or not isinstance(best.effect, Handling):
+            continue
+        place = {k: v for k, v in best.keywords.items() if isinstance(v, float)}
+        size = model.without_term(one.term).with_term(best).shared_sizes(best)
+        evidence, dwells = best.effect.describe(run.lot, size, **place), best.effect.dwells(run.lot, **place)
+        run.beside = [best if t is one.term else t for t in run.beside]
+        run.handled[at] = replace(one, term=best, evidence=evidence, dwells=tuple(dwells))
+        moved = True
+    return moved
 
 
 @dataclass(frozen=True)
@@ -218,8 +236,9 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     evidence, dwells = _happened(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, evidence, carried_by(searched.model, term)))
     lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
+    carried, lasting = carried_by(searched.model, term), term if lot is None else None
+    run.handled.append(Named(group, *errors, units, dwells, evidence, carried, lasting))
     if lot is None:
         run.beside.append(term)
     else:
