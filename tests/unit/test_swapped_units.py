@@ -52,6 +52,14 @@ def test_no_pair_is_searched_where_no_units_were_exchanged(world: World) -> None
     assert [UnitsSwapped().places(lot_of(measured(one.dwells, one.history))) for one in lots] == [[]] * 5
 
 
+def test_a_dwell_of_an_exchanged_unit_is_no_wrong_pose() -> None:
+    made = make(World(differ=0.4, fault="units_swapped"), SEED + 112)
+    document = diagnose(made.dwells, made.history)
+    (told,), (group,) = made.faults, document["classes"]
+    assert document["blocked_by"] == []
+    assert (group["effects"], tuple(group["units"])) == (["units_swapped"], told.units)
+
+
 def test_part_of_a_difference_between_two_units_is_no_exchange() -> None:
     made = make(World(units=4, differ=0.2), SEED + 30)
     dwells = made.dwells.copy()

@@ -6,26 +6,15 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.handling.base import EDGE, Array, Handling, Misfit, by_block
+from inertial.criticism.exchanged import EDGE, PlainFit
+from inertial.criticism.handling.base import Array, Handling, Misfit, by_block
 from inertial.state import History, State
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
-_OPPOSITE = -0.5
-"""Correlation of the residuals of two units below which they may have been exchanged: what one has too much the other lacks."""
-
-_LEFT = 0.5
-"""Share of the squares of both that is left with the readings exchanged back."""
-
-_AROUND = 3
-"""Dwells on either side of the best one that are searched."""
-
 _OF_ONE = 1.25
 """Factor within which the coefficient must be one: part of a difference between two units is no exchange."""
-
-_MANY = 4
-"""Units from which the median over the units is what they have in common."""
 
 
 class UnitsSwapped(Handling):
@@ -42,19 +31,14 @@ class UnitsSwapped(Handling):
         """Pairs whose residuals by a plain fit are opposite to each other and vanish with an exchange, at the best dwells."""
         if lot.radial:
             return []
-        basis, left = _plain_fit(lot)
+        fit = _plain_fit(lot)
         return [
-            {"unit": float(a), "other": float(b), "dwell": float(k)}
-            for a, b in _opposite(left)
-            for k in _instants(_of_other(lot, a, b) - lot.output[[a, b]], basis[[a, b]], left[[a, b]])
+            {"unit": float(a), "other": float(b), "dwell": float(k)} for a, b in fit.pairs() for k in fit.instants(a, b)
         ]
 
     def placed(self, lot: "Lot", **place: float) -> dict[str, float]:
         """At the dwell from which on an exchange leaves least: between dwells that were left out all were equally good."""
-        one, other, _ = _places(lot, **place)
-        pair = [one, other]
-        basis, left = (each[pair] for each in _plain_fit(lot))
-        near = _instants(_of_other(lot, one, other) - lot.output[pair], basis, left, around=0)
+        near = _plain_fit(lot).instants(int(place["unit"]), int(place["other"]), around=0)
         return {**place, "dwell": float(near[0])} if near else place
 
     def looks(self, lot: "Lot", places: int) -> int:
@@ -106,55 +90,10 @@ def _places(lot: "Lot", **place: float) -> tuple[int, int, NDArray[np.bool_]]:
     return one, other, there & (np.arange(lot.state.time.shape[1]) >= place["dwell"])
 
 
-def _plain_fit(lot: "Lot") -> tuple[Array, Array]:
-    """A fit of bias, response and their slopes over temperature: orthonormal columns (units, n, p), residuals (units, n, 3)."""
-    state = lot.state
-    units, n = state.time.shape
-    force = np.broadcast_to(state.force, (units, n, 3))
-    columns = [np.ones((units, n, 1)), force]
-    if state.theta is not None and float(np.ptp(state.theta)) > 1.0:
-        columns += [state.theta[..., None], state.theta[..., None] * force]
-    there = np.all(np.isfinite(lot.error), axis=-1, keepdims=True)
-    basis = np.linalg.qr(np.concatenate(columns, axis=-1) * there)[0]
-    output = np.where(there, lot.output, 0.0)
-    return basis, output - basis @ (np.swapaxes(basis, -1, -2) @ output)
-
-
-def _opposite(left: Array) -> list[tuple[int, int]]:
-    """Pairs of units, each of which has the residuals that are most opposite to the other's."""
-    units = len(left)
-    own = left - np.median(left, axis=0) if units >= _MANY else left
-    flat = own.reshape(units, -1)
-    size = np.linalg.norm(flat, axis=1)
-    flat = flat / np.where(size > 0.0, size, 1.0)[:, None]
-    alike = flat @ flat.T
-    partner = np.argmin(alike, axis=1)
-    mutual = (partner[partner] == np.arange(units)) & (np.arange(units) < partner)
-    return [(int(a), int(partner[a])) for a in np.flatnonzero(mutual) if alike[a, partner[a]] < _OPPOSITE]
-
-
-def _instants(apart: Array, basis: Array, left: Array, around: int = _AROUND) -> list[int]:
-    """Dwells about the one from which on an exchange leaves least; none if it leaves too much.
-
-    Parameters
-    ----------
-    apart : (2, n, 3), readings of the other unit less the own; basis : (2, n, p); left : (2, n, 3)
-    """
-    n = apart.shape[1]
-    dwells = np.arange(EDGE, n - EDGE + 1)
-    after = (np.arange(n) >= dwells[:, None]).astype(np.float64)
-    squares = np.zeros(dwells.size)
-    for difference, own, rest in zip(apart, basis, left, strict=True):
-        # ‖r + c‖² of the columns c = P·H·d, from running sums: cᵀc = dᵀHd − (QᵀHd)², rᵀc = rᵀHd
-        for axis in range(3):
-            change = difference[:, axis]
-            along = after @ (own * change[:, None])
-            squares += after @ change**2 - np.sum(along**2, axis=1) + 2.0 * (after @ (rest[:, axis] * change))
-    best = int(np.argmin(squares))
-    whole = float(np.sum(left**2))
-    if whole <= 0.0 or whole + float(squares[best]) > _LEFT * whole:
-        return []
-    return dwells[max(best - around, 0) : best + around + 1].tolist()
+def _plain_fit(lot: "Lot") -> PlainFit:
+    """The fit by which pairs are found."""
+    there = np.all(np.isfinite(lot.error), axis=-1)
+    return PlainFit(lot.output, lot.state.force, lot.state.theta, there, lambda one, other: _of_other(lot, one, other))
 
 
 def _of_other(lot: "Lot", one: int, other: int) -> Array:
