@@ -251,9 +251,12 @@ def _misfit(model: Model, richer: Model) -> Misfit:
     """Misfit of a model on the dwells of some units, with the noise of a richer model."""
     local = [t for t in model.terms if not t.shared]
 
-    def left(lot: Lot, units: tuple[int, ...]) -> float:
+    def left(lot: Lot, units: tuple[int, ...], *, own_noise: bool = False) -> float:
         # dwells that were removed stay removed
         error = model.problem.lot.error[list(units)]
+        if own_noise:
+            # the noise of soaks was that of the readings before they were corrected
+            return cost_of_model(Model(Problem(replace(lot, error=error, loudness=None)), local))
         problem = Problem(replace(lot, error=error))
         blocks = [3 * unit + axis for unit in units for axis in range(3)]
         noise = problem.covariance.rescaled(richer.noise.pick(blocks), model.problem.covariance)

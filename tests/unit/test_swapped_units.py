@@ -25,6 +25,7 @@ SEED = 6_300_000
     [
         ("swapped", 1), ("swapped", 2), ("swapped", 3), ("swapped_thermometers", 1), ("swapped_thermometers", 2),
         ("swapped_alike", 1), ("swapped_alike", 2), ("swapped_two_units", 1), ("swapped_two_units", 2),
+        ("swapped_two_units", 700_002),
         pytest.param("swapped_many_units", 1, marks=pytest.mark.slow),
     ],
 )  # fmt: skip

@@ -6,9 +6,8 @@ axis. They are of scope "data": no model is extended by them.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,15 @@ if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
 Array = NDArray[np.float64]
-Misfit = Callable[["Lot", tuple[int, ...]], float]
-"""Whitened sum of squares of the model's residuals on a lot of some units, by their numbers in the whole lot."""
+
+
+class Misfit(Protocol):
+    """How badly the model fits a lot of some units, by their numbers in the whole lot."""
+
+    def __call__(self, lot: "Lot", units: tuple[int, ...], *, own_noise: bool = False) -> float:
+        """The whitened sum of squares, or with the noise of that lot the deviance."""
+        ...
+
 
 _PLACES = 40
 EDGE = 3  # dwells at both ends after which, or before which, no change can be detected

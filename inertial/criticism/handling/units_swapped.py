@@ -79,7 +79,7 @@ class UnitsSwapped(Handling):
         one, other, _ = _places(lot, **place)
         outputs = _outputs_exchanged(lot, **place)
         whole = replace(outputs, state=_temperatures_exchanged(lot.state, **place))
-        misfits = [misfit(each.units([one, other]), (one, other)) for each in (outputs, whole)]
+        misfits = [misfit(each.units([one, other]), (one, other), own_noise=True) for each in (outputs, whole)]
         return outputs if misfits[0] <= misfits[1] else whole
 
 
