@@ -35,7 +35,7 @@ def test_units_that_were_exchanged_are_told_with_the_dwell_and_no_physics(name: 
     (told,), (group,) = made.faults, document["classes"]
     assert (group["effects"], group["scope"]) == (["units_swapped"], "data")
     assert (tuple(group["units"]), group["dwells"]) == (told.units, [told.dwells[0]])
-    assert "exchanged" in group["evidence"]
+    assert group["evidence"].startswith(f"{told.units[0]} and {told.units[1]}: exchanged before this dwell")
     assert (document["recommended"], document["unexplained"]) == ([], None)
 
 

@@ -68,10 +68,7 @@ class UnitsSwapped(Handling):
         del size
         one, other, after = _places(lot, **place)
         apart = 1e6 * float(np.sqrt(np.mean((lot.output[one, after] - _of_other(lot, one, other)[0, after]) ** 2)))
-        return (
-            f"the two units were exchanged before this dwell: from it on each has the readings of the other, {apart:.0f} µg "
-            "apart; their readings are exchanged back"
-        )
+        return f"exchanged before this dwell, readings {apart:.0f} µg apart; they are exchanged back"
 
     def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
         """With the readings exchanged back: the temperatures, too, if the model fits better with them."""
