@@ -246,6 +246,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "TOGETHER": ("decision_rates.py",),
     "LEFT_OUT": ("worlds", "loop"),
     "REMAINDER": ("remainders.py",),
+    "JUMPS_RARE": ("worlds", "noises"),
 }
 """Numbers with a command of their own."""
 

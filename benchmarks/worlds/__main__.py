@@ -68,7 +68,7 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
     for told in made.faults:
         stray = [effects for effects in stray if not set(told.names) & set(effects)]
     said = [(set(g["effects"]), g.get("units") or [], g.get("dwells") or []) for g in groups]
-    said += [({b["fault"]}, b["units"], b["dwells"]) for b in document["blocked_by"]]
+    said += _blocked(document)
     return {
         "adequate": document["adequate"],
         "named": [g["effects"] for g in groups],
@@ -88,6 +88,14 @@ def judged(world: World, made: Made, document: dict[str, Any]) -> dict[str, Any]
         "said": [(sorted(a), b, c) for a, b, c in said],
         "truth": [(told.names, told.units, told.dwells) for told in made.faults],
     }
+
+
+def _blocked(document: dict[str, Any]) -> list[tuple[set[str], list[str], list[int]]]:
+    """Data faults: one of several units in the same dwells is one."""
+    together: dict[tuple[str, tuple[int, ...]], list[str]] = defaultdict(list)
+    for b in document["blocked_by"]:
+        together[b["fault"], tuple(b["dwells"])] += b["units"]
+    return [({fault}, units, list(dwells)) for (fault, dwells), units in together.items()]
 
 
 def _left_out(made: Made, document: dict[str, Any]) -> bool | None:

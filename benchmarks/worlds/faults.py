@@ -62,6 +62,21 @@ def unit_moved(scene: Any, readings: Floats, noise: Floats, amount: float, rng: 
     return scene, turned, readings, noise, Told(names, (f"W{unit + 1:03d}",), (at,))
 
 
+def units_swapped(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """Two units are exchanged after a soak, or within one; with an ``amount`` their thermometers go with them."""
+    n = noise.shape[1]
+    one, other = (int(u) for u in rng.choice(len(noise), 2, replace=False))
+    at = int(rng.choice([np.flatnonzero(np.diff(scene.soak))[-1] + 1, rng.integers(n // 3, 2 * n // 3)]))
+    pair, late = [one, other], slice(at, None)
+    whole, noise = scene.output + noise, noise.copy()
+    noise[pair, late] = whole[pair[::-1], late] - scene.output[pair, late]
+    if amount:
+        readings = readings.copy()
+        readings[pair, late] = readings[pair[::-1], late]
+    units = tuple(f"W{unit + 1:03d}" for unit in sorted(pair))
+    return scene, None, readings, noise, Told(("units_swapped",), units, tuple(range(at, n)))
+
+
 def thermometer(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
     """All thermometers of one soak read ``amount`` K too much."""
     soak = int(rng.integers(int(scene.soak.max()) + 1))
@@ -83,6 +98,15 @@ def wrong_pose(scene: Any, readings: Floats, noise: Floats, amount: float, rng: 
     off[dwell] = np.radians(amount)
     scene = replace(scene, outer=scene.outer + np.cos(way) * off, inner=scene.inner + np.sin(way) * off)
     return scene, None, readings, noise, Told(("wrong_pose",), (), (dwell,))
+
+
+def pose_off(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
+    """The table stands ``amount`` degrees off in every dwell of one pose, for all units."""
+    chosen, way = int(rng.integers(noise.shape[1])), rng.uniform(0.0, 2.0 * np.pi)
+    here = np.linalg.norm(scene.force - scene.force[chosen], axis=-1) < 1e-6
+    off = np.radians(amount) * here
+    scene = replace(scene, outer=scene.outer + np.cos(way) * off, inner=scene.inner + np.sin(way) * off)
+    return scene, None, readings, noise, Told(("pose_off",), (), tuple(np.flatnonzero(here).tolist()))
 
 
 def table_slip(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
@@ -115,8 +139,10 @@ FAULTS: dict[str, Callable[..., Done]] = {
     "dwell_of_moved": dwell_of_moved,
     "unit_unsoaked": unit_unsoaked,
     "unit_moved": unit_moved,
+    "units_swapped": units_swapped,
     "thermometer": thermometer,
     "wrong_pose": wrong_pose,
+    "pose_off": pose_off,
     "table_slip": table_slip,
     "unsoaked": unsoaked,
 }

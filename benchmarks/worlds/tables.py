@@ -73,6 +73,15 @@ FAULTS |= {
     "moved_and_thermometer": World(fault="unit_moved", amount=0.2, beside=(("thermometer", 0.5),)),
     "slip_and_moved": World(fault="table_slip", amount=0.7, beside=(("unit_moved", 0.5),)),
     "pose_and_moved": World(fault="wrong_pose", amount=0.1, beside=(("unit_moved", 0.2),)),
+    "pose_off": World(fault="pose_off", amount=0.1),
+    "pose_off_one_unit": World(units=1, fault="pose_off", amount=0.1),
+    "pose_off_one_unit_12": World(units=1, poses=12, fault="pose_off", amount=0.1),
+    "pose_off_two_units": World(units=2, fault="pose_off", amount=0.1),
+    "swapped": World(differ=0.2, fault="units_swapped"),
+    "swapped_thermometers": World(differ=0.2, fault="units_swapped", amount=1.0),
+    "swapped_alike": World(differ=0.02, fault="units_swapped"),
+    "swapped_two_units": World(units=2, differ=0.2, fault="units_swapped"),
+    "swapped_many_units": World(units=32, differ=0.2, fault="units_swapped"),
 }
 """What goes wrong, one at a time and two at once."""
 

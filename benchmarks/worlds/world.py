@@ -26,6 +26,7 @@ class World:
     floors : the amount in place of ``amount``, over the RMS noise of a dwell about the mean of its record, for faults in mg
     beside : further faults and their amounts
     rest : RMS of the table's rest position, µrad, alike for all; lsb : resolution over the noise of a dwell's samples
+    differ : factor on what the units differ by in bias and response
     turn_on : RMS of the bias shift between the run and the fresh one, µg; unsoaked : dwells begin when the chamber arrives
     """
 
@@ -42,6 +43,7 @@ class World:
     beside: tuple[tuple[str, float], ...] = ()
     rest: float = 0.0
     lsb: float = 0.0
+    differ: float = 1.0
     turn_on: float = 0.0
     repeats: int = 1
     hours: float = 2.5
@@ -102,7 +104,7 @@ def make(world: World, seed: int) -> Made:
     """The tables of a world; the same seed gives the same bytes."""
     plan, device, first, second, third = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
     scene = _scene(world, plan, first)
-    lot = Lot.drawn(device, world.units)
+    lot = Lot.drawn(device, world.units, world.differ)
     scene, again = (replace(s, output=lot.output(s)) for s in (scene, _with_heat(scene, world, second)))
     noises = [
         1e-6 * dwell_noise(noise, s.start, s.duration, world.units, g, s.temperature.mean(axis=0))
@@ -145,11 +147,11 @@ class Lot:
     scale_tempco: Floats
 
     @staticmethod
-    def drawn(rng: np.random.Generator, units: int) -> Lot:
+    def drawn(rng: np.random.Generator, units: int, differ: float = 1.0) -> Lot:
         """Devices of one make."""
-        matrix = np.eye(3) + 3e-3 * rng.standard_normal((units, 3, 3))
+        matrix = np.eye(3) + 3e-3 * differ * rng.standard_normal((units, 3, 3))
         return Lot(
-            0.02 * rng.standard_normal((units, 3)),
+            0.02 * differ * rng.standard_normal((units, 3)),
             matrix,
             50e-6 * (rng.standard_normal(3) + 0.6 * rng.standard_normal((units, 3))),
             80e-6 * (1.0 + 0.4 * rng.standard_normal((units, 3))),

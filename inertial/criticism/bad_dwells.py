@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inertial.criticism.bad_norms import bad_norms
 from inertial.criticism.decisions import BAD_DWELL, COMMON, MOST_BAD
+from inertial.criticism.handling.base import poses
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.space import Space
@@ -24,6 +25,16 @@ _ALIKE = 0.6
 
 _AT_LEAST = 2
 """Dwells that may be left out of a record, however short it is."""
+
+_SEVERAL = 3
+"""Units from which the median over the units tells a wrong pose from a bad dwell; with fewer the dwells of one pose do."""
+
+_EVERY_TIME = 0.7
+"""Share of the mean deviation of all dwells of a pose that each of them has along it if the pose is off every time.
+
+One bad dwell of three gives a third of its deviation to the mean, and less than a tenth, of the opposite sign, to each other
+one: it stays a bad dwell.
+"""
 
 _LEAST_DOF = 6
 """Degrees of freedom of a unit below which none of its dwells can be identified as bad."""
@@ -81,6 +92,8 @@ def _round(model: Model, most: int) -> list[BadDwell]:
     space = model.space
     axes = 1 if model.problem.lot.radial else 3
     looked = _Deletion(space, axes)
+    if not model.problem.lot.radial and looked.units < _SEVERAL:
+        looked.leave(looked.off_every_time(poses(model.problem.lot)))
     bad: list[BadDwell] = []
     while len(bad) < most:
         best = looked.worst()
@@ -109,6 +122,29 @@ class _Deletion:
             # the prior's part of each block's variance
             self.centre = np.maximum(space.noise.scale**2 * (self.dof + space.noise.prior) - self.squares, 0.0)
         self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
+        self.left_to_poses = np.zeros(self.n, dtype=bool)
+
+    def leave(self, dwells: NDArray[np.bool_]) -> None:
+        """Leave some dwells (n,) to the alternatives that concern a pose."""
+        self.left_to_poses = dwells
+
+    def off_every_time(self, pose: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
+        known = self.there & (self.size > 1e-9 * self.size.max())
+        size = np.where(known, self.size, 1.0)
+        there = known.reshape(self.units, self.axes, self.n).all(axis=1)
+        off = np.where(known, self.left / size, 0.0).reshape(self.units, self.axes, self.n) * there[:, None]
+        squares = self._studentised(np.where(known, self.left**2 / size, 0.0)).sum(axis=1)
+        of_pose = (pose == np.arange(int(pose.max()) + 1)[:, None]).astype(np.float64)
+        count = of_pose @ there.sum(axis=0)
+        mean = of_pose @ off.sum(axis=0).T / np.maximum(count, 1.0)[:, None]
+        along = np.einsum("uan,na->un", off, mean[pose])
+        alike = (along > _EVERY_TIME * np.sum(mean[pose] ** 2, axis=1)) & (
+            squares > float(chi2_upper(COMMON, self.axes))
+        )
+        every = of_pose @ np.any(there & ~alike, axis=0) == 0.0
+        several = of_pose @ there.any(axis=0) > 1.0
+        return (every & several)[pose]
 
     def worst(self) -> tuple[int, int, Array] | None:
         """Unit and dwell that stand out most, with their deviations (axes,); None where none does by more than chance."""
@@ -116,9 +152,10 @@ class _Deletion:
         drop = np.where(known, self.left**2 / np.where(known, self.size, 1.0), 0.0)
         squares = self._studentised(drop)
         statistic = squares.sum(axis=1)
-        if self.units > 2:
+        if self.units >= _SEVERAL:
             together = np.median(statistic, axis=0) > float(chi2_upper(COMMON, self.axes))
             statistic = np.where(together, 0.0, statistic)
+        statistic = np.where(self.left_to_poses, 0.0, statistic)
         unit, dwell = np.unravel_index(int(np.argmax(statistic)), statistic.shape)
         dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
         freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())

@@ -1,12 +1,13 @@
 """Classes of effects that the data cannot separate."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from inertial.criticism import decisions
 from inertial.criticism.decisions import CLASS_WIDTH
 from inertial.criticism.field import Candidates
 from inertial.criticism.handling.base import Handling
+from inertial.criticism.jumps import Jumps, jumps_instead
 from inertial.criticism.model import Model
 from inertial.criticism.search import Rival, judge, judge_refined, ranked, scanned, size_of
 from inertial.criticism.term import Term
@@ -70,9 +71,20 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
     near = [t for t in near if term.effect.id not in t.effect.after]
     judged = [judge_refined(field, rest, t, model.noise) for t in near]
     judged = ranked([own, *judged])
+    jumps = jumps_instead(field, rest, judged[0])
+    if jumps is not None:
+        judged = _with_jumps(judged, jumps)
     best = judged[0]
     members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + CLASS_WIDTH)
     return EffectClass(members, best.log_p, size_of(rest, best.term))
+
+
+def _with_jumps(judged: list[Rival], jumps: Jumps) -> list[Rival]:
+    """Rivals with the jumps of single axes that take the place of the best of them, at their score together."""
+    best, first = judged[0], jumps.terms[0]
+    same = next((r for r in judged if r.term.effect.id == first.effect.id), replace(best, term=first, ratio=None))
+    others = [r for r in judged if r is not same]
+    return sorted([*others, replace(same, cost=min(same.cost, best.cost - jumps.ahead))], key=lambda r: r.cost)
 
 
 def _stretch(term: Term, looked: Sequence[tuple[Term, float]], own: Rival) -> float:

@@ -204,6 +204,12 @@ RISES = 0.005
 by more than half of it in 17 of 17, by more than it in 13 of 17, by more than twice as much in 9 of 17.
 """
 
+JUMPS_RARE = 9.2
+"""Price, in chi-square, of every further jump of a single axis that takes the place of an effect together with others.
+
+Derived: 2·ln 100, an axis in a hundred jumps by itself. `python benchmarks/worlds noises --runs 10`.
+"""
+
 LESS_FLICKER, LESS_WALK = 0.25, 1.0 / 30.0
 """Fractions of 1/f and random walk at which candidates are tested again: a drift hidden in the walk is detected there.
 

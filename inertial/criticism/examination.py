@@ -1,6 +1,6 @@
 """A run under examination: bad dwells and handling errors are removed before effects are judged."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,13 +18,15 @@ from inertial.criticism.handling import alternatives
 from inertial.criticism.handling.base import Exchangeable, Handling, Misfit, soaks
 from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
+from inertial.criticism.jumps import jumps_instead
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.lot_part import LotPart, part_of
 from inertial.criticism.loudness import loudness_of
 from inertial.criticism.model import Model
+from inertial.criticism.penalty import cost_of_model
 from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import replaced, terms_of
-from inertial.criticism.search import SearchResult, judge, search
+from inertial.criticism.refinement import better_placed, replaced, terms_of
+from inertial.criticism.search import Rival, SearchResult, judge, search
 from inertial.criticism.slope import slope_of
 from inertial.criticism.term import Term
 from inertial.criticism.turn_on import with_turn_on
@@ -43,7 +45,7 @@ class Named:
 
     heldout_before, heldout_after : on dwells left out, the worst of the kinds that can judge both; NaN if none can
     units, dwells : that an alternative of scope "data" concerns, none for all units; evidence : its description
-    carried : the dwells of largest influence
+    carried : the dwells of largest influence; term : the alternative in the model, if it stays there
     """
 
     effects: EffectClass
@@ -54,6 +56,7 @@ class Named:
     dwells: tuple[int, ...] = ()
     evidence: str = ""
     carried: CarriedEvidence = field(default_factory=CarriedEvidence)
+    term: Term | None = None
 
     @property
     def predicts(self) -> bool:
@@ -141,11 +144,28 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
         # dwells that an effect or a handling error explains are not bad; with it in the model smaller ones become visible
         whole = Problem(run.lot, slope=searched.base.problem.slope)
         kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
-        if {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}:
+        same = {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}
+        if same and not _placed_again(run, searched.model):
             break
         run.removed = kept
         searched = mended(run)
     return run, searched
+
+
+def _placed_again(run: ExaminedRun, model: Model) -> bool:
+    """Whether a change during the run is at another dwell now that the bad dwells beside it are known; then it is moved there."""
+    moved = False
+    for at, one in enumerate(run.handled):
+        best = None if one.term is None else better_placed(model, one.term)
+        if one.term is None or best is None or not isinstance(best.effect, Handling):
+            continue
+        place = {k: v for k, v in best.keywords.items() if isinstance(v, float)}
+        size = model.without_term(one.term).with_term(best).shared_sizes(best)
+        evidence, dwells = best.effect.describe(run.lot, size, **place), best.effect.dwells(run.lot, **place)
+        run.beside = [best if t is one.term else t for t in run.beside]
+        run.handled[at] = replace(one, term=best, evidence=evidence, dwells=tuple(dwells))
+        moved = True
+    return moved
 
 
 @dataclass(frozen=True)
@@ -169,38 +189,54 @@ def mended(run: ExaminedRun) -> EffectSearch:
         base = run.model()
         fields = Candidates(base.problem, candidates_of(base, run.effects), run.alternatives())
         part = part_of(fields, base, wide=run.drift is not None)
-        searched, of = search(part.field, part.base, stop=part.imitates), part.field
-        if searched.handling is None and part.field is not fields:
+        searched, of = search(part.field, part.base, part.imitates, _jumps_in(part.field)), part.field
+        if not searched.handling and part.field is not fields:
             part.base.problem.forget()
             part.base.forget()
-            searched = replace(search(fields, base, stop=part.imitates, start=searched.added), ladder=searched.ladder)
-            of = fields
+            whole = search(fields, base, part.imitates, _jumps_in(fields), start=searched.added)
+            searched, of = replace(whole, ladder=searched.ladder), fields
         if part.field is not fields:
             base.forget()
-        if searched.handling is None or len(run.handled) >= _MENDED:
+        if not searched.handling or len(run.handled) >= _MENDED:
             if run.withdraw(part, searched.added):
                 continue
             return EffectSearch(base, fields, part, searched)
-        if run.comes_again(searched.handling) and run.withdraw(part, [searched.handling]):
+        if run.comes_again(searched.handling[0]) and run.withdraw(part, searched.handling):
             continue
-        _mend(run, of, searched, searched.handling)
+        for term in searched.handling:
+            others = [other for other in searched.handling if other is not term]
+            beside = Model(of.problem, [*searched.model.terms, *others], near=searched.model.noise)
+            _mend(run, of, replace(searched, model=beside if others else searched.model), term)
+
+
+def _jumps_in(fields: Candidates) -> Callable[[Model, Rival], tuple[Term, ...]]:
+    """The jumps of single axes that explain more than an effect."""
+
+    def instead(model: Model, rival: Rival) -> tuple[Term, ...]:
+        jumps = jumps_instead(fields, model, rival)
+        return jumps.terms if jumps is not None and jumps.ahead > 0.0 else ()
+
+    return instead
 
 
 def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Term) -> None:
     """Remove a handling error from a run, and record it."""
-    model = searched.model.with_term(term)
-    group = class_of(fields, model, term)
-    problem = fields.problem
     alternative, place = term.effect, {k: v for k, v in term.keywords.items() if isinstance(v, float)}
     if not isinstance(alternative, Handling):
         raise TypeError(term.effect.id)
+    place = alternative.placed(run.lot, **place)
+    term = Term(alternative, tuple(place.items()))
+    model = searched.model.with_term(term)
+    group = class_of(fields, model, term)
+    problem = fields.problem
     size = model.shared_sizes(term)
-    units = (int(place["unit"]),) if "unit" in place else ()
+    units = alternative.units(**place)
     evidence, dwells = _happened(fields, searched.model, term, alternative, size)
     before, after = left_out(searched.model), left_out(model)
     errors = fit_rms(problem, model.terms), *worst(before, after)
-    run.handled.append(Named(group, *errors, units, dwells, evidence, carried_by(searched.model, term)))
     lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
+    carried, lasting = carried_by(searched.model, term), term if lot is None else None
+    run.handled.append(Named(group, *errors, units, dwells, evidence, carried, lasting))
     if lot is None:
         run.beside.append(term)
     else:
@@ -213,9 +249,12 @@ def _misfit(model: Model, richer: Model) -> Misfit:
     """Misfit of a model on the dwells of some units, with the noise of a richer model."""
     local = [t for t in model.terms if not t.shared]
 
-    def left(lot: Lot, units: tuple[int, ...]) -> float:
+    def left(lot: Lot, units: tuple[int, ...], *, own_noise: bool = False) -> float:
         # dwells that were removed stay removed
         error = model.problem.lot.error[list(units)]
+        if own_noise:
+            # the noise of soaks was that of the readings before they were corrected
+            return cost_of_model(Model(Problem(replace(lot, error=error, loudness=None)), local))
         problem = Problem(replace(lot, error=error))
         blocks = [3 * unit + axis for unit in units for axis in range(3)]
         noise = problem.covariance.rescaled(richer.noise.pick(blocks), model.problem.covariance)

@@ -31,6 +31,7 @@ class Candidates:
         self.handling: list[Handling] = []
         self.grids: dict[str, list[dict[str, float]]] = {}
         self.lacking: dict[str, str] = {}
+        self._looked: dict[str, int] = {}
         self._single: dict[str, Array] = {}
         for effect in effects:
             try:
@@ -46,11 +47,12 @@ class Candidates:
             if places and problem.lot.state.time.shape[0] >= alternative.fewest_units:
                 self.handling.append(alternative)
                 self.grids[alternative.id] = places
+                self._looked[alternative.id] = alternative.looks(problem.lot, len(places))
 
     @property
     def looks(self) -> int:
         """Number of tests made in one pass: every effect at every value, every alternative at every place."""
-        return sum(len(g) for g in self.grids.values())
+        return sum(self._looked.get(name, len(grid)) for name, grid in self.grids.items())
 
     def of(self, name: str) -> AnyEffect | Handling:
         """The candidate of an id."""
@@ -58,7 +60,7 @@ class Candidates:
 
     def places(self, name: str) -> int:
         """Number of places in the price of an alternative; one for an effect."""
-        return len(self.grids[name]) if any(a.id == name for a in self.handling) else 1
+        return self._looked.get(name, 1)
 
     def gains(self, space: Space, leave: set[str], *, handling: bool = False) -> dict[str, Gain]:
         """Gain of every candidate that the model does not hold already."""
@@ -72,6 +74,10 @@ class Candidates:
                 for each, gain in zip(gains, self._gain(spaces, effect, None), strict=True):
                     each[effect.id] = gain
         return gains
+
+    def gain_of(self, space: Space, effect: AnyEffect | Handling) -> Gain:
+        """Gain of one candidate, whether the model holds it or not."""
+        return self._gain([space], effect, None)[0]
 
     def _gain(self, spaces: Sequence[Space], effect: AnyEffect | Handling, first: int | None) -> list[Gain]:
         if isinstance(effect, OfOneDwell) and not self.problem.lot.radial:

@@ -21,6 +21,7 @@ class Lot:
     response : (units, 3, 3), K over its diagonal: how a change of force shows on each axis
     radial : only the norm of the force is known; the state's force is then the corrected output's own direction
     recorded : the white errors are from the scatter and number of samples, not from the residuals
+    scale : (units, 3), what the output of each axis was divided by; None where it is one for all
     loudness : (n,), standard deviation of the noise of each dwell over the lot's; None where it is the same in all
     """
 
@@ -31,6 +32,7 @@ class Lot:
     radial: bool = False
     recorded: bool = False
     loudness: Array | None = None
+    scale: Array | None = None
 
     def units(self, index: Sequence[int]) -> "Lot":
         """The lot of some units only."""
@@ -41,4 +43,5 @@ class Lot:
             output=self.output[pick],
             error=self.error[pick],
             response=self.response[pick],
+            scale=None if self.scale is None else self.scale[pick],
         )

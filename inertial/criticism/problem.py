@@ -266,7 +266,7 @@ class Problem:
 
     def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
         """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""
-        if grid and "unit" not in grid[0]:
+        if grid and ("unit" not in grid[0] or "other" in grid[0]):
             alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
             size = max(1, _PIECE // ((3 if alike else self.blocks) * self.n * _WIDEST))
             for start in range(0, len(grid), size):

@@ -19,6 +19,13 @@ from inertial.effects.base import AnyEffect, Nonlinear
 Array = NDArray[np.float64]
 
 
+_NEAR = 3
+"""Dwells on either side of a change of handling that are tried once more with all other terms in the model."""
+
+_CLEARLY = 1.0
+"""Chi-square by which another of them must be better."""
+
+
 def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term:
     """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
 
@@ -51,6 +58,20 @@ def _placed(space: Space, problem: Problem, term: Term) -> Term:
     pieces = list(problem.pieces(term.effect, near))
     drop = np.concatenate([space.gain(replace(p, key=None)).drop for p in pieces])
     return Term(term.effect, tuple(near[int(np.argmax(drop))].items()))
+
+
+def better_placed(model: Model, term: Term) -> Term | None:
+    """A change of handling in a model at a dwell near its own that is clearly better; None if there is none."""
+    dwell = term.keywords.get("dwell")
+    if not isinstance(term.effect, Handling) or not isinstance(dwell, float):
+        return None
+    rest = model.without_term(term)
+    space, n = rest.at(model.noise), model.problem.n
+    near = [dwell, *(dwell + k for k in range(-_NEAR, _NEAR + 1) if k and 1 <= dwell + k < n)]
+    terms = [Term(term.effect, tuple({**term.keywords, "dwell": k}.items())) for k in near]
+    drops = [float(space.gain(replace(t.candidate(rest.problem), key=None)).drop[0]) for t in terms]
+    best = int(np.argmax(drops))
+    return terms[best] if drops[best] > drops[0] + _CLEARLY else None
 
 
 def _between_choices(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:

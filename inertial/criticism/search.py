@@ -52,23 +52,28 @@ class Rival:
 class SearchResult:
     """Outcome of the search: the model with the added effects, and the rivals of the first step, best first.
 
-    handling : the alternative that ended the search, because it was the best of its step; ``model`` is the model before it
+    handling : the alternatives that ended the search, because they were the best of its step; ``model`` is the model before them
     """
 
     model: Model
     added: tuple[Term, ...]
     ladder: tuple[Rival, ...]
-    handling: Term | None = None
+    handling: tuple[Term, ...] = ()
 
 
 def search(
-    field: Candidates, base: Model, stop: Callable[[Sequence[Term]], bool], start: Sequence[Term] = ()
+    field: Candidates,
+    base: Model,
+    stop: Callable[[Sequence[Term]], bool],
+    instead: Callable[[Model, "Rival"], tuple[Term, ...]],
+    start: Sequence[Term] = (),
 ) -> SearchResult:
     """The effects that the measurements require beyond a base model, or the handling error that must be corrected first.
 
     Parameters
     ----------
     stop : called before the third and every further effect: whether the chosen ones only imitate another cause
+    instead : called before every effect: the handling errors that together explain more than it does
     start : effects that a part of the lot required already
     """
     chosen: list[Term] = list(start)
@@ -80,7 +85,9 @@ def search(
         if best is None or (len(chosen) >= 2 and stop(chosen)):
             break
         if isinstance(best.term.effect, Handling):
-            return SearchResult(model, tuple(chosen), ladder, best.term)
+            return SearchResult(model, tuple(chosen), ladder, (best.term,))
+        if handled := instead(model, best):
+            return SearchResult(model, tuple(chosen), ladder, handled)
         best = _parent_first(field, model, best)
         chosen.append(best.term)
         model = model.with_term(best.term)

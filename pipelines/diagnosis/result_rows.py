@@ -83,10 +83,11 @@ def _class(named: Named, names: Names) -> dict[str, Any]:
     }
     row |= _carried(named.carried, names)
     if named.evidence:
+        units = [names.units[u] for u in named.units]
         row |= {
-            "units": [names.units[u] for u in named.units],
+            "units": units,
             "dwells": [names.dwells[d] for d in named.dwells],
-            "evidence": named.evidence,
+            "evidence": f"{' and '.join(units)}: {named.evidence}" if len(units) > 1 else named.evidence,
         }
     return row
 

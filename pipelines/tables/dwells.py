@@ -203,7 +203,7 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
     felt = np.einsum("uij,unj->uni", response, measurement.state.force) + _run_with_temperature(measurement, scale)
     state = replace(measurement.state, felt=felt, memory={})
-    return Lot(state, np.where(there[..., None], output, 0.0), error, response)
+    return Lot(state, np.where(there[..., None], output, 0.0), error, response, scale=scale)
 
 
 _WARM = 5.0

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.exchanged import PlainFit
 from inertial.criticism.faults.fault import Fault, places_of
 from inertial.criticism.readings import Array, Readings, exchanged, find_split
 
@@ -83,9 +84,11 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
         # an error of most units belongs to the plan or the table: the search for effects reports it
         ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)
         out &= ratio < _COMMON
+    # of two units that were exchanged the search for effects reports it, too
+    swapped = set(_exchanged_from_a_dwell_on(readings)) if out.any() else set[int]()
     for unit, row in enumerate(out):
         places = np.flatnonzero(row)
-        if not places.size or places.size > 0.4 * row.size:
+        if not places.size or places.size > 0.4 * row.size or unit in swapped:
             continue
         felt = _felt(readings, unit, places)
         turned = np.abs(np.linalg.norm(felt, axis=-1) - 1.0) < 0.02
@@ -93,6 +96,17 @@ def wrong_poses(readings: Readings) -> Iterator[Fault]:
             continue
         name, text = _which_pose(readings.force[unit], places[turned], felt[turned])
         yield Fault(name, unit, places_of(places[turned]), text)
+
+
+def _exchanged_from_a_dwell_on(readings: Readings) -> Iterator[int]:
+    """Units that have the readings of another one from a dwell on."""
+    warm = readings.temperature if readings.temperature is not None else readings.chamber
+    theta = None if warm is None or not np.isfinite(warm[readings.there]).all() else warm
+    output = readings.output
+    fit = PlainFit(output, readings.force, theta, readings.there, lambda one, other: output[[other, one]])
+    for pair in fit.pairs():
+        if fit.instants(*pair):
+            yield from pair
 
 
 def _felt(readings: Readings, unit: int, places: NDArray[np.intp]) -> Array:

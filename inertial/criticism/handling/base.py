@@ -6,9 +6,8 @@ axis. They are of scope "data": no model is extended by them.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,15 @@ if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
 
 Array = NDArray[np.float64]
-Misfit = Callable[["Lot", tuple[int, ...]], float]
-"""Whitened sum of squares of the model's residuals on a lot of some units, by their numbers in the whole lot."""
+
+
+class Misfit(Protocol):
+    """How badly the model fits a lot of some units, by their numbers in the whole lot."""
+
+    def __call__(self, lot: "Lot", units: tuple[int, ...], *, own_noise: bool = False) -> float:
+        """The whitened sum of squares, or with the noise of that lot the deviance."""
+        ...
+
 
 _PLACES = 40
 EDGE = 3  # dwells at both ends after which, or before which, no change can be detected
@@ -34,6 +40,7 @@ class Handling(Effect):
     Attributes
     ----------
     fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
+    of_one_axis : whether it concerns the bias of one axis of one unit, at an ``axis``
     in_part : whether some units of a large lot stand for it: it is the same for all, and mended without a look at each
     """
 
@@ -43,10 +50,16 @@ class Handling(Effect):
     simplicity: ClassVar[int] = 0
     fewest_units: ClassVar[int] = 2
     in_part: ClassVar[bool] = True
+    of_one_axis: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """The places of the search: values of ``unit``, ``dwell``, ``soak`` or ``pose``; units in order."""
+        """The places of the search: values of ``unit``, ``other``, ``dwell``, ``soak`` or ``pose``; units in order."""
+
+    def looks(self, lot: "Lot", places: int) -> int:
+        """Number of places that are paid for: those of the search, unless residuals have chosen them among more."""
+        del lot
+        return places
 
     @abstractmethod
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
@@ -74,6 +87,11 @@ class Handling(Effect):
         low, high = max(1, int(place["dwell"]) - step + 1), min(n - 1, int(place["dwell"]) + step - 1)
         return [{**place, "dwell": float(k)} for k in range(low, high + 1)]
 
+    def placed(self, lot: "Lot", **place: float) -> dict[str, float]:
+        """The place once more in a lot with the dwells that were left out of the search."""
+        del lot
+        return place
+
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """The lot without it; None if only its term in the model removes it."""
         del lot, size, place
@@ -88,6 +106,10 @@ class Handling(Effect):
         """Places of the affected dwells: the first after a change, or each one that is wrong."""
         del lot
         return [int(place["dwell"])] if "dwell" in place else []
+
+    def units(self, **place: float) -> tuple[int, ...]:
+        """The affected units; none where all are."""
+        return tuple(int(place[name]) for name in ("unit", "other") if name in place)
 
     def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
@@ -174,6 +196,12 @@ def tilts(state: State) -> Array:
     by_outer = np.stack([np.cos(outer) * np.sin(inner), np.cos(outer) * np.cos(inner), -np.sin(outer)], axis=-1)
     by_inner = np.stack([np.sin(outer) * np.cos(inner), -np.sin(outer) * np.sin(inner), np.zeros_like(outer)], axis=-1)
     return np.stack([by_outer, by_inner], axis=-1)
+
+
+def poses(lot: "Lot") -> NDArray[np.intp]:
+    """Number of the pose of each dwell, (n,)."""
+    force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
+    return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def soaks(state: State) -> NDArray[np.intp]:

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from inertial.criticism.handling.base import EDGE, Array, Handling, after, times
+from inertial.criticism.handling.base import Array, Handling, after, times
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
@@ -29,6 +29,7 @@ class BiasJump(Handling):
     hides_behind: ClassVar[tuple[str, ...]] = ("step_change",)
     fewest_units: ClassVar[int] = 1
     in_part: ClassVar[bool] = False
+    of_one_axis: ClassVar[bool] = True
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every axis of every unit at every place in time; none where only a norm is known."""
@@ -36,7 +37,7 @@ class BiasJump(Handling):
             return []
         units, n = lot.state.time.shape
         # a jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it
-        every = range(EDGE, n - EDGE + 1) if n <= _EVERY else times(lot)
+        every = range(1, n) if n <= _EVERY else times(lot)
         return [
             {"unit": float(u), "axis": float(axis), "dwell": float(k)}
             for u in range(units)

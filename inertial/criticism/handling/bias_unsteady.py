@@ -27,6 +27,7 @@ class BiasUnsteady(Handling):
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_quadratic", "thermal_hysteresis")
     fewest_units: ClassVar[int] = 1
     in_part: ClassVar[bool] = False
+    of_one_axis: ClassVar[bool] = True
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every axis of every unit; none where only a norm is known, or with less than three soaks."""
@@ -48,10 +49,19 @@ class BiasUnsteady(Handling):
         return column
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
-        """The axis and its changes."""
-        del lot
-        by_soak = ", ".join(f"{1e6 * v:+.0f}" for v in size)
+        """The axis and its changes: what is linear in the temperature belongs to the bias and its temperature coefficient."""
+        levels, warm = np.concatenate([[0.0], size]), _temperatures(lot)
+        line = np.stack([np.ones(levels.size), warm - warm.mean()], axis=-1)
+        levels = levels - line @ np.linalg.lstsq(line, levels, rcond=None)[0]
+        by_soak = ", ".join(f"{1e6 * v:+.0f}" for v in levels)
         axis = AXES[int(place["axis"])]
         return (
-            f"the bias of axis {axis} of the unit differs from soak to soak ({by_soak} µg relative to the first soak)"
+            f"the bias of axis {axis} of the unit differs from soak to soak ({by_soak} µg from a line over temperature)"
         )
+
+
+def _temperatures(lot: "Lot") -> Array:
+    """Mean temperature of each soak, °C."""
+    soak = soaks(lot.state)
+    warm = np.zeros(soak.size) if lot.state.temperature is None else lot.state.temperature.mean(axis=0)
+    return np.bincount(soak, weights=warm) / np.bincount(soak)

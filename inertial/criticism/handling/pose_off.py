@@ -3,9 +3,8 @@
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from inertial.criticism.handling.base import Array, Handling, tilts, without
+from inertial.criticism.handling.base import Array, Handling, poses, tilts, without
 
 if TYPE_CHECKING:
     from inertial.criticism.lot import Lot
@@ -18,19 +17,21 @@ class PoseOff(Handling):
     symbol: ClassVar[str] = "Δα, Δβ"
     equation: ClassVar[str] = "∂f/∂α·Δα + ∂f/∂β·Δβ in every dwell of one pose"
     breaker: ClassVar[str] = "check the angles of that pose in the recipe, and measure it again"
+    fewest_units: ClassVar[int] = 1
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
-        """Every pose that comes more than once; none if the angles are unknown."""
+        """Every pose with more than one dwell; none if the angles are unknown."""
         if lot.state.outer is None or lot.state.inner is None:
             return []
-        number, count = np.unique(_poses(lot), return_counts=True)
+        there = np.isfinite(lot.error).all(axis=-1).any(axis=0)
+        number, count = np.unique(poses(lot)[there], return_counts=True)
         several = number[count > 1]
         return [{"pose": float(k)} for k in several] if several.size > 3 * int(count.max() > 1) else []
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Errors of the two angles in the dwells of one pose."""
         del slope
-        return tilts(lot.state) * (_poses(lot) == int(place["pose"]))[:, None, None]
+        return tilts(lot.state) * (poses(lot) == int(place["pose"]))[:, None, None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
@@ -46,10 +47,4 @@ class PoseOff(Handling):
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:
         """The dwells of the pose."""
-        return np.flatnonzero(_poses(lot) == int(place["pose"])).tolist()
-
-
-def _poses(lot: "Lot") -> NDArray[np.intp]:
-    """Number of the pose of each dwell, (n,)."""
-    force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
-    return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)
+        return np.flatnonzero(poses(lot) == int(place["pose"])).tolist()

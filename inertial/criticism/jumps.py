@@ -1,0 +1,182 @@
+"""Jumps of single axes in place of an effect: telegraph noise of a few axes has the shape of a slow effect of the whole lot.
+
+An effect has coefficients for every unit and axis, so one effect explains three axes that jump by themselves better than any one
+jump does. What the jumps of a few axes explain together is therefore compared with the effect as a whole, at the same noise.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.criticism.bases import SEEN
+from inertial.criticism.candidate import Candidate
+from inertial.criticism.decisions import CLASS_WIDTH, JUMPS_RARE
+from inertial.criticism.field import Candidates
+from inertial.criticism.handling.base import Handling
+from inertial.criticism.handling.bias_jump import BiasJump
+from inertial.criticism.model import Model
+from inertial.criticism.penalty import freedom, price
+from inertial.criticism.search import Rival
+from inertial.criticism.space import Space
+from inertial.criticism.tail_areas import log_f_tail
+from inertial.criticism.term import Term
+
+Array = NDArray[np.float64]
+
+_AXES = 6
+"""Largest number of axes whose jumps take the place of one effect."""
+
+_JUMPS = 4
+"""Largest number of jumps of one axis."""
+
+_BEYOND = 1.5
+"""Largest ratio of what jumps explain to what the effect explains in the same axes: below it jumps of few axes are not tried."""
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Jumps of single axes in place of an effect.
+
+    terms : those of the axis of the largest gain first; ahead : their score, together, less that of the effect
+    """
+
+    terms: tuple[Term, ...]
+    ahead: float
+
+
+@dataclass(frozen=True)
+class _OfAxis:
+    """The best jumps of one axis, with their score."""
+
+    score: float
+    terms: tuple[Term, ...]
+
+
+def jumps_instead(field: Candidates, model: Model, rival: Rival) -> Jumps | None:
+    """The jumps of single axes that explain about as much as an effect with coefficients for every axis; None if none do."""
+    alternatives = [a for a in field.handling if a.of_one_axis]
+    if not alternatives or rival.term.shared or not rival.rank:
+        return None
+    space = model.at(model.with_term(rival.term).noise)
+    # the variances are those with the effect, or with jumps in its place, in the model: at them deviances are sums of squares
+    drops = _drops(space, rival.term.candidate(model.problem))
+    score = _score(drops, rival)
+    largest = np.argsort(drops)[::-1][:_AXES]
+    if _BEYOND * float(drops[largest].sum()) < score - CLASS_WIDTH:
+        return None
+    single = _single_jumps(field, space, alternatives)
+    of_axes = sorted((_best(field, space, int(b), single) for b in largest), key=lambda one: -one.score)
+    together, terms = 0.0, list[Term]()
+    for one in of_axes:
+        gain = one.score - (JUMPS_RARE if terms else 0.0)
+        if gain > 0.0:
+            together += gain
+            terms += one.terms
+    ahead = float(together - score)
+    return Jumps(tuple(terms), ahead) if terms and ahead > -CLASS_WIDTH else None
+
+
+def _drops(space: Space, candidate: Candidate) -> Array:
+    """Reduction of the residuals of each block by an effect, (blocks,), beside the terms that blocks share."""
+    white = space.whiten(candidate.of_blocks[:, :, 0, :])
+    columns = space.project(white)
+    before, size = (np.sqrt(np.einsum("bnp,bnp->bp", each, each)) for each in (white, columns))
+    columns = columns * np.where(size > SEEN * before, 1.0 / np.where(size > 0.0, size, 1.0), 0.0)[:, None, :]
+    inverse = np.linalg.pinv(np.swapaxes(columns, -1, -2) @ columns, rcond=SEEN**2, hermitian=True)
+    along = np.einsum("bnp,bn->bp", columns, space.residual)
+    drops = np.einsum("bp,bpq,bq->b", along, inverse, along)
+    # with their coefficients estimated again the effect explains more
+    whole, total = float(space.gain(candidate).drop[0]), max(float(drops.sum()), 1e-300)
+    return drops * max(whole / total, 1.0)
+
+
+def _score(drops: Array, rival: Rival) -> float:
+    """Score of an effect of all axes, of one axis of all units, or of one unit, less what its unevenness within them costs."""
+    nonlinear, by_unit = freedom(rival.term), drops.reshape(-1, 3)
+    scores: list[float] = []
+    for parts in (by_unit.reshape(1, -1), by_unit.T, by_unit):
+        part = parts[int(np.argmax(parts.sum(axis=1)))]
+        drop = float(part.sum())
+        paid = price(drop, rival.rank / len(parts) + nonlinear) + 2.0 * float(np.log(len(parts)))
+        scores.append(drop - paid + _evenness(part))
+    return max(scores)
+
+
+def _evenness(drops: Array) -> float:
+    """Twice the logarithm of the probability that so few of several reductions have so much of them; zero where that is usual.
+
+    Coefficients from one normal distribution have reductions of chi-square of one degree of freedom each: those of the m largest
+    and of the others have an F distribution, one for each of the possible choices. Noise alone gives one to each.
+    """
+    ordered = np.sort(drops)[::-1]
+    count = ordered.size
+    unlikely = 0.0
+    for m in range(1, count):
+        top, rest = float(ordered[:m].sum()), float(ordered[m:].sum())
+        ratio = (top / m) / max(rest / (count - m), 1.0)
+        chances = float(np.log(comb(count, m) * count))
+        unlikely = min(unlikely, 2.0 * (float(log_f_tail(ratio, m, count - m)) + chances))
+    return unlikely
+
+
+def _single_jumps(field: Candidates, space: Space, alternatives: Sequence[Handling]) -> dict[int, _OfAxis]:
+    """The best place of the best alternative in each block."""
+    best: dict[int, _OfAxis] = {}
+    for alternative in alternatives:
+        gain = field.gain_of(space, alternative)
+        paid = 2.0 * float(np.log(field.places(alternative.id)))
+        places = zip(field.grids[alternative.id], gain.drop.tolist(), gain.rank.tolist(), strict=True)
+        for place, drop, rank in places:
+            block = int(3 * place["unit"] + place["axis"])
+            score = drop - price(drop, rank) - paid
+            if block not in best or score > best[block].score:
+                best[block] = _OfAxis(float(score), (Term(alternative, tuple(place.items())),))
+    return best
+
+
+def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis]) -> _OfAxis:
+    """The best jumps of one block: one of the alternatives, or several jumps from level to level."""
+    axes = len(space.q)
+    tried = [_OfAxis(0.0, ()), *([single[block]] if block in single else [])]
+    jump = field.of(BiasJump.id) if BiasJump.id in field.grids else None
+    if jump is not None:
+        unit, axis = divmod(block, 3)
+        for drop, dwells in _several(space, block):
+            chosen = float(np.log(comb(space.q.shape[1] - 1, len(dwells)) * axes))
+            places = ({"unit": float(unit), "axis": float(axis), "dwell": float(k)} for k in dwells)
+            terms = tuple(Term(jump, tuple(place.items())) for place in places)
+            tried.append(_OfAxis(drop - price(drop, len(dwells)) - 2.0 * chosen, terms))
+    return max(tried, key=lambda one: one.score)
+
+
+def _several(space: Space, block: int) -> Iterator[tuple[float, list[int]]]:
+    """Reductions of the deviance by two jumps of a block and more, each with its dwells: two at a time, or one."""
+    n = space.q.shape[1]
+    dwells, one = np.arange(1, n), np.array([block])
+    steps = (np.arange(n)[:, None] >= dwells).astype(np.float64)[None]
+    white = space.project(space.covariance.whiten(steps, space.noise.shares, one) / space.noise.scale[block], one)[0]
+    gram, along = white.T @ white, white.T @ space.residual[block]
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    gram, along = gram / size[:, None] / size, along / size
+    chosen: list[int] = []
+    while len(chosen) < _JUMPS:
+        chosen += _next_two(gram, along, chosen) if len(chosen) + 2 <= _JUMPS else []
+        some = gram[np.ix_(chosen, chosen)]
+        drop = float(along[chosen] @ np.linalg.lstsq(some, along[chosen], rcond=1e-8)[0])
+        yield drop, [int(dwells[k]) for k in sorted(chosen)]
+
+
+def _next_two(gram: Array, along: Array, chosen: list[int]) -> list[int]:
+    """The two columns that reduce most beside those that are chosen."""
+    if chosen:
+        beside = np.linalg.lstsq(gram[np.ix_(chosen, chosen)], gram[chosen], rcond=1e-8)[0]
+        gram, along = gram - gram[:, chosen] @ beside, along - beside.T @ along[chosen]
+    own = np.diag(gram)
+    determinant = own[:, None] * own - gram**2
+    squares = along[:, None] ** 2 * own + along**2 * own[:, None] - 2.0 * along[:, None] * along * gram
+    seen = determinant > 1e-3
+    drop = np.where(seen, squares / np.where(seen, determinant, 1.0), 0.0)
+    return [int(k) for k in np.unravel_index(int(np.argmax(drop)), drop.shape)]
