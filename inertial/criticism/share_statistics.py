@@ -81,8 +81,12 @@ class ShareStatistics:
     def _rows(self) -> Array:
         """Determined columns, and the measurements behind them, as rows, (blocks, r + 1, n).
 
-        Of the measurements a plain fit is taken off before: what the model leaves of them is a millionth of their squares.
+        Of the measurements a plain fit is taken off before: what the model leaves of them is a millionth of their squares. With
+        products of a model without the last term, it is the fit of that model: the measurements are the same in all of them.
         """
+        if self._before is not None and self._further is not None:
+            before, further = self._before._rows, self._further.of_blocks[:, :, 0]  # noqa: SLF001  # of its own kind
+            return np.concatenate([before[:, :-1], np.swapaxes(further, -1, -2), before[:, -1:]], axis=1)
         x, y = self._determined, self.problem.y[..., None]
         there = self.problem.covariance.there[..., None]
         own = x * there
