@@ -20,7 +20,7 @@ from inertial.criticism.candidate import Candidate
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, walk_kernel
 from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.products import PIECE, products_of, products_with
+from inertial.criticism.products import PIECE, Spanned, products_of, products_with
 from inertial.criticism.whitener import applied, applied_back, grouped, solved, whitener_of
 from inertial.noise.flicker import flicker_kernel
 
@@ -147,13 +147,22 @@ class Covariance:
         """Place of the profile of a block, and its steps."""
         return next((place, steps) for place, steps, blocks in self._groups if block in blocks)
 
-    def whitener_of_block(self, block: int, shares: Shares) -> tuple[Array, float]:
-        """Lower triangle (n, n) that makes the noise of a block at shares white, and the log-determinant of its covariance."""
+    def whitener_of_block(self, block: int, shares: Shares) -> tuple[Array | None, Array, float]:
+        """What makes the noise of a block at shares white, and the log-determinant of its covariance.
+
+        A lower triangle (n, n), or if that is None factors by dwell (n,).
+        """
         place, steps = self.group_of(block)
         kernel = self._kernels[place]
         white = np.where(kernel.there, 1.0 / kernel.white, 0.0)
-        logdet = 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
-        return self._whitener(place, steps, shares) or (np.diag(white), logdet)
+        made = self._whitener(place, steps, shares)
+        if made is None:
+            return None, white, 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
+        return made[0], white, made[1]
+
+    def logdet_of_block(self, block: int, shares: Shares) -> float:
+        """Log-determinant of the covariance of one block over its white variance."""
+        return self.whitener_of_block(block, shares)[2]
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
@@ -319,6 +328,12 @@ class Covariance:
     def products_with(self, candidate: Candidate, rows: Array, shares: Shares) -> tuple[Array, Array]:
         """Products cᵀV⁻¹c (blocks, p, p) of a candidate's columns at one value, and with rows (blocks, k, n): (blocks, p, k)."""
         return products_with(candidate, rows, self.level, self._by_whitener(shares))
+
+    def products_of_spanned(
+        self, spanned: Spanned, columns: Array, places: NDArray[np.intp], shares: Shares
+    ) -> tuple[Array, Array]:
+        """The same of columns that a few series span; with columns (rows, n), those of each block at places (blocks, k)."""
+        return spanned.products_with(columns, places, self.level, self._by_whitener(shares))
 
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""

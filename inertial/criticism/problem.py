@@ -1,7 +1,7 @@
 """A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 
@@ -12,6 +12,7 @@ from inertial.criticism.candidate import Candidate
 from inertial.criticism.covariance import Covariance
 from inertial.criticism.handling.base import Handling, by_block
 from inertial.criticism.lot import Lot
+from inertial.criticism.noise_shares import Shares
 from inertial.criticism.shared_rows import finest_rows, shared_rows
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited, has_start
@@ -56,6 +57,17 @@ def _by_axis(values: Values) -> list[dict[str, float]]:
     return [on_axis(values, 0)] * 3
 
 
+@dataclass(frozen=True)
+class KnownDeviances:
+    """Restricted deviances that the models of equal terms have in common, by the shares of the noise.
+
+    of_lot : of all blocks; of_blocks : of single blocks, less the log-determinants
+    """
+
+    of_lot: dict[Shares, float] = field(default_factory=dict[Shares, float])
+    of_blocks: dict[tuple[int, Shares], float] = field(default_factory=dict[tuple[int, Shares], float])
+
+
 class Problem:
     """Series and columns of a lot by block.
 
@@ -74,6 +86,11 @@ class Problem:
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
+        self._deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
+
+    def deviances_of(self, terms: frozenset[tuple[object, ...]]) -> KnownDeviances:
+        """What is known of the models whose terms have these keys."""
+        return self._deviances.setdefault(terms, KnownDeviances())
 
     @property
     def series(self) -> Array:
