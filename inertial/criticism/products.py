@@ -16,7 +16,8 @@ PIECE = 1_000_000
 """Largest number of columns' values that are whitened at a time for their products."""
 
 _MANY, _PART = 32, 3
-"""Columns of all blocks from which on the series that span them are found, and how many times fewer these must be."""
+"""Columns of all blocks from which on the series that span them are found, and how many times fewer than these columns, and than
+the dwells, they must be: of large lots products of more series would cost more than whitening."""
 
 _ROUNDING = 1e-13
 """Part of columns of unit length that is rounding."""
@@ -123,7 +124,7 @@ def spanned(columns: Array) -> Spanned | None:
     basis, upper, order = made
     diagonal = np.abs(np.diagonal(upper))
     count = int(np.count_nonzero(diagonal > _ROUNDING * diagonal[0]))
-    if count * _PART > blocks * p:
+    if count * _PART > min(blocks * p, n):
         return None
     inside = np.empty((blocks * p, count))
     inside[order] = upper[:count].T
