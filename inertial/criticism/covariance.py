@@ -145,7 +145,19 @@ class Covariance:
 
     def group_of(self, block: int) -> tuple[int, int]:
         """Place of the profile of a block, and its steps."""
-        return next((place, steps) for place, steps, blocks in self._groups if block in blocks)
+        return self._group_of[block]
+
+    @cached_property
+    def _group_of(self) -> dict[int, tuple[int, int]]:
+        return {int(block): (place, steps) for place, steps, blocks in self._groups for block in blocks}
+
+    @cached_property
+    def _white(self) -> list[tuple[Array, float]]:
+        """Factors (n,) that make white noise one of variance one, and the log-determinant of its covariance, by profile."""
+        return [
+            (np.where(k.there, 1.0 / k.white, 0.0), 2.0 * float(np.sum(np.log(k.white[k.there]))))
+            for k in self._kernels
+        ]
 
     def whitener_of_block(self, block: int, shares: Shares) -> tuple[Array | None, Array, float]:
         """What makes the noise of a block at shares white, and the log-determinant of its covariance.
@@ -153,12 +165,9 @@ class Covariance:
         A lower triangle (n, n), or if that is None factors by dwell (n,).
         """
         place, steps = self.group_of(block)
-        kernel = self._kernels[place]
-        white = np.where(kernel.there, 1.0 / kernel.white, 0.0)
+        factors, logdet = self._white[place]
         made = self._whitener(place, steps, shares)
-        if made is None:
-            return None, white, 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
-        return made[0], white, made[1]
+        return (None, factors, logdet) if made is None else (made[0], factors, made[1])
 
     def logdet_of_block(self, block: int, shares: Shares) -> float:
         """Log-determinant of the covariance of one block over its white variance."""
@@ -212,8 +221,7 @@ class Covariance:
                 own = columns[rows] / self.level[place_of[rows], None, None]
                 whitener = self._whitener(place, steps, common)
                 if whitener is None:
-                    kernel = self._kernels[place]
-                    out[rows] = own * np.where(kernel.there, 1.0 / kernel.white, 0.0)[:, None]
+                    out[rows] = own * self._white[place][0][:, None]
                 else:
                     n, m = columns.shape[1:]
                     flat = whitener[0] @ own.transpose(1, 0, 2).reshape(n, -1)
@@ -238,8 +246,7 @@ class Covariance:
             own = own[own >= 0]
             if own.size:
                 whitener = self._whitener(place, steps, common)
-                kernel = self._kernels[place]
-                yield own, None if whitener is None else whitener[0], np.where(kernel.there, 1.0 / kernel.white, 0.0)
+                yield own, None if whitener is None else whitener[0], self._white[place][0]
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, m, n), g, with this noise, in place of independent normal numbers; zero where a dwell is missing."""
@@ -339,10 +346,8 @@ class Covariance:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""
         logdets = np.zeros(len(self.level))
         for place, steps, members, common in self._groups_at(shares):
-            kernel = self._kernels[place]
             whitener = self._whitener(place, steps, common)
-            white = 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
-            logdets[members] = white if whitener is None else whitener[1]
+            logdets[members] = self._white[place][1] if whitener is None else whitener[1]
         return logdets
 
     def of_dwells(self, block: int, noise: Noise, dwells: NDArray[np.intp]) -> Array:

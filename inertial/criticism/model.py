@@ -238,9 +238,10 @@ class Model:
 
         def deviance(block: int, shares: Shares) -> float | None:
             known = self._known.of_blocks.get((block, shares))
-            if known is None and (found := self.statistics.deviance_of_block(block, shares, sizes)) is not None:
-                known, firm = found
-                if self._alike and firm:
+            if known is None and (left := self.statistics.left_of_block(block, shares, sizes)) is not None:
+                dof = int(self.problem.covariance.count[block]) - self.statistics.rank
+                known = left.information + dof * float(np.log(max(float(left.squares[0]), 1e-300)))
+                if self._alike and left.firm:
                     self._known.of_blocks[block, shares] = known
             return known
 

@@ -25,6 +25,9 @@ SHARED = ("station", "data")
 _PIECE = 1_000_000
 """Number of columns processed at a time."""
 
+_WIDE = 3_000_000
+"""The same of the columns of one effect at several values: each pass over them goes through the model's own columns once."""
+
 _FEW = 1000
 """Values of a column of all blocks up to which it takes longer to find equal columns than to work on all."""
 
@@ -219,7 +222,7 @@ class Problem:
     @property
     def at_a_time(self) -> int:
         """Values of an effect's parameters whose columns are worked on together: few of a large lot, to limit the memory."""
-        return max(1, _PIECE // (1 + self.blocks * self.n * _WIDEST))
+        return max(1, _WIDE // (1 + self.blocks * self.n * _WIDEST))
 
     def varied(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, start: bool = False

@@ -241,10 +241,8 @@ class ShareStatistics:
             return None
         return beside_common(self.products(shares), self._common, scale)
 
-    def deviance_of_block(self, block: int, shares: Shares, sizes: Array | None = None) -> tuple[float, bool] | None:
-        """−2 log restricted likelihood of one block at shares, less the log-determinant, and whether it is firm.
-
-        None if columns are collinear.
+    def left_of_block(self, block: int, shares: Shares, sizes: Array | None = None) -> Left | None:
+        """What is left of the measurements of one block; None if columns are collinear.
 
         Parameters
         ----------
@@ -258,8 +256,4 @@ class ShareStatistics:
             turn[np.flatnonzero(~self._common), np.arange(self.rank)] = 1.0
             turn[np.append(np.flatnonzero(self._common), len(products) - 1), -1] = sizes
             products = turn.T @ products @ turn
-        found = factorised(products[None])
-        if found is None:
-            return None
-        dof = int(self.problem.covariance.count[block]) - self.rank
-        return found.information + dof * float(np.log(max(float(found.squares[0]), 1e-300))), found.firm
+        return factorised(products[None])

@@ -11,7 +11,7 @@ from inertial.criticism.decisions import SHARE_STEP
 Array = NDArray[np.float64]
 
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
-_times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
+_times, _solve, _added = get_blas_funcs(("trmm", "trsm", "axpy"), dtype=np.float64)
 
 EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
@@ -91,12 +91,16 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     wander : covariances (n, n) of 1/f and of random walk of variance one
     """
     there, whole = dwells.there, bool(dwells.there.all())
-    covariance = np.diag(dwells.white[there] ** 2)
+    covariance = np.zeros((there.size, there.size))
     for i, each in zip(index, wander, strict=True):
         if i is not None:
-            kernel = dwells.louder(each)
-            own = kernel if whole else kernel[np.ix_(there, there)]
-            covariance += 10.0 ** (i / SHARE_STEP) * own
+            _added(each.reshape(-1), covariance.reshape(-1), a=10.0 ** (i / SHARE_STEP))
+    if isinstance(dwells.loudness, np.ndarray):
+        covariance *= dwells.loudness[:, None]
+        covariance *= dwells.loudness
+    if not whole:
+        covariance = covariance[np.ix_(there, there)]
+    covariance.reshape(-1)[:: len(covariance) + 1] += dwells.white[there] ** 2
     # of the transpose, which is in Fortran order: no copy
     upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
     if failed:
