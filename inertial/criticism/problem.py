@@ -1,6 +1,6 @@
 """A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -58,6 +58,14 @@ def _by_axis(values: Values) -> list[dict[str, float]]:
     if any(isinstance(value, tuple) for value in values.values()):
         return [on_axis(values, axis) for axis in range(3)]
     return [on_axis(values, 0)] * 3
+
+
+def _of_axes(effect: SensorEffect, values: Values, made: Callable[[int, dict[str, float]], Array]) -> list[Array]:
+    """What is made for each sensor axis; the same three times where the effect depends on none, and its values neither."""
+    each = _by_axis(values)
+    if effect.same_on_axes and each[0] is each[2]:
+        return [made(0, each[0])] * 3
+    return [made(axis, own) for axis, own in enumerate(each)]
 
 
 @dataclass(frozen=True)
@@ -157,8 +165,9 @@ class Problem:
             return effect.columns(self.lot, self.slope, **on_axis(values, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
-            axes = [effect.columns(state, axis, **own) for axis, own in enumerate(_by_axis(values))]
-            return self._by_axis([excited(effect, columns) for columns in axes])
+            return self._by_axis(
+                _of_axes(effect, values, lambda axis, own: excited(effect, effect.columns(state, axis, **own)))
+            )
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
     def start(self, effect: AnyEffect | Handling, values: Values) -> Array:
@@ -167,8 +176,9 @@ class Problem:
             return np.zeros((self.blocks, self.n, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
-            each = [effect.start_columns(state, axis, **own) for axis, own in enumerate(_by_axis(values))]
-            columns = self._by_axis(each)
+            columns = self._by_axis(
+                _of_axes(effect, values, lambda axis, own: effect.start_columns(state, axis, **own))
+            )
         else:
             columns = self.seen(effect.start_change(self.lot.state, **on_axis(values, 0)))
         # a state that decays before the second dwell leaves a column of one dwell only: it is kept, and this dwell has no
