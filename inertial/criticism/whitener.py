@@ -11,7 +11,10 @@ from inertial.criticism.decisions import SHARE_STEP
 Array = NDArray[np.float64]
 
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
-_times, _solve, _added = get_blas_funcs(("trmm", "trsm", "axpy"), dtype=np.float64)
+_times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
+
+_ROWS = 48
+"""Rows of a kernel that are scaled at a time: an array of all of them is memory that the system has to clear first."""
 
 EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
@@ -92,15 +95,14 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     """
     there, whole = dwells.there, bool(dwells.there.all())
     covariance = np.zeros((there.size, there.size))
+    covariance.reshape(-1)[:: there.size + 1] = dwells.white**2
     for i, each in zip(index, wander, strict=True):
         if i is not None:
-            _added(each.reshape(-1), covariance.reshape(-1), a=10.0 ** (i / SHARE_STEP))
-    if isinstance(dwells.loudness, np.ndarray):
-        covariance *= dwells.loudness[:, None]
-        covariance *= dwells.loudness
+            kernel, share = dwells.louder(each), 10.0 ** (i / SHARE_STEP)
+            for rows in (slice(first, first + _ROWS) for first in range(0, there.size, _ROWS)):
+                covariance[rows] += share * kernel[rows]
     if not whole:
         covariance = covariance[np.ix_(there, there)]
-    covariance.reshape(-1)[:: len(covariance) + 1] += dwells.white[there] ** 2
     # of the transpose, which is in Fortran order: no copy
     upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
     if failed:
