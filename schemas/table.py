@@ -2,13 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-import pandera.pandas as pa
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import pandera.pandas as pa
+
+Kind = Literal["str", "float64", "int64", "bool"]
+"""The types of columns, by pandas' names."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """What every value of a column must satisfy.
+
+    kind : type; low : smallest number, None for any; allowed : the texts that may be there, none for any
+    filled : whether a text may not be empty; missing : whether numbers may be NaN
+    """
+
+    kind: Kind
+    low: float | None = None
+    allowed: tuple[str, ...] = ()
+    filled: bool = False
+    missing: bool = False
+
+    def contract(self) -> pa.Column:
+        """The same as a column of the library that explains what is wrong."""
+        import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
+
+        checks = [pa.Check.ge(self.low)] if self.low is not None else []
+        checks += [pa.Check.isin(list(self.allowed))] if self.allowed else []
+        checks += [pa.Check.str_length(min_value=1)] if self.filled else []
+        return pa.Column(str if self.kind == "str" else self.kind, checks=checks, nullable=self.missing)
 
 
 @dataclass(frozen=True)
@@ -17,43 +45,57 @@ class Table:
 
     Parameters
     ----------
-    columns : the columns that must be there, with their checks.
+    columns : the columns that must be there, with what their values must satisfy.
     finite : columns in which NaN and infinity are refused; all of them are numbers.
     key : columns that together name a row; no two rows may share them.
     only_ok : finite columns count only in rows whose ``status`` is ``ok``.
     """
 
-    columns: dict[str, pa.Column]
+    columns: dict[str, Column]
     finite: tuple[str, ...] = ()
     key: tuple[str, ...] = ()
     only_ok: bool = False
-    schema: pa.DataFrameSchema = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "schema", pa.DataFrameSchema(self.columns, strict=False, coerce=True))
+    @cached_property
+    def schema(self) -> pa.DataFrameSchema:
+        """The contract for the library that explains what is wrong."""
+        import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
+
+        return pa.DataFrameSchema(
+            {name: column.contract() for name, column in self.columns.items()}, strict=False, coerce=True
+        )
 
 
-def text(*allowed: str) -> pa.Column:
+def text(*allowed: str) -> Column:
     """A text: one of the allowed ones, or any that is not empty."""
-    checks = [pa.Check.isin(list(allowed))] if allowed else [pa.Check.str_length(min_value=1)]
-    return pa.Column(str, checks=checks)
+    return Column("str", allowed=allowed, filled=not allowed)
 
 
-def number(*, low: float | None = None, missing: bool = False) -> pa.Column:
+def any_text() -> Column:
+    """A text that may be empty."""
+    return Column("str")
+
+
+def flag() -> Column:
+    """True or false."""
+    return Column("bool")
+
+
+def number(*, low: float | None = None, missing: bool = False) -> Column:
     """A floating-point number, at least ``low`` where it is given; NaN only where ``missing``."""
-    return pa.Column(float, checks=[pa.Check.ge(low)] if low is not None else [], nullable=missing)
+    return Column("float64", low=low, missing=missing)
 
 
-def whole(low: int = 0) -> pa.Column:
+def whole(low: int = 0) -> Column:
     """A whole number, at least ``low``."""
-    return pa.Column("int64", checks=[pa.Check.ge(low)])
+    return Column("int64", low=low)
 
 
-def numbers(names: Sequence[str]) -> dict[str, pa.Column]:
+def numbers(names: Sequence[str]) -> dict[str, Column]:
     """Columns of numbers of which none is missing, by name."""
     return {name: number() for name in names}
 
 
-def gaps(names: Sequence[str]) -> dict[str, pa.Column]:
+def gaps(names: Sequence[str]) -> dict[str, Column]:
     """Columns of numbers that may be NaN, by name."""
     return {name: number(missing=True) for name in names}

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from pandera.errors import SchemaError
 
 from schemas.columns import Seen, all_different
 from schemas.errors import DataRejected
 from schemas.tables import TABLES
 
 if TYPE_CHECKING:
+    from pandera.errors import SchemaError
+
     from schemas.table import Table
 
 
@@ -31,6 +32,8 @@ def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
         return frame
     _refuse_not_finite(table, frame, source)
     _refuse_twice(table, frame, source)
+    from pandera.errors import SchemaError  # noqa: PLC0415 - a table without an error does not need it
+
     try:
         return table.schema.validate(frame)
     except SchemaError as problem:

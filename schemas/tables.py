@@ -6,10 +6,8 @@ Every table has a schema version that travels with its file.
 
 from __future__ import annotations
 
-import pandera.pandas as pa
-
 from schemas import version
-from schemas.table import Table, gaps, number, numbers, text, whole
+from schemas.table import Table, any_text, flag, gaps, number, numbers, text, whole
 from schemas.units import AXES
 
 VERSION = version.VERSION
@@ -37,7 +35,7 @@ TABLES: dict[str, Table] = {
             **gaps(_SURROUNDINGS),
             **numbers(("start_s", "duration_s", "rate_hz")),
             "n": whole(),
-            "overflow": pa.Column(bool),
+            "overflow": flag(),
             "status": text(),
             "out_unit": text(*OUTPUT_UNITS),
             "full_scale": number(low=0.0),
@@ -61,8 +59,8 @@ TABLES: dict[str, Table] = {
             "time_s": number(),
             "kind": text(),
             "record": whole(-1),  # −1: none
-            "reason": pa.Column(str),
-            "action": pa.Column(str),
+            "reason": any_text(),
+            "action": any_text(),
         },
         finite=("time_s",),
     ),
@@ -78,9 +76,9 @@ TABLES: dict[str, Table] = {
         {
             "unit": text(),
             "slot": whole(),
-            "refused": pa.Column(bool),
-            "fault": pa.Column(str),
-            "reason": pa.Column(str),
+            "refused": flag(),
+            "fault": any_text(),
+            "reason": any_text(),
         },
         key=("unit",),
     ),
@@ -96,7 +94,7 @@ TABLES: dict[str, Table] = {
             "effect": text(),
             "name": text(),
             **numbers(("value", "standard_error")),
-            "unit_text": pa.Column(str),
+            "unit_text": any_text(),
         },
         finite=("value", "standard_error"),
         key=("unit", "axis", "effect", "name"),
@@ -177,8 +175,8 @@ TABLES: dict[str, Table] = {
             "axis": text(*AXES),
             "term": text(),
             **gaps(("value", "low", "high")),
-            "identified": pa.Column(bool),
-            "unit_text": pa.Column(str),
+            "identified": flag(),
+            "unit_text": any_text(),
         },
         key=("unit", "axis", "term"),
     ),
@@ -195,14 +193,14 @@ TABLES: dict[str, Table] = {
             **{name: text() for name in ("unit", "procedure", "figure", "axis")},
             "number": whole(),
             **gaps(("value", "uncertainty", "low", "high")),
-            "identified": pa.Column(bool),
+            "identified": flag(),
             "unit_text": text(),
-            "note": pa.Column(str),
+            "note": any_text(),
         },
         key=("number", "unit", "figure", "axis"),
     ),
     "procedure_findings": Table(
-        {"unit": pa.Column(str), "procedure": text(), "number": whole(), "subject": text(), "text": text()}
+        {"unit": any_text(), "procedure": text(), "number": whole(), "subject": text(), "text": text()}
     ),
     "figures": Table(
         {
@@ -210,9 +208,9 @@ TABLES: dict[str, Table] = {
             "figure": text(),
             **numbers(("value", "uncertainty")),
             "limit": number(missing=True),
-            "unit_text": pa.Column(str),
+            "unit_text": any_text(),
             "outcome": text(),
-            "rule": pa.Column(str),
+            "rule": any_text(),
         },
         finite=("value", "uncertainty"),
         key=("unit", "figure"),
@@ -221,7 +219,7 @@ TABLES: dict[str, Table] = {
     "budget": Table(
         {
             **{name: text() for name in ("unit", "quantity", "axis", "contribution", "type", "distribution", "scope")},
-            **{name: pa.Column(str) for name in ("unit_text", "input_unit", "source")},
+            **{name: any_text() for name in ("unit_text", "input_unit", "source")},
             **numbers(("u", "share", "divisor", "stated")),
             **gaps(("dof", "sensitivity", "visible")),
         },
@@ -231,7 +229,7 @@ TABLES: dict[str, Table] = {
     "uncertainties": Table(
         {
             **{name: text() for name in ("unit", "quantity", "axis", "frame")},
-            **{name: pa.Column(str) for name in ("unit_text", "largest")},
+            **{name: any_text() for name in ("unit_text", "largest")},
             **numbers(("value", "u_a", "u_b", "u", "k", "expanded")),
             **gaps(("dof", "shown", "unseen")),
         },
@@ -248,7 +246,7 @@ TABLES: dict[str, Table] = {
     "lot_risks": Table(
         {
             "figure": text(),
-            "unit_text": pa.Column(str),
+            "unit_text": any_text(),
             "units": whole(1),
             **numbers(("mean", "u", "limit", "accept")),
             **gaps(("process", "pfa", "pfr", "accepted", "largest_pfa")),
@@ -261,9 +259,9 @@ TABLES: dict[str, Table] = {
             "unit": text(),
             "slot": whole(),
             "outcome": text(*OUTCOMES),
-            "grade": pa.Column(str),
-            "reasons": pa.Column(str),
-            "rule": pa.Column(str),
+            "grade": any_text(),
+            "reasons": any_text(),
+            "rule": any_text(),
         },
         key=("unit",),
     ),

@@ -20,7 +20,7 @@ from inertial.criticism.candidate import Candidate
 from inertial.criticism.decisions import SHARE_STEP
 from inertial.criticism.noise import LONGEST, walk_kernel
 from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.products import PIECE, products_of, products_with
+from inertial.criticism.products import PIECE, Spanned, products_of, products_with
 from inertial.criticism.whitener import applied, applied_back, grouped, solved, whitener_of
 from inertial.noise.flicker import flicker_kernel
 
@@ -145,15 +145,33 @@ class Covariance:
 
     def group_of(self, block: int) -> tuple[int, int]:
         """Place of the profile of a block, and its steps."""
-        return next((place, steps) for place, steps, blocks in self._groups if block in blocks)
+        return self._group_of[block]
 
-    def whitener_of_block(self, block: int, shares: Shares) -> tuple[Array, float]:
-        """Lower triangle (n, n) that makes the noise of a block at shares white, and the log-determinant of its covariance."""
+    @cached_property
+    def _group_of(self) -> dict[int, tuple[int, int]]:
+        return {int(block): (place, steps) for place, steps, blocks in self._groups for block in blocks}
+
+    @cached_property
+    def _white(self) -> list[tuple[Array, float]]:
+        """Factors (n,) that make white noise one of variance one, and the log-determinant of its covariance, by profile."""
+        return [
+            (np.where(k.there, 1.0 / k.white, 0.0), 2.0 * float(np.sum(np.log(k.white[k.there]))))
+            for k in self._kernels
+        ]
+
+    def whitener_of_block(self, block: int, shares: Shares) -> tuple[Array | None, Array, float]:
+        """What makes the noise of a block at shares white, and the log-determinant of its covariance.
+
+        A lower triangle (n, n), or if that is None factors by dwell (n,).
+        """
         place, steps = self.group_of(block)
-        kernel = self._kernels[place]
-        white = np.where(kernel.there, 1.0 / kernel.white, 0.0)
-        logdet = 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
-        return self._whitener(place, steps, shares) or (np.diag(white), logdet)
+        factors, logdet = self._white[place]
+        made = self._whitener(place, steps, shares)
+        return (None, factors, logdet) if made is None else (made[0], factors, made[1])
+
+    def logdet_of_block(self, block: int, shares: Shares) -> float:
+        """Log-determinant of the covariance of one block over its white variance."""
+        return self.whitener_of_block(block, shares)[2]
 
     def _whitener(self, place: int, steps: int, shares: Shares) -> tuple[Array, float] | None:
         """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance."""
@@ -203,8 +221,7 @@ class Covariance:
                 own = columns[rows] / self.level[place_of[rows], None, None]
                 whitener = self._whitener(place, steps, common)
                 if whitener is None:
-                    kernel = self._kernels[place]
-                    out[rows] = own * np.where(kernel.there, 1.0 / kernel.white, 0.0)[:, None]
+                    out[rows] = own * self._white[place][0][:, None]
                 else:
                     n, m = columns.shape[1:]
                     flat = whitener[0] @ own.transpose(1, 0, 2).reshape(n, -1)
@@ -229,8 +246,7 @@ class Covariance:
             own = own[own >= 0]
             if own.size:
                 whitener = self._whitener(place, steps, common)
-                kernel = self._kernels[place]
-                yield own, None if whitener is None else whitener[0], np.where(kernel.there, 1.0 / kernel.white, 0.0)
+                yield own, None if whitener is None else whitener[0], self._white[place][0]
 
     def coloured(self, noise: Noise, drawn: Array) -> Array:
         """Series (blocks, m, n), g, with this noise, in place of independent normal numbers; zero where a dwell is missing."""
@@ -320,14 +336,18 @@ class Covariance:
         """Products cᵀV⁻¹c (blocks, p, p) of a candidate's columns at one value, and with rows (blocks, k, n): (blocks, p, k)."""
         return products_with(candidate, rows, self.level, self._by_whitener(shares))
 
+    def products_of_spanned(
+        self, spanned: Spanned, columns: Array, places: NDArray[np.intp], shares: Shares
+    ) -> tuple[Array, Array]:
+        """The same of columns that a few series span; with columns (rows, n), those of each block at places (blocks, k)."""
+        return spanned.products_with(columns, places, self.level, self._by_whitener(shares))
+
     def logdet(self, shares: Shares) -> Array:
         """Log-determinants of the blocks' covariances over their white variance, (blocks,)."""
         logdets = np.zeros(len(self.level))
         for place, steps, members, common in self._groups_at(shares):
-            kernel = self._kernels[place]
             whitener = self._whitener(place, steps, common)
-            white = 2.0 * float(np.sum(np.log(kernel.white[kernel.there])))
-            logdets[members] = white if whitener is None else whitener[1]
+            logdets[members] = self._white[place][1] if whitener is None else whitener[1]
         return logdets
 
     def of_dwells(self, block: int, noise: Noise, dwells: NDArray[np.intp]) -> Array:

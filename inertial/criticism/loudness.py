@@ -78,14 +78,19 @@ def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
     time = problem.lot.state.time[:, places]
     left = np.full((problem.blocks, places.size), np.nan)
     expected = np.full(problem.blocks, np.nan)
+    before: tuple[Array, Array] | None = None
+    q: Array | None = None
     for block in range(problem.blocks):
         own = there[block]
         if np.count_nonzero(own) < _FEWEST:
             continue
-        x = _columns(force[block // 3][own], time[block // 3][own])
-        if x is None:
+        here = force[block // 3][own], time[block // 3][own]
+        if before is None or not all(map(np.array_equal, here, before)):
+            # the axes of a unit, and units in the same poses at the same times, have the same columns
+            before, x = here, _columns(*here)
+            q = None if x is None else np.linalg.qr(x)[0]
+        if q is None:
             continue
-        q = np.linalg.qr(x)[0]
         y = series[block, places[own]]
         left[block, own] = y - q @ (q.T @ y)
         v = covariance.of_dwells(block, model.noise, places[own])

@@ -1,6 +1,6 @@
 """A model under criticism: its columns in a problem, and the noise of its residuals."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from inertial.criticism.candidate import Candidate
 from inertial.criticism.covariance import LARGE
 from inertial.criticism.noise_shares import Noise, Shares
 from inertial.criticism.own_shares import own_shares
-from inertial.criticism.problem import Problem
+from inertial.criticism.problem import KnownDeviances, Problem
 from inertial.criticism.share_statistics import ShareStatistics
 from inertial.criticism.shares import best_shares, plausible_shares
 from inertial.criticism.space import Space
@@ -132,7 +132,7 @@ class Model:
         for _ in range(_TURNS):
             space = self._rough(best)
             series = self.problem.y if not self.shared.shape[-1] else self.problem.y - self.shared @ space.shared_sizes
-            own = own_shares(self.problem, series, self.local, space)
+            own = own_shares(self.problem, series, self.local, space, self._by_products(best))
             if own == best.own:
                 break
             # the others without them, from where they were
@@ -174,14 +174,18 @@ class Model:
     def _rough(self, shares: Shares) -> Space:
         """The space at shares, with the blocks weighted by their known variances."""
         if shares not in self._spaces:
-            scale = np.ones(self.problem.blocks) if self._near is None else self._near.scale
-            if self._near is None and self.shared.shape[-1]:
-                scale = self._own_scale
             most = max(2 if self.problem.y.size <= LARGE else 1, _SPACES // max(self.local.size, 1))
             while len(self._spaces) >= most:  # the oldest first: a search for shares seldom goes back
                 del self._spaces[next(iter(self._spaces))]
-            self._spaces[shares] = self._space(Noise(shares, scale))
+            self._spaces[shares] = self._space(Noise(shares, self._weights))
         return self._spaces[shares]
+
+    @cached_property
+    def _weights(self) -> Array:
+        """Standard deviations by which the blocks weigh while the shares are searched, (blocks,)."""
+        if self._near is None and self._joined:
+            return self._own_scale
+        return np.ones(self.problem.blocks) if self._near is None else self._near.scale
 
     @cached_property
     def _own_scale(self) -> Array:
@@ -191,13 +195,26 @@ class Model:
 
     def _restricted(self, shares: Shares) -> float:
         """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
-        quick = None if self.shared.shape[-1] else self.statistics.at(shares)
+        known = self._known.of_lot.get(shares)
+        if known is None:
+            known, firm = self._deviance(shares)
+            if firm:
+                self._known.of_lot[shares] = known
+        return known
+
+    def _deviance(self, shares: Shares) -> tuple[float, bool]:
+        """The same, computed: by the products of the columns if these are precise, else in the whitened space.
+
+        And whether it is the same for all models of equal terms.
+        """
+        quick = self.statistics.beside_shared(shares, self._weights) if self._joined else self.statistics.at(shares)
         if quick is None:
             space = self._rough(shares)
-            information, squares, dof = space.information, space.squares, space.by_block
-        else:
-            information, squares = quick
-            dof = self.problem.covariance.count - float(self.statistics.rank)
+            return self._deviance_of(shares, space.information, space.squares, space.by_block), False
+        dof = self.problem.covariance.count - float(self.statistics.rank)
+        return self._deviance_of(shares, quick.information, quick.squares, dof), self._alike and quick.firm
+
+    def _deviance_of(self, shares: Shares, information: float, squares: Array, dof: Array) -> float:
         logdet = float(np.sum(self.problem.covariance.logdet(shares)))
         if self._least.any():
             known = dof > 0
@@ -209,16 +226,61 @@ class Model:
         own = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
         return logdet + information + float(np.sum(own))
 
+    def _by_products(self, best: Shares) -> Callable[[int, Shares], float | None]:
+        """−2 log restricted likelihood of a block at shares, less the log-determinant; None if products are not precise enough.
+
+        What all blocks share has the coefficients that it has at the best shares.
+        """
+        beside = self.statistics.beside_shared(best, self._weights) if self._joined else None
+        if self._joined and beside is None:
+            return lambda _, __: None
+        sizes = None if beside is None else beside.sizes
+
+        def deviance(block: int, shares: Shares) -> float | None:
+            known = self._known.of_blocks.get((block, shares))
+            if known is None and (left := self.statistics.left_of_block(block, shares, sizes)) is not None:
+                dof = int(self.problem.covariance.count[block]) - self.statistics.rank
+                known = left.information + dof * float(np.log(max(float(left.squares[0]), 1e-300)))
+                if self._alike and left.firm:
+                    self._known.of_blocks[block, shares] = known
+            return known
+
+        return deviance
+
+    @property
+    def _joined(self) -> bool:
+        """Whether all blocks share some coefficients."""
+        return self.shared.shape[-1] > 0
+
+    @property
+    def _alike(self) -> bool:
+        """Whether the restricted likelihood depends on the terms alone: no weights, and no curve, are in it."""
+        return not self._joined and self._curves is None
+
+    @cached_property
+    def _known(self) -> KnownDeviances:
+        """The deviances that are known."""
+        return (
+            self.problem.deviances_of(frozenset(term.key for term in self.terms)) if self._alike else KnownDeviances()
+        )
+
     @cached_property
     def statistics(self) -> ShareStatistics:
-        """Products of the columns with coefficients by block, and of the measurements, at any shares."""
-        further = None
-        if self._added is not None and not self._added.shared:
+        """Products of the columns and of the measurements, at any shares."""
+        before, further = self._simpler, None
+        if self._added is not None:
             further = self._added.with_start(self.problem)
-        elif self._simpler is not None and self._added is None and self._curves is not None:
+        elif before is not None and self._curves is not before._curves and self._curves is not None:  # noqa: SLF001  # of its own kind
             further = Candidate(self._curves[:, :, None], shared=False)
-        before = None if self._simpler is None or further is None else self._simpler.statistics
-        return ShareStatistics(self.problem, self.local, before, further)
+        elif before is not None and self._shared_curves is not None:
+            further = Candidate(before.statistics.independent(self._shared_curves)[:, :, None], shared=True)
+        return ShareStatistics(
+            self.problem,
+            self.local,
+            None if before is None or further is None else before.statistics,
+            further,
+            self.shared,
+        )
 
     @cached_property
     def space(self) -> Space:
@@ -303,7 +365,7 @@ class Model:
 
     def with_shared_curves(self, columns: Array) -> "Model":
         """The model with the columns (blocks, n, d) of a driver, whose coefficients all blocks share."""
-        return self._variant(self.terms, shared_curves=columns)
+        return self._variant(self.terms, shared_curves=columns, simpler=self if self._shared_curves is None else None)
 
     def without(self, effect_id: str) -> "Model":
         """The model less one effect."""

@@ -7,6 +7,7 @@ shares of its own, by its own restricted likelihood, in every model that is judg
 the block, its residuals no longer deviate, and the block has the lot's shares again.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +32,9 @@ _STRIDE = 4
 """Eighths of a decade by which own shares are searched: half decades."""
 
 
-def own_shares(problem: "Problem", series: Array, local: Array, space: "Space") -> tuple[tuple[int, float, float], ...]:
+def own_shares(
+    problem: "Problem", series: Array, local: Array, space: "Space", of_block: Callable[[int, Shares], float | None]
+) -> tuple[tuple[int, float, float], ...]:
     """Blocks with shares of their own, and these, for the residuals of a model at the lot's shares.
 
     Parameters
@@ -39,6 +42,7 @@ def own_shares(problem: "Problem", series: Array, local: Array, space: "Space") 
     series : (blocks, n), measurements less what columns that blocks share explain, g
     local : (blocks, n, p), columns with coefficients by block
     space : of the model at the lot's shares, or at shares some blocks of which are their own
+    of_block : −2 log restricted likelihood of a block at shares, less the log-determinant, where products give it; else None
     """
     if problem.lot.radial or problem.n > LONGEST:
         return ()
@@ -53,7 +57,12 @@ def own_shares(problem: "Problem", series: Array, local: Array, space: "Space") 
         columns = np.concatenate([local[block], series[block][:, None]], axis=1)
 
         def deviance(shares: Shares, block: int = block, columns: Array = columns) -> float:
-            return _deviance(problem, block, columns, shares)
+            quick = of_block(block, shares)
+            return (
+                _deviance(problem, block, columns, shares)
+                if quick is None
+                else problem.covariance.logdet_of_block(block, shares) + quick
+            )
 
         best = best_shares(deviance, common, finest=_STRIDE)
         if deviance(common) - deviance(best) > OWN_SHARES:
@@ -75,8 +84,8 @@ def _deviance(problem: "Problem", block: int, columns: Array, shares: Shares) ->
     """−2 log restricted likelihood of one block, its columns and behind them its measurements (n, p + 1), at shares."""
     covariance = problem.covariance
     there = covariance.there[block]
-    whitener, logdet = covariance.whitener_of_block(block, shares)
-    white = (whitener @ columns)[there] / covariance.level[block]
+    whitener, factors, logdet = covariance.whitener_of_block(block, shares)
+    white = (columns * factors[:, None] if whitener is None else whitener @ columns)[there] / covariance.level[block]
     size = np.linalg.norm(white[:, :-1], axis=0)
     seen = size > 0.0
     upper = np.linalg.qr(np.concatenate([white[:, :-1][:, seen] / size[seen], white[:, -1:]], axis=1), mode="r")

@@ -1,7 +1,7 @@
 """A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 
@@ -12,6 +12,7 @@ from inertial.criticism.candidate import Candidate
 from inertial.criticism.covariance import Covariance
 from inertial.criticism.handling.base import Handling, by_block
 from inertial.criticism.lot import Lot
+from inertial.criticism.noise_shares import Shares
 from inertial.criticism.shared_rows import finest_rows, shared_rows
 from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited, has_start
@@ -23,6 +24,9 @@ SHARED = ("station", "data")
 
 _PIECE = 1_000_000
 """Number of columns processed at a time."""
+
+_WIDE = 3_000_000
+"""The same of the columns of one effect at several values: each pass over them goes through the model's own columns once."""
 
 _FEW = 1000
 """Values of a column of all blocks up to which it takes longer to find equal columns than to work on all."""
@@ -56,6 +60,25 @@ def _by_axis(values: Values) -> list[dict[str, float]]:
     return [on_axis(values, 0)] * 3
 
 
+def _of_axes(effect: SensorEffect, values: Values, made: Callable[[int, dict[str, float]], Array]) -> list[Array]:
+    """What is made for each sensor axis; the same three times where the effect depends on none, and its values neither."""
+    each = _by_axis(values)
+    if effect.same_on_axes and each[0] is each[2]:
+        return [made(0, each[0])] * 3
+    return [made(axis, own) for axis, own in enumerate(each)]
+
+
+@dataclass(frozen=True)
+class KnownDeviances:
+    """Restricted deviances that the models of equal terms have in common, by the shares of the noise.
+
+    of_lot : of all blocks; of_blocks : of single blocks, less the log-determinants
+    """
+
+    of_lot: dict[Shares, float] = field(default_factory=dict[Shares, float])
+    of_blocks: dict[tuple[int, Shares], float] = field(default_factory=dict[tuple[int, Shares], float])
+
+
 class Problem:
     """Series and columns of a lot by block.
 
@@ -74,6 +97,11 @@ class Problem:
         self._kept: dict[tuple[object, ...], Candidate] = {}
         self._terms: dict[tuple[object, ...], Array] = {}
         self._room = _CACHE
+        self._deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
+
+    def deviances_of(self, terms: frozenset[tuple[object, ...]]) -> KnownDeviances:
+        """What is known of the models whose terms have these keys."""
+        return self._deviances.setdefault(terms, KnownDeviances())
 
     @property
     def series(self) -> Array:
@@ -137,8 +165,9 @@ class Problem:
             return effect.columns(self.lot, self.slope, **on_axis(values, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
-            axes = [effect.columns(state, axis, **own) for axis, own in enumerate(_by_axis(values))]
-            return self._by_axis([excited(effect, columns) for columns in axes])
+            return self._by_axis(
+                _of_axes(effect, values, lambda axis, own: excited(effect, effect.columns(state, axis, **own)))
+            )
         return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
 
     def start(self, effect: AnyEffect | Handling, values: Values) -> Array:
@@ -147,8 +176,9 @@ class Problem:
             return np.zeros((self.blocks, self.n, 0))
         if isinstance(effect, SensorEffect):
             state = self.lot.state
-            each = [effect.start_columns(state, axis, **own) for axis, own in enumerate(_by_axis(values))]
-            columns = self._by_axis(each)
+            columns = self._by_axis(
+                _of_axes(effect, values, lambda axis, own: effect.start_columns(state, axis, **own))
+            )
         else:
             columns = self.seen(effect.start_change(self.lot.state, **on_axis(values, 0)))
         # a state that decays before the second dwell leaves a column of one dwell only: it is kept, and this dwell has no
@@ -202,7 +232,7 @@ class Problem:
     @property
     def at_a_time(self) -> int:
         """Values of an effect's parameters whose columns are worked on together: few of a large lot, to limit the memory."""
-        return max(1, _PIECE // (1 + self.blocks * self.n * _WIDEST))
+        return max(1, _WIDE // (1 + self.blocks * self.n * _WIDEST))
 
     def varied(
         self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, start: bool = False

@@ -106,5 +106,6 @@ def _shown(model: Model, noise: Noise, effect: AnyEffect, place: dict[str, float
     """Whether the first column of an effect is visible beside the model and the possible initial state."""
     problem = model.problem
     term = Term(effect, tuple(place.items()), 1)
-    beside = model.with_curves(problem.start(effect, place))
+    # not model.with_curves: the noise of the model itself is not needed
+    beside = Model(problem, model.terms, curves=problem.start(effect, place))
     return bool(np.any(beside.at(noise).gain(term.candidate(problem)).rank[0]))

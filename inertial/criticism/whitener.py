@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 _factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
 _times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
 
+_ROWS = 48
+"""Rows of a kernel that are scaled at a time: an array of all of them is memory that the system has to clear first."""
+
 EVEN = 1.5
 """White standard errors of a block that differ by less than this factor are taken as equal."""
 
@@ -91,12 +94,15 @@ def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Arr
     wander : covariances (n, n) of 1/f and of random walk of variance one
     """
     there, whole = dwells.there, bool(dwells.there.all())
-    covariance = np.diag(dwells.white[there] ** 2)
+    covariance = np.zeros((there.size, there.size))
+    covariance.reshape(-1)[:: there.size + 1] = dwells.white**2
     for i, each in zip(index, wander, strict=True):
         if i is not None:
-            kernel = dwells.louder(each)
-            own = kernel if whole else kernel[np.ix_(there, there)]
-            covariance += 10.0 ** (i / SHARE_STEP) * own
+            kernel, share = dwells.louder(each), 10.0 ** (i / SHARE_STEP)
+            for rows in (slice(first, first + _ROWS) for first in range(0, there.size, _ROWS)):
+                covariance[rows] += share * kernel[rows]
+    if not whole:
+        covariance = covariance[np.ix_(there, there)]
     # of the transpose, which is in Fortran order: no copy
     upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
     if failed:

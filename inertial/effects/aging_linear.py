@@ -17,6 +17,7 @@ class AgingLinear(SensorEffect):
     per: ClassVar[tuple[str, ...]] = ("h",)
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature", "thermal_hysteresis", "warm_up")
     breaker: ClassVar[str] = "a reference pose measured again and again; soaks in mixed order"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 27
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:

@@ -24,6 +24,7 @@ class AgingLog(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("warm_up", "aging_linear")
     breaker: ClassVar[str] = "a long stay at constant temperature after power-on"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 29
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 30.0, 36000.0, "log", 8),)
 

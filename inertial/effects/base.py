@@ -104,7 +104,12 @@ class Effect(ABC):
 
 
 class SensorEffect(Effect):
-    """An effect inside the device: columns with coefficients of their own for every unit and axis."""
+    """An effect inside the device: columns with coefficients of their own for every unit and axis.
+
+    same_on_axes : whether the columns do not depend on the axis: they are made once for the three
+    """
+
+    same_on_axes: ClassVar[bool] = False
 
     @abstractmethod
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:

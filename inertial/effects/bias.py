@@ -18,6 +18,7 @@ class Bias(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (50.0, 150000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("level_error",)
     breaker: ClassVar[str] = "opposed faces, each axis up and down"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 0
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:

@@ -16,6 +16,7 @@ class BiasTemperature(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (0.5, 2500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "supply_sensitivity", "thermal_lag")
     breaker: ClassVar[str] = "soaks on the way back, so that time and temperature part"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:

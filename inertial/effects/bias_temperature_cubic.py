@@ -16,6 +16,7 @@ class BiasTemperatureCubic(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_kink",)
     breaker: ClassVar[str] = "at least five temperatures"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 7
     after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
 

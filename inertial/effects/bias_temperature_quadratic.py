@@ -16,6 +16,7 @@ class BiasTemperatureQuadratic(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_hysteresis", "thermal_kink")
     breaker: ClassVar[str] = "at least four temperatures, on the way up and back"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 5
     after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
 

@@ -27,6 +27,7 @@ class Covariate(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str] = "vary this quantity alone"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 60
     primary: ClassVar[int | None] = 1
 

@@ -22,6 +22,7 @@ class Magnetic(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("level_error",)
     breaker: ClassVar[str] = "turn the station, or a coil about it"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 45
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:

@@ -22,6 +22,7 @@ class StepChange(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear",)
     breaker: ClassVar[str] = "a reference pose repeated through the run"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 31
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("instant", "s", 0.0, 1.0, "linear", 40),)
 

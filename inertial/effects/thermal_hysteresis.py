@@ -21,6 +21,7 @@ class ThermalHysteresis(SensorEffect):
     per: ClassVar[tuple[str, ...]] = ("K", "K")
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "bias_temperature_quadratic")
     breaker: ClassVar[str] = "a closed loop of temperature, and minor loops; a one-way soak holds no information"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 24
     memory: ClassVar[bool] = True
     primary: ClassVar[int | None] = 1

@@ -20,6 +20,7 @@ class ThermalKink(SensorEffect):
     per: ClassVar[tuple[str, ...]] = ("K",)
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature_cubic", "bias_temperature_quadratic")
     breaker: ClassVar[str] = "steps of 5 K about the kink"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 25
     after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (

@@ -20,6 +20,7 @@ class ThermalLag(SensorEffect):
     per: ClassVar[tuple[str, ...]] = ("K", "K²")
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_rate", "bias_temperature")
     breaker: ClassVar[str] = "a fast step of temperature, read while it settles"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 21
     memory: ClassVar[bool] = True
     primary: ClassVar[int | None] = 1

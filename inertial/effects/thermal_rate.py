@@ -18,6 +18,7 @@ class ThermalRate(SensorEffect):
     per: ClassVar[tuple[str, ...]] = ("(K/min)",)
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_lag",)
     breaker: ClassVar[str] = "ramps at two rates; soaked readings never see it"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 20
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("settling", "s", 4.0, 60.0, "log", 4),)
 

@@ -17,6 +17,7 @@ class VibrationRectification(SensorEffect):
     per: ClassVar[tuple[str, ...]] = ("g²",)
     hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "bias_temperature")
     breaker: ClassVar[str] = "the compressor off; the vibration recorded"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 34
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:

@@ -19,6 +19,7 @@ class WarmUp(SensorEffect):
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "aging_log")
     breaker: ClassVar[str] = "a power cycle at constant temperature"
+    same_on_axes: ClassVar[bool] = True
     simplicity: ClassVar[int] = 26
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 10.0, 7200.0, "log", 14),)
 

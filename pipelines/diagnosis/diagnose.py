@@ -87,7 +87,8 @@ def diagnose(
     DataRejected
         Nothing is left to diagnose, or the dwells lack a quantity of the model.
     """
-    return document(*examined(dwells, history, effects))
+    with threadpool_limits(1):  # as in the search: the next measurement is found by small matrices, too
+        return document(*examined(dwells, history, effects))
 
 
 def examined(

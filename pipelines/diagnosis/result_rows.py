@@ -9,7 +9,6 @@ import numpy as np
 
 from inertial import effects as catalogue
 from inertial.criticism.model import Model
-from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import intervals, settled, terms_of
 from pipelines.tables.sound_lot import probability
 from schemas.units import MICRO
@@ -54,7 +53,7 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
         return {}
     known = catalogue.catalogue()
     judged = [t.effect.id for t in diagnosis.base.terms if t.effect.id in known or ":" in t.effect.id]
-    problem = Problem(diagnosis.problem.lot)
+    problem = diagnosis.problem  # its columns and the whiteners of its noise are known
     ids = dict.fromkeys([*judged, *(term.effect.id for term in added)])
     model = settled(Model(problem, terms_of(catalogue.get_all(list(ids)), problem)))
     between = intervals(model)

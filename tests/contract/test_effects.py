@@ -123,6 +123,18 @@ def test_start_columns_are_finite_and_fit_the_dwells(name: str) -> None:
     assert np.isfinite(start).all()
 
 
+@pytest.mark.parametrize("name", [name for name in EVERY if isinstance(effects.get(name), SensorEffect)])
+def test_says_rightly_whether_its_columns_are_the_same_on_all_axes(name: str) -> None:
+    effect = effects.get(name)
+    assert isinstance(effect, SensorEffect)
+    made = [
+        [of(RICH, axis, **values) for axis in range(3)]
+        for values in grid_of(effect, RICH)
+        for of in (effect.columns, effect.start_columns)
+    ]
+    assert effect.same_on_axes == all(np.array_equal(each, axes[0]) for axes in made for each in axes)
+
+
 @pytest.mark.parametrize("name", EVERY)
 def test_says_nothing_where_nothing_changes(name: str) -> None:
     """The same pose, temperature, supply and instant again and again: whatever a column says then is a bias."""

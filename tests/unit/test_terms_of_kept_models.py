@@ -6,9 +6,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from inertial import effects as catalogue
 from inertial.criticism.examination import ExaminedRun
 from inertial.criticism.handling.gain_step import GainStep
 from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Shares
 from inertial.criticism.term import Term
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
@@ -58,6 +60,17 @@ def test_a_model_less_an_equal_term_does_not_hold_it() -> None:
     base, term = model_and_term()
     richer = base.with_term(term)
     assert [t.effect.id for t in richer.without_term(equal(term)).terms] == [t.effect.id for t in base.terms]
+
+
+@pytest.mark.parametrize("shares", [Shares(1.0, 0.0), Shares(3.0, 10.0), Shares(0.1, 100.0)])
+def test_terms_that_are_added_in_turn_leave_what_they_leave_together(shares: Shares) -> None:
+    base, _ = model_and_term()
+    terms = [Term(catalogue.get(name)) for name in ("third_order", "aging_linear", "second_order")]
+    in_turn = base
+    for place, term in enumerate(terms):
+        in_turn = in_turn.with_term(term)
+        together = Model(base.problem, [*base.terms, *terms[: place + 1]])
+        assert in_turn._restricted(shares) == pytest.approx(together._restricted(shares), abs=1e-6)
 
 
 @pytest.mark.parametrize("units", [1, 2])

@@ -1,0 +1,173 @@
+"""Restricted deviances by products of columns are those of the whitened series, for every model and any shares of the noise."""
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inertial import effects as catalogue
+from inertial.criticism.candidate import Candidate
+from inertial.criticism.examination import ExaminedRun
+from inertial.criticism.handling.gain_step import GainStep
+from inertial.criticism.model import Model
+from inertial.criticism.noise_shares import Shares
+from inertial.criticism.own_shares import _deviance, own_shares
+from inertial.criticism.products import products_with, spanned
+from inertial.criticism.share_statistics import ShareStatistics
+from inertial.criticism.shares import shares_at
+from inertial.criticism.term import Term
+from inertial.criticism.unknown import suspects
+from pipelines.tables.dwells import lot_of, measured
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
+
+from noise import Noise
+from world import World, make
+
+BASE = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
+CUBIC = Term(catalogue.get("third_order"))
+SLOW = Term(catalogue.get("aging_linear"))
+PLAY = Term(catalogue.get("thermal_hysteresis"), (("half_width", 12.0),), 1, rest=True)
+GAIN = Term(GainStep(), (("unit", 1.0), ("dwell", 30.0)))
+
+
+@cache
+def base(*, gaps: bool) -> Model:
+    """The judged model of a lot of three units with a cubic, in part without some of their dwells."""
+    made = make(World(units=3, noise=Noise(white=60.0, flicker=30.0), hidden=(("third_order", 2.0),)), 5_950_001)
+    dwells = made.dwells
+    if gaps:
+        units = sorted(dwells["unit"].unique())
+        dwells = dwells[~((dwells["unit"] == units[0]) & dwells["dwell"].isin([5, 17, 18]))]
+    return ExaminedRun(lot_of(measured(dwells, made.history), square=False), BASE).model()
+
+
+def curves(model: Model) -> np.ndarray:
+    """A curve of its own for every block."""
+    time = np.linspace(-1.0, 1.0, model.problem.n)
+    return np.stack([np.sin(k + 3.0 * time) for k in range(model.problem.blocks)])[..., None]
+
+
+def of_the_table(model: Model) -> np.ndarray:
+    """The columns of a curve over a table angle, which all blocks share."""
+    (suspect, *_) = [s for s in suspects(model.problem) if s.candidate.shared]
+    return suspect.candidate.of_blocks[:, :, 0]
+
+
+MODELS = {
+    "base": lambda model: model,
+    "one more": lambda model: model.with_term(CUBIC),
+    "two more": lambda model: model.with_term(PLAY).with_term(CUBIC),
+    "three more": lambda model: model.with_term(PLAY).with_term(CUBIC).with_term(SLOW),
+    "a curve": lambda model: model.with_curves(curves(model)),
+    "more and a curve": lambda model: model.with_term(CUBIC).with_curves(curves(model)),
+    "a shared one more": lambda model: model.with_term(GAIN),
+    "more and a shared one": lambda model: model.with_term(CUBIC).with_term(GAIN),
+    "a shared one and more": lambda model: model.with_term(GAIN).with_term(CUBIC),
+    "a shared curve": lambda model: model.with_shared_curves(of_the_table(model)),
+    "shared ones alone": lambda model: Model(model.problem, [*model.terms, GAIN, CUBIC], near=model.noise),
+}
+
+steps = st.none() | st.integers(-8, 20)
+own = st.lists(st.tuples(st.sampled_from([0, 4]), steps, steps), max_size=2, unique_by=lambda one: one[0])
+
+
+@cache
+def model_of(name: str, *, gaps: bool) -> Model:
+    return MODELS[name](base(gaps=gaps))
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize("name", MODELS)
+@given(place=st.tuples(steps, steps), apart=own)
+@settings(max_examples=12, deadline=None)
+def test_a_deviance_by_products_is_that_of_the_whitened_series(
+    name: str, place: tuple[int | None, int | None], apart: list[tuple[int, int | None, int | None]], *, gaps: bool
+) -> None:
+    model = model_of(name, gaps=gaps)
+    shares = shares_at(place, tuple((block, *shares_at(each)[:2]) for block, *each in sorted(apart)))
+    statistics = model.statistics
+    quick = statistics.beside_shared(shares, model._weights) if model._joined else statistics.at(shares)
+    assert quick is not None
+    space = model._rough(shares)
+    assert quick.information == pytest.approx(space.information, rel=1e-9)
+    np.testing.assert_allclose(quick.squares, space.squares, rtol=1e-7)
+    np.testing.assert_allclose(model.problem.covariance.count - statistics.rank, space.by_block)
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize("name", MODELS)
+def test_shares_of_single_blocks_by_products_are_those_of_the_whitened_series(name: str, *, gaps: bool) -> None:
+    model = model_of(name, gaps=gaps)
+    lot = Shares(1.0, 10.0)
+    space = model._rough(lot)
+    y = model.problem.y
+    series = y - model.shared @ space.shared_sizes if model._joined else y
+    quick = model._by_products(lot)
+    assert quick(0, Shares(3.0, 0.0)) is not None
+    differences = [
+        [of(block, Shares(3.0, 1.0)) - of(block, lot) for block in range(model.problem.blocks)]
+        for of in (
+            lambda block, shares: quick(block, shares) + model.problem.covariance.logdet_of_block(block, shares),
+            lambda block, shares: _alone(model, series, block, shares),
+        )
+    ]
+    np.testing.assert_allclose(differences[0], differences[1], atol=1e-6)
+    found = [own_shares(model.problem, series, model.local, space, of) for of in (quick, lambda *_: None)]
+    assert found[0] == found[1]
+
+
+def _alone(model: Model, series: np.ndarray, block: int, shares: Shares) -> float:
+    return _deviance(model.problem, block, np.concatenate([model.local[block], series[block][:, None]], axis=1), shares)
+
+
+def test_what_is_known_of_equal_models_is_what_each_of_them_finds() -> None:
+    model = base(gaps=False)
+    there = {shares: model.with_term(PLAY).with_term(CUBIC)._restricted(shares) for shares in map(shares_at, PLACES)}
+    other = Model(model.problem, [*model.terms, CUBIC, PLAY])
+    for shares, known in there.items():
+        space = other._rough(shares)
+        plain = other._deviance_of(shares, space.information, space.squares, space.by_block)
+        assert other._restricted(shares) == pytest.approx(known, abs=1e-7)
+        assert known == pytest.approx(plain, abs=1e-6)
+
+
+PLACES = [(4, None), (0, 8), (None, 16), (12, 4), (-8, -8)]
+
+
+@given(seed=st.integers(0, 2**32 - 1), rank=st.integers(1, 6), p=st.integers(6, 12))
+@settings(max_examples=30, deadline=None)
+def test_products_of_columns_that_few_series_span_are_those_of_the_columns(seed: int, rank: int, p: int) -> None:
+    rng = np.random.default_rng(seed)
+    blocks, n = 6, 30
+    columns = rng.standard_normal((blocks, p, rank)) @ (
+        rng.standard_normal((rank, n)) * 10.0 ** rng.uniform(-3, 3, (rank, 1))
+    )
+    rows, places = rng.standard_normal((8, n)), rng.integers(0, 8, (blocks, 3))
+    level = rng.uniform(0.5, 2.0, blocks)
+    lower = np.tril(rng.standard_normal((n, n)))
+    groups = [(np.array([0, 2, 5]), lower, np.ones(n)), (np.array([1, 3, 4]), None, rng.uniform(0.5, 2.0, n))]
+    few = spanned(np.swapaxes(columns, -1, -2))
+    assert few is not None
+    assert len(few.series) == rank
+    found = few.products_with(rows, places, level, groups)
+    every = Candidate(np.swapaxes(columns, -1, -2)[:, :, None], shared=False)
+    for one, other in zip(found, products_with(every, rows[places], level, groups), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9 * np.abs(other).max())
+
+
+def test_columns_that_need_many_series_are_whitened_themselves() -> None:
+    assert spanned(np.random.default_rng(1).standard_normal((6, 60, 8))) is None
+
+
+def test_columns_of_the_table_span_fewer_directions_than_they_are() -> None:
+    model = base(gaps=False)
+    columns = of_the_table(model)
+    found = ShareStatistics(model.problem, model.local).independent(np.concatenate([columns, columns], axis=-1))
+    assert 0 < found.shape[-1] <= columns.shape[-1]
+    flat = found.reshape(-1, found.shape[-1])
+    np.testing.assert_allclose(flat.T @ flat, np.eye(found.shape[-1]), atol=1e-9)
