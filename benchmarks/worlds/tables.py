@@ -96,6 +96,10 @@ HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name 
 HIDDEN |= {f"adc_nonlinearity_{size:g}": World(hidden=(("adc_nonlinearity", size),)) for size in (1.0, 2.0, 5.0)}
 HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
 HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
+HIDDEN |= {
+    f"misalignment_and_{name}": World(hidden=(("misalignment_temperature", 2.0),), fault=fault, amount=1.0)
+    for name, fault in (("moved", "unit_moved"), ("slip", "table_slip"))
+}
 TABLES = {"nulls": NULLS, "noises": NOISES, "faults": FAULTS, "small": SMALL, "hidden": HIDDEN}
 WRONG = (
     "bias_temperature_quadratic", "scale_temperature_quadratic", "aging_linear", "aging_log", "step_change", "warm_up",

@@ -200,7 +200,7 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     size = model.shared_sizes(term)
     units = (int(place["unit"]),) if "unit" in place else ()
     evidence, dwells = _happened(fields, searched.model, term, alternative, size)
-    before, after = left_out(searched.model), left_out(model)
+    before, after = left_out(searched.model), left_out(model, term)
     errors = fit_rms(problem, model.terms), *worst(before, after)
     run.handled.append(Named(group, *errors, units, dwells, evidence, carried_by(searched.model, term)))
     lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)

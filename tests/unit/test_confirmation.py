@@ -8,6 +8,7 @@ import pytest
 from inertial.criticism.examination import Named
 from inertial.criticism.left_out import LeftOut
 from inertial.criticism.reproduced_change import ReproducedChange
+from pipelines.cli.diagnosis_text import why_not_recommended
 from pipelines.diagnosis import confirmation
 from pipelines.diagnosis.model_history import text_of
 
@@ -28,6 +29,32 @@ def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_wo
     before: float, after: float, predicts: object
 ) -> None:
     assert Named(SimpleNamespace(), 1.0, before, after).predicts is predicts
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "recommended", "lines"),
+    [
+        (10.0, 9.0, ["third_order"], []),
+        (10.0, 12.0, [], ["third_order is not recommended: the error on dwells left out rises from 10.0 to 12.0 µg."]),
+        (
+            None,
+            None,
+            [],
+            ["third_order is not recommended: no dwells left out can judge it; a fresh run of the same units decides."],
+        ),
+    ],
+)
+def test_it_is_said_why_an_effect_is_not_recommended(
+    before: float | None, after: float | None, recommended: list[str], lines: list[str]
+) -> None:
+    fault = {"effects": ["bad_dwell"], "scope": "data", "heldout_after_ug": None}
+    effect = {
+        "effects": ["third_order", "odd_quadratic"],
+        "scope": "sensor",
+        "heldout_before_ug": before,
+        "heldout_after_ug": after,
+    }
+    assert why_not_recommended({"classes": [fault, effect], "recommended": recommended}) == lines
 
 
 def test_a_gain_in_density_does_not_confirm_an_error_that_rises() -> None:
