@@ -109,8 +109,9 @@ def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
 def test_a_fresh_run_does_not_confirm_a_fall_within_its_uncertainty(
     error: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(confirmation, "estimate", lambda model: model)
+    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
     monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
+    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
     monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
     change = ReproducedChange(1.0, 0.1, 2e-4, 1e-4, error, "base")
     monkeypatch.setattr(confirmation, "reproduced_change", lambda *_: change)
@@ -125,8 +126,9 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     left: tuple[float, float], confirmed: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sizes = iter(left)
-    monkeypatch.setattr(confirmation, "estimate", lambda model: model)
+    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
     monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
+    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
     monkeypatch.setattr(confirmation, "residuals_of", lambda problem, model: np.full((1, 9), next(sizes)))
     monkeypatch.setattr(
         confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
@@ -135,3 +137,24 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     evidence = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
     assert evidence["confirmed"] is confirmed
     assert ("the error on the fresh run rises from 200 to 1.45e+05 µg" in text_of(ROW, evidence)) is (confirmed is None)
+
+
+@pytest.mark.parametrize(("rise", "confirmed"), [(1.02, True), (1.5, None)])
+def test_a_fresh_run_confirms_where_dwells_left_out_rise_within_their_uncertainty(
+    rise: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
+    monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
+    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
+    monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
+    monkeypatch.setattr(
+        confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
+    )
+    # where they rise depends on the dwell: half of them fall
+    before, after = missed(1e-4, 1.0), missed(1e-4, 2.0)
+    after.missed["blocks of time"][:, ::2] *= rise * 1.1
+    after.missed["blocks of time"][:, 1::2] *= rise / 1.1
+    monkeypatch.setattr(confirmation, "left_out", lambda _: before)
+    evidence = confirmation.progress("old", "new", after, "fresh")
+    assert evidence["confirmed"] is confirmed
+    assert bool(evidence["rises"]) is (confirmed is None)
