@@ -149,11 +149,19 @@ def _rise(what: str, before: float, after: float) -> str | None:
 
 
 def _rises_left_out(before: Model, after: LeftOut) -> str | None:
-    """A kind of dwells left out of the first run that is predicted worse by more than its uncertainty; None if there is none."""
-    first = left_out(before)
+    """A kind of dwells left out of the first run that speaks against the effects, as text; None if there is none.
+
+    Its error rises by more than its uncertainty, or it rises and the log density falls by as much as would confirm.
+    """
+    first, what = left_out(before), "the error on dwells left out"
     kinds: list[Kind] = [kind for kind in first.density if kind in after.density]
-    told = (_clear_rise("the error on dwells left out", first.missed[kind], after.missed[kind]) for kind in kinds)
-    return next((text for text in told if text), None)
+    for kind in kinds:
+        old, new = first.missed[kind], after.missed[kind]
+        against = after.density[kind] - first.density[kind] < -LEFT_OUT
+        text = _rise(what, rms(old), rms(new)) if against else _clear_rise(what, old, new)
+        if text:
+            return text
+    return None
 
 
 def _clear_rise(what: str, before: Array, after: Array) -> str | None:

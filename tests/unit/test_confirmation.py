@@ -139,9 +139,11 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     assert ("the error on the fresh run rises from 200 to 1.45e+05 µg" in text_of(ROW, evidence)) is (confirmed is None)
 
 
-@pytest.mark.parametrize(("rise", "confirmed"), [(1.02, True), (1.5, None)])
+@pytest.mark.parametrize(
+    ("rise", "density", "confirmed"), [(1.02, 2.0, True), (1.02, -2.0, True), (1.02, -4.0, None), (1.5, 2.0, None)]
+)
 def test_a_fresh_run_confirms_where_dwells_left_out_rise_within_their_uncertainty(
-    rise: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
+    rise: float, density: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
     monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
@@ -151,7 +153,7 @@ def test_a_fresh_run_confirms_where_dwells_left_out_rise_within_their_uncertaint
         confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
     )
     # where they rise depends on the dwell: half of them fall
-    before, after = missed(1e-4, 1.0), missed(1e-4, 2.0)
+    before, after = missed(1e-4, 1.0), missed(1e-4, density)
     after.missed["blocks of time"][:, ::2] *= rise * 1.1
     after.missed["blocks of time"][:, 1::2] *= rise / 1.1
     monkeypatch.setattr(confirmation, "left_out", lambda _: before)
