@@ -107,6 +107,10 @@ HIDDEN |= {f"{name}_2_one_unit": World(units=1, hidden=((name, 2.0),)) for name 
 HIDDEN |= {f"adc_nonlinearity_{size:g}": World(hidden=(("adc_nonlinearity", size),)) for size in (1.0, 2.0, 5.0)}
 HIDDEN["third_order_and_dwell"] = World(hidden=(("third_order", 2.0),), fault="bad_dwell", amount=1.0)
 HIDDEN["cubic_and_moved"] = World(hidden=(("third_order", 2.0),), fault="unit_moved", amount=0.3)
+HIDDEN |= {
+    f"misalignment_and_{name}": World(hidden=(("misalignment_temperature", 2.0),), fault=fault, amount=1.0)
+    for name, fault in (("moved", "unit_moved"), ("slip", "table_slip"))
+}
 OUTSIDE = {f"{name}_{size:g}": World(hidden=((name, size),)) for size in (1.0, 2.0, 5.0) for name in physics.OUTSIDE}
 OUTSIDE |= {f"{name}_2_two_units": World(units=2, hidden=((name, 2.0),)) for name in physics.OUTSIDE}
 """Physics outside the catalogue: to be told unexplained, with what it follows, and no effect or fault in its place."""

@@ -232,7 +232,7 @@ def _mend(run: ExaminedRun, fields: Candidates, searched: SearchResult, term: Te
     size = model.shared_sizes(term)
     units = alternative.units(**place)
     evidence, dwells = _happened(fields, searched.model, term, alternative, size)
-    before, after = left_out(searched.model), left_out(model)
+    before, after = left_out(searched.model), left_out(model, term)
     errors = fit_rms(problem, model.terms), *worst(before, after)
     lot = alternative.settled(run.lot, size, _misfit(searched.model, model), **place)
     carried, lasting = carried_by(searched.model, term), term if lot is None else None

@@ -3,6 +3,10 @@
 With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ of all dwells, those of a fold B deviate by (P_BB)⁻¹(Py)_B, with covariance (P_BB)⁻¹: the
 prediction from all others, with wander and the errors of the coefficients, without a second fit. Ordinary least squares on the
 other dwells is biased under wander: both sides of a fold share it, and every slow effect is confirmed.
+
+Handling errors of the run (a unit moved, the table slipped) are facts of this run and no part of the model: they keep the
+coefficients of all dwells in every fold, as corrections of the readings do. Without that a fold on one side of a change would
+extrapolate it. The term that is judged is predicted by the other dwells alone, also where it is a handling error.
 """
 
 from dataclasses import dataclass
@@ -15,11 +19,12 @@ from scipy.linalg import solve_triangular
 from inertial.criticism import decisions
 from inertial.criticism.bases import orthonormal
 from inertial.criticism.decisions import BLOCKS
-from inertial.criticism.handling.base import soaks
-from inertial.criticism.heldout import residuals
+from inertial.criticism.handling.base import Handling, soaks
+from inertial.criticism.heldout import Fitting
 from inertial.criticism.model import Model
 from inertial.criticism.noise import LONGEST
 from inertial.criticism.problem import Problem
+from inertial.criticism.term import Term
 
 Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "blocks of time"]
@@ -50,11 +55,16 @@ class LeftOut:
         return max((_rms(self.missed[k]) for k in usable), default=float("nan"))
 
 
-def left_out(model: Model) -> LeftOut:
-    """The prediction of dwells left out: poses in six folds, soaks one by one, six stretches of time."""
+def left_out(model: Model, judged: Term | None = None) -> LeftOut:
+    """The prediction of dwells left out: poses in six folds, soaks one by one, six stretches of time.
+
+    Parameters
+    ----------
+    judged : the term that is judged; the other handling errors of the model have their coefficients of all dwells
+    """
     if model.problem.n > LONGEST:
-        return _without_wander(model)
-    parts = _Parts(model)
+        return _without_wander(model, judged)
+    parts = _Parts(model, judged)
     missed: dict[Kind, Array] = {}
     density: dict[Kind, float] = {}
     for kind, fold in _folds(model.problem).items():
@@ -71,20 +81,40 @@ def left_out(model: Model) -> LeftOut:
     return LeftOut(missed, density)
 
 
-def _without_wander(model: Model) -> LeftOut:
+def _without_wander(model: Model, judged: Term | None) -> LeftOut:
     """Poses left out by weighted least squares: for records so long that wander is not modelled."""
     problem = model.problem
     fold = _by_pose(problem)
     whole = np.full((problem.blocks, problem.n), np.nan)
+    kept = _kept(model, judged)
+    series = problem.series
+    if kept.any():
+        series = series - model.shared[..., kept] @ model.space.shared_sizes[kept]
+    fitting = Fitting(problem, [t for t in model.terms if not _keeps(t, judged)])
     for k in range(int(fold.max()) + 1):
-        whole[:, fold == k] = residuals(problem, model.terms, fold != k)[:, fold == k]
-    return LeftOut({"poses": whole}, {"poses": 0.0})
+        whole[:, fold == k] = fitting.left(series[..., None], fold != k)[:, fold == k, 0]
+    return LeftOut({"poses": np.where(np.isfinite(problem.error), whole, np.nan)}, {"poses": 0.0})
+
+
+def _keeps(term: Term, judged: Term | None) -> bool:
+    """Whether a term keeps its coefficients of all dwells: a handling error, unless it is judged itself."""
+    return isinstance(term.effect, Handling) and (judged is None or term.key != judged.key)
+
+
+def _kept(model: Model, judged: Term | None) -> NDArray[np.bool_]:
+    """The shared columns (q,) of a model that keep their coefficients."""
+    flags: list[bool] = []
+    for term in (t for t in model.terms if t.shared):
+        width = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
+        flags += [_keeps(term, judged)] * width
+    # curves and unknown states of memories follow
+    return np.array([*flags, *[False] * (model.shared.shape[-1] - len(flags))], dtype=bool)
 
 
 class _Parts:
     """The matrix P of every block, by the blocks that share a whitener, and its change by columns that all blocks share."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, judged: Term | None) -> None:
         space = model.space
         self.blocks = space.targets.shape[0]
         z = model.shared
@@ -92,13 +122,11 @@ class _Parts:
         white = space.targets / np.concatenate([np.ones(1), np.where(size > 0.0, size, 1.0)])
         rows = space.backed(white)
         py, pz = rows[:, 0], np.swapaxes(rows[:, 1:], -1, -2)
-        self.inner = np.einsum("bnq,bnr->qr", white[..., 1:], white[..., 1:])
+        inner = np.einsum("bnq,bnr->qr", white[..., 1:], white[..., 1:])
         if z.shape[-1]:
-            py = (
-                py
-                - pz
-                @ np.linalg.lstsq(self.inner, np.einsum("bnq,bn->q", white[..., 1:], white[..., 0]), rcond=1e-10)[0]
-            )
+            py = py - pz @ np.linalg.lstsq(inner, np.einsum("bnq,bn->q", white[..., 1:], white[..., 0]), rcond=1e-10)[0]
+        again = ~_kept(model, judged)
+        pz, self.inner = pz[..., again], inner[np.ix_(again, again)]
         level = space.covariance.level * space.noise.scale
         along = space.backed(space.q) * level[:, None, None]
         self.groups = [
@@ -121,7 +149,7 @@ class _Parts:
         density = 0.0
         inner = self.inner.copy()
         right = np.zeros(inner.shape[0])
-        held: list[tuple[_Group, NDArray[np.intp], Array, Array]] = []
+        held: list[tuple[_Group, NDArray[np.intp], _Fold]] = []
         for group in self.groups:
             places = np.flatnonzero(out & group.there)
             if not places.size:
@@ -129,24 +157,46 @@ class _Parts:
             own = group.left_out(places)
             if own is None:
                 return None
-            off, across, log_det = own
             py, pz = group.py[:, places], group.pz[:, places]
-            density += 0.5 * log_det - 0.5 * off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * off))
-            inner -= np.einsum("bkq,bkr->qr", pz, across)
-            right += np.einsum("bkq,bk->q", pz, off)
-            held.append((group, places, across, off))
+            density += 0.5 * own.log_det - 0.5 * own.off.size * np.log(2.0 * np.pi) - 0.5 * float(np.sum(py * own.off))
+            inner -= np.einsum("bkq,bkr->qr", pz, own.across)
+            right += np.einsum("bkq,bk->q", pz, own.off)
+            held.append((group, places, own))
         turn = np.zeros(right.shape)
         if right.size:
-            values = np.linalg.eigvalsh(inner)
+            values, vectors = np.linalg.eigh(inner)
             if values[0] <= 1e-9 * max(float(np.trace(self.inner)), 1e-300):
+                return None
+            # errors of the shared coefficients, as the other dwells determine them, in the prediction
+            half = vectors / np.sqrt(values)
+            if any(own.is_blind(np.mean(np.sum((own.across @ half) ** 2, axis=-1), axis=-1)) for *_, own in held):
                 return None
             turn = np.linalg.solve(inner, right)
             density += 0.5 * float(np.linalg.slogdet(inner)[1] - np.linalg.slogdet(self.inner)[1])
             density -= 0.5 * float(right @ turn)
         where = np.cumsum(out) - 1
-        for group, places, across, off in held:
-            missed[np.ix_(group.members, where[places])] = off + across @ turn
+        for group, places, own in held:
+            missed[np.ix_(group.members, where[places])] = own.off + own.across @ turn
         return missed, density
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """Dwells left out of blocks that share a whitener, predicted with the shared coefficients of all dwells.
+
+    off : (b, k), (P_BB)⁻¹(Py)_B, g; across : (b, k, q), (P_BB)⁻¹(Pz)_B, g; log_det : sum of log|P_BB|
+    expected : (b,), g², variance of a prediction; enough : (b,), g², variance from which on it tells nothing
+    """
+
+    off: Array
+    across: Array
+    log_det: float
+    expected: Array
+    enough: Array
+
+    def is_blind(self, more: Array | float = 0.0) -> bool:
+        """Whether the other dwells determine the prediction of some block too little, with ``more`` (b,) variance, g²."""
+        return not bool(np.all(self.expected + more < self.enough))
 
 
 class _Group:
@@ -181,8 +231,8 @@ class _Group:
         self.typical = level**2 * (np.sum(root**2) - inside) / np.maximum(own.size - rank, 1)
         """Variance of what the model leaves of each block, (b,): nothing that it predicts should be much worse."""
 
-    def left_out(self, places: NDArray[np.intp]) -> tuple[Array, Array, float] | None:
-        """(P_BB)⁻¹(Py)_B (b, k), (P_BB)⁻¹(Pz)_B (b, k, q) and the sum of log|P_BB|; None if the others determine too little.
+    def left_out(self, places: NDArray[np.intp]) -> _Fold | None:
+        """The dwells at some places; None if the others determine too little.
 
         (S − AᵀA)⁻¹ = S⁻¹ + S⁻¹Aᵀ(I − AS⁻¹Aᵀ)⁻¹AS⁻¹: one inverse for all blocks, and a small one for each.
         """
@@ -201,14 +251,14 @@ class _Group:
         half = np.swapaxes(directions, -1, -2) @ turned / np.sqrt(remains)[..., None]
         expected = (np.trace(inverse) + np.einsum("brk,brk->b", half, half)) * self.level**2 / places.size
         alone = np.mean(1.0 / np.diagonal(whole)) * self.level**2
-        if not bool(np.all(expected < decisions.FOLD_BLIND**2 * np.maximum(alone, self.typical))):
-            return None
         right = np.concatenate([self.py[:, places, None], self.pz[:, places]], axis=-1)
         solved = inverse @ right + np.swapaxes(half, -1, -2) @ (half @ right)
         solved *= self.level[:, None, None] ** 2
         log_det = float(np.sum(np.log(remains)) + len(rows) * np.sum(np.log(values)))
         log_det -= 2.0 * places.size * float(np.sum(np.log(self.level)))
-        return solved[..., 0], solved[..., 1:], log_det
+        enough = decisions.FOLD_BLIND**2 * np.maximum(alone, self.typical)
+        fold = _Fold(solved[..., 0], solved[..., 1:], log_det, expected, enough)
+        return None if fold.is_blind() else fold
 
 
 def _folds(problem: Problem) -> dict[Kind, NDArray[np.intp]]:

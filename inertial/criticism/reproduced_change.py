@@ -102,7 +102,16 @@ def _base(problem: Problem, terms: tuple[Term, ...]) -> tuple[Model, str]:
     full = bool(np.all(space.ranks == columns)) and problem.n >= _SPARE * columns
     if full:
         return base, "base"
-    return Model(problem, [t for t in terms if t.effect.id == "bias"]), "bias"
+    return _bias(problem, terms), "bias"
+
+
+def without_own_bias(problem: Problem, terms: tuple[Term, ...], left: Array) -> Array:
+    """Residuals (blocks, n), g, less the bias that a run has of its own: devices come up elsewhere after a switch-on."""
+    return np.where(np.isfinite(left), _own_out(problem, _bias(problem, terms), np.nan_to_num(left)), np.nan)
+
+
+def _bias(problem: Problem, terms: tuple[Term, ...]) -> Model:
+    return Model(problem, [t for t in terms if t.effect.id == "bias"])
 
 
 def _together(model: Model, change: Array) -> float:
@@ -117,9 +126,8 @@ def _together(model: Model, change: Array) -> float:
 
 def _falls(problem: Problem, base: Model, left: Array, change: Array) -> tuple[float, float, float]:
     """RMS before and after, and the standard error of their difference over units and stretches of time."""
-    space = base.at(problem.covariance.white_noise())
     there = np.isfinite(problem.error)
-    ends = [_own_out(problem, base, space, series)[..., None] for series in (left, left - change)]
+    ends = [_own_out(problem, base, series)[..., None] for series in (left, left - change)]
     both = np.where(there[..., None], np.concatenate(ends, axis=-1), 0.0) ** 2
     units = problem.lot.state.time.shape[0]
     stretch = np.arange(problem.n) * min(BLOCKS, problem.n) // problem.n
@@ -133,7 +141,7 @@ def _falls(problem: Problem, base: Model, left: Array, change: Array) -> tuple[f
     return before, after, float(np.max(spread)) if spread else float("nan")
 
 
-def _own_out(problem: Problem, base: Model, space: Space, series: Array) -> Array:
+def _own_out(problem: Problem, base: Model, series: Array) -> Array:
     """Series (blocks, n), g, without the part that the base model explains by ordinary least squares."""
     level = problem.covariance.level[:, None]
     local = np.where(np.isfinite(problem.error)[..., None], base.local, 0.0) / level[..., None]
@@ -143,7 +151,6 @@ def _own_out(problem: Problem, base: Model, space: Space, series: Array) -> Arra
     u, s, _ = q
     u = u * (s > 1e-9 * s[:, :1])[:, None, :]
     own = np.where(np.isfinite(problem.error), series, 0.0)
-    del space
     return own - (u @ (np.swapaxes(u, -1, -2) @ own[..., None]))[..., 0]
 
 

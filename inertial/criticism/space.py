@@ -247,14 +247,28 @@ class Space:
 
     def _gain_along(self, along: Array, seen: NDArray[np.bool_]) -> Gain:
         rank = seen.sum(axis=(0, 2))
-        onto = along[..., 0] if self.targets.shape[-1] == 1 else along @ np.concatenate([[1.0], -self.shared_sizes])
-        by_block = np.einsum("bgr,bgr->bg", onto, onto)
         if self.targets.shape[-1] == 1:
+            by_block = np.einsum("bgr,bgr->bg", along[..., 0], along[..., 0])
             return Gain(by_block.sum(axis=0), rank, by_block)
-        # the common columns are fitted again beside the candidate: the blocks share in all of the reduction
-        taken = np.einsum("bgrt,bgrs->gts", along, along)
-        drop = np.array([self.rss - schur(self.gram - t) for t in taken])
-        return Gain(drop, rank, by_block * (drop / np.maximum(by_block.sum(axis=0), 1e-300)))
+        left = self.gram - np.einsum("bgrt,bgrs->gts", along, along)
+        drop = np.array([self.rss - schur(each) for each in left])
+        return Gain(drop, rank, self._by_block(along, left))
+
+    def _by_block(self, along: Array, left: Array) -> Array:
+        """Reduction of each block's own sum of squares, (blocks, grid), with the shared coefficients estimated again.
+
+        Parameters
+        ----------
+        along : (blocks, grid, r, t), the targets along the candidate; left : (grid, t, t), their products after it
+        """
+        size = np.sqrt(np.maximum(np.diagonal(self.gram)[1:], 1e-300))
+        inner = np.linalg.pinv(left[:, 1:, 1:] / np.outer(size, size), rcond=1e-8, hermitian=True)
+        again = np.einsum("gqp,gp->gq", inner, left[:, 1:, 0] / size) / size
+        turned = np.concatenate([np.ones((len(left), 1)), -again], axis=-1)
+        whole = np.einsum("bnt,bns->bts", self.targets, self.targets)
+        after = np.einsum("bts,gt,gs->bg", whole, turned, turned, optimize=True)
+        after -= np.sum(np.einsum("bgrt,gt->bgr", along, turned) ** 2, axis=-1)
+        return np.einsum("bn,bn->b", self.residual, self.residual)[:, None] - after
 
     def _gain_shared(self, found: Products, *, one_unit: bool) -> Gain:
         """Gain of columns whose coefficients all blocks share, or the three of each unit: units in turn, all values of each."""

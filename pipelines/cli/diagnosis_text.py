@@ -152,7 +152,7 @@ def _classes(document: dict[str, Any]) -> None:
         values = _parameters_of(group, effects)
         size = short(group["size_ug"]) if group["size_ug"] > 0.0 else "within noise"
         size += "" if group["plausible"] else " (!)"
-        errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"])
+        errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"]) or "–"
         text = group.get("evidence") or values
         lines.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
     columns = ["effect", "scope", "size\nµg", "p", "residual\nµg", "cross-validated\nµg", "parameters"]
@@ -164,9 +164,30 @@ def _classes(document: dict[str, Any]) -> None:
         "residual: with the effect added · cross-validated: on dwells not fitted, the worst of poses, soaks, stretches of "
         "time"
     )
+    if any(group["heldout_after_ug"] is None for group in document["classes"]):
+        legend += " · –: no dwells left out can judge it"
     if any(group.get("nonlinear_interval") for group in document["classes"]):
         legend += " · in brackets: 68 % interval"
     console().print(legend, style="dim", markup=False)
+    for line in why_not_recommended(document):
+        console().print(line, markup=False, soft_wrap=True)
+
+
+def why_not_recommended(document: dict[str, Any]) -> list[str]:
+    """Why effects that are named are not recommended for the model."""
+    lines: list[str] = []
+    for group in document["classes"]:
+        if group["scope"] == "data" or set(group["effects"]) & set(document["recommended"]):
+            continue
+        name, before, after = group["effects"][0], group.get("heldout_before_ug"), group["heldout_after_ug"]
+        if after is None or before is None:
+            why = "no dwells left out can judge it; a fresh run of the same units decides"
+        elif after > before:
+            why = f"the error on dwells left out rises from {short(before)} to {short(after)} µg"
+        else:
+            continue
+        lines.append(f"{name} is not recommended: {why}.")
+    return lines
 
 
 def _parameters_of(group: dict[str, Any], effects: Any) -> str:

@@ -10,7 +10,7 @@ from inertial.criticism.comparison import estimate, residuals_of, rms
 from inertial.criticism.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
 from inertial.criticism.left_out import left_out
 from inertial.criticism.problem import Problem
-from inertial.criticism.reproduced_change import reproduced_change
+from inertial.criticism.reproduced_change import reproduced_change, without_own_bias
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
@@ -59,9 +59,9 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
     problem = Problem(fresh)
     rises, reason = None, None
     if change.confirmed is True:
-        unchanged = tuple(rms(residuals_of(problem, one)) for one in (old, new))
-        rises = _rise("the error on the fresh run", *unchanged)
-        rises = rises or _rise("the error on dwells left out", *_worst(before, out))
+        # with the coefficients unchanged, less the bias of the day
+        left = [without_own_bias(problem, one.terms, residuals_of(problem, one)) for one in (old, new)]
+        rises = _clear_rise("the error on the fresh run", left[0], left[1]) or _rises_left_out(before, out)
         reason = rises or _unclear(change)
     elif change.confirmed is None:
         reason = "the fresh run does not decide; measure another run"
@@ -148,11 +148,29 @@ def _rise(what: str, before: float, after: float) -> str | None:
     return f"{what} rises from {MICRO * before:.3g} to {MICRO * after:.3g} µg"
 
 
-def _worst(before: Model, after: LeftOut) -> tuple[float, float]:
-    """The worst error on dwells left out before and after, over the kinds that can judge both."""
-    first = left_out(before)
-    kinds = set(first.density) & set(after.density)
-    return first.rms(kinds), after.rms(kinds)
+def _rises_left_out(before: Model, after: LeftOut) -> str | None:
+    """A kind of dwells left out of the first run that speaks against the effects, as text; None if there is none.
+
+    Its error rises by more than its uncertainty, or it rises and the log density falls by as much as would confirm.
+    """
+    first, what = left_out(before), "the error on dwells left out"
+    kinds: list[Kind] = [kind for kind in first.density if kind in after.density]
+    for kind in kinds:
+        old, new = first.missed[kind], after.missed[kind]
+        against = after.density[kind] - first.density[kind] < -LEFT_OUT
+        text = _rise(what, rms(old), rms(new)) if against else _clear_rise(what, old, new)
+        if text:
+            return text
+    return None
+
+
+def _clear_rise(what: str, before: Array, after: Array) -> str | None:
+    """The error of residuals (blocks, n), g, that rises by more than its uncertainty, as text; None if it does not.
+
+    A fresh run decides by itself: what changes by chance on other dwells is no evidence against an effect.
+    """
+    fall, error = _fall(before, after)
+    return _rise(what, rms(before), rms(after)) if not fall >= -CONFIRMED * error else None
 
 
 def _fall(before: Array, after: Array) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from pipelines.diagnosis.result_rows import (
     white_noise_of,
     without_influence,
 )
-from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, probability, sound_lot
+from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
@@ -117,13 +117,18 @@ def examined(
 
 
 def document(
-    measurement: Measured, faults: list[Fault], diagnosis: Diagnosis | None, following: Proposed | None = None
+    measurement: Measured,
+    faults: list[Fault],
+    diagnosis: Diagnosis | None,
+    following: Proposed | None = None,
+    left_out: Collection[str] = (),
 ) -> dict[str, Any]:
     """The document of a diagnosis; if every unit has a data fault, no effect is judged.
 
     Parameters
     ----------
     following : what to measure next; by the capabilities of the station that the run shows if None
+    left_out : ``UNIT:DWELL``, removed on purpose: no notice says that they are missing
     """
     blocked = [_fault(measurement, f) for f in faults]
     if diagnosis is None:
@@ -150,7 +155,7 @@ def document(
     units = tuple(u for k, u in enumerate(measurement.units) if k not in faulty)
     names = Names(units, tuple(int(d) for d in measurement.dwells))
     terms = [*diagnosis.base.terms, *(m.term for n in diagnosis.named for m in n.effects.physics)]
-    warnings = without_history(measurement, terms)
+    warnings = [*gaps(measurement, faults, left_out), *without_history(measurement, terms)]
     return {
         "adequate": diagnosis.adequate,
         "reason": diagnosis.unjudged or None,

@@ -47,7 +47,10 @@ def examination(
     """
     effects = list(judged) if judged else default_model(table)
     measurement, faults, diagnosis = examined(table, history, effects, left_out)
-    whole = {**document(measurement, faults, diagnosis), **_extras(measurement.units, effects, diagnosis)}
+    whole = {
+        **document(measurement, faults, diagnosis, left_out=left_out),
+        **_extras(measurement.units, effects, diagnosis),
+    }
     return Examination(whole, measurement, diagnosis)
 
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from inertial.counts import number_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE
-from inertial.criticism.faults import find_faults
+from inertial.criticism.faults import find_faults, missing_dwells
 from inertial.errors import InertialError
 from pipelines.tables.condense import condense
 from pipelines.tables.dwells import lot_of, measured
@@ -29,6 +30,7 @@ MISSING = frozenset({"dropped_samples", "truncated_file"})
 
 SMALL_MISFIT = "the misfit is smaller than the noise, but significant"
 _SMALL = 1.1
+_SHOWN = 6  # units, and dwells of each, that a notice of missing dwells lists
 _SEED = 1293
 
 
@@ -95,6 +97,29 @@ def _on_purpose(measurement: Measured, fault: Fault, left_out: Collection[str]) 
     """Whether a fault is only that dwells were left out."""
     named = {f"{measurement.units[fault.unit]}:{int(measurement.dwells[k])}" for k in fault.dwells}
     return fault.name in MISSING and bool(named) and named <= set(left_out)
+
+
+def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[str] = ()) -> list[str]:
+    """A notice of the dwells that units without a fault lack and others have: they are judged by the dwells they have.
+
+    Parameters
+    ----------
+    left_out : ``UNIT:DWELL``, of which nothing is said: they were removed on purpose
+    """
+    faulty = {fault.unit for fault in faults}
+    parts: list[str] = []
+    for place, unit in enumerate(measurement.units):
+        numbers = [int(measurement.dwells[k]) for k in missing_dwells(measurement.readings, place)]
+        numbers = [n for n in numbers if f"{unit}:{n}" not in left_out]
+        if numbers and place not in faulty:
+            shown = ", ".join(map(str, numbers[:_SHOWN])) + (", …" if len(numbers) > _SHOWN else "")
+            parts.append(f"{unit} {len(numbers)} ({shown})")
+    if not parts:
+        return []
+    text = ", ".join(parts[:_SHOWN]) + (
+        f" and {number_of(len(parts) - _SHOWN, 'more unit')}" if len(parts) > _SHOWN else ""
+    )
+    return [f"of {len(measurement.dwells)} dwells of the lot are missing: {text}; these units are judged by the others"]
 
 
 def every_unit_faulty(faults: Sequence[Fault]) -> str:

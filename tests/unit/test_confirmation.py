@@ -8,6 +8,7 @@ import pytest
 from inertial.criticism.examination import Named
 from inertial.criticism.left_out import LeftOut
 from inertial.criticism.reproduced_change import ReproducedChange
+from pipelines.cli.diagnosis_text import why_not_recommended
 from pipelines.diagnosis import confirmation
 from pipelines.diagnosis.model_history import text_of
 
@@ -28,6 +29,32 @@ def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_wo
     before: float, after: float, predicts: object
 ) -> None:
     assert Named(SimpleNamespace(), 1.0, before, after).predicts is predicts
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "recommended", "lines"),
+    [
+        (10.0, 9.0, ["third_order"], []),
+        (10.0, 12.0, [], ["third_order is not recommended: the error on dwells left out rises from 10.0 to 12.0 µg."]),
+        (
+            None,
+            None,
+            [],
+            ["third_order is not recommended: no dwells left out can judge it; a fresh run of the same units decides."],
+        ),
+    ],
+)
+def test_it_is_said_why_an_effect_is_not_recommended(
+    before: float | None, after: float | None, recommended: list[str], lines: list[str]
+) -> None:
+    fault = {"effects": ["bad_dwell"], "scope": "data", "heldout_after_ug": None}
+    effect = {
+        "effects": ["third_order", "odd_quadratic"],
+        "scope": "sensor",
+        "heldout_before_ug": before,
+        "heldout_after_ug": after,
+    }
+    assert why_not_recommended({"classes": [fault, effect], "recommended": recommended}) == lines
 
 
 def test_a_gain_in_density_does_not_confirm_an_error_that_rises() -> None:
@@ -82,8 +109,9 @@ def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
 def test_a_fresh_run_does_not_confirm_a_fall_within_its_uncertainty(
     error: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(confirmation, "estimate", lambda model: model)
+    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
     monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
+    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
     monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
     change = ReproducedChange(1.0, 0.1, 2e-4, 1e-4, error, "base")
     monkeypatch.setattr(confirmation, "reproduced_change", lambda *_: change)
@@ -98,8 +126,9 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     left: tuple[float, float], confirmed: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sizes = iter(left)
-    monkeypatch.setattr(confirmation, "estimate", lambda model: model)
+    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
     monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
+    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
     monkeypatch.setattr(confirmation, "residuals_of", lambda problem, model: np.full((1, 9), next(sizes)))
     monkeypatch.setattr(
         confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
@@ -108,3 +137,26 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     evidence = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
     assert evidence["confirmed"] is confirmed
     assert ("the error on the fresh run rises from 200 to 1.45e+05 µg" in text_of(ROW, evidence)) is (confirmed is None)
+
+
+@pytest.mark.parametrize(
+    ("rise", "density", "confirmed"), [(1.02, 2.0, True), (1.02, -2.0, True), (1.02, -4.0, None), (1.5, 2.0, None)]
+)
+def test_a_fresh_run_confirms_where_dwells_left_out_rise_within_their_uncertainty(
+    rise: float, density: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
+    monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
+    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
+    monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
+    monkeypatch.setattr(
+        confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
+    )
+    # where they rise depends on the dwell: half of them fall
+    before, after = missed(1e-4, 1.0), missed(1e-4, density)
+    after.missed["blocks of time"][:, ::2] *= rise * 1.1
+    after.missed["blocks of time"][:, 1::2] *= rise / 1.1
+    monkeypatch.setattr(confirmation, "left_out", lambda _: before)
+    evidence = confirmation.progress("old", "new", after, "fresh")
+    assert evidence["confirmed"] is confirmed
+    assert bool(evidence["rises"]) is (confirmed is None)

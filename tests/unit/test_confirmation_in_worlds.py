@@ -33,6 +33,15 @@ def test_a_cubic_is_confirmed_where_units_come_up_elsewhere():
     assert evidence["fall_ug"] > 3.0 * evidence["fall_u_ug"] > 0.0
 
 
+@pytest.mark.parametrize(("units", "seed"), [(1, 63_103), (1, 63_107), (8, 63_102)])
+def test_a_curve_over_temperature_is_confirmed_where_units_come_up_elsewhere(units, seed):
+    # 300 µg more or less hide what the effect takes off the error of the fresh run, unless the run has a bias of its own
+    world = World(units=units, turn_on=300.0, hidden=(("bias_temperature_quadratic", 2.0),))
+    evidence = progress(world, "bias_temperature_quadratic", seed)
+    assert (evidence["confirmed"], evidence["rises"]) == (True, None)
+    assert evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
+
+
 @pytest.mark.parametrize("effect", ["bias_temperature_quadratic", "aging_log", "thermal_hysteresis", "step_change"])
 def test_slow_effects_that_are_not_there_are_not_confirmed(effect):
     world = World(units=2, noise=Noise(walk=4.0))

@@ -6,9 +6,11 @@ import pytest
 
 from inertial.criticism.faults.outputs import lattice_step
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.examination import examination
 
 pytestmark = pytest.mark.usefixtures("no_next_measurement")
 
+BASE = ["bias", "scale", "misalignment"]
 OUT = ["out_x", "out_y", "out_z"]
 
 
@@ -108,6 +110,54 @@ def test_missing_dwells_at_the_end_are_a_truncated_file(rng):
     rows = table.index[table["unit"] == "U002"].to_numpy()
     blocked = diagnose(table.drop(index=rows[50:]))["blocked_by"]
     assert [(b["fault"], b["units"]) for b in blocked] == [("truncated_file", ["U002"])]
+
+
+def lacking(table, unit, dwells):
+    """The table without some dwells of a unit, by their place."""
+    return table.drop(index=table.index[table["unit"] == unit].to_numpy()[dwells])
+
+
+def test_a_unit_without_some_dwells_is_diagnosed_by_those_it_has(rng):
+    table = lots.lot(rng, hidden=lambda f, t, s, r: r.normal(0.0, 60e-6, 3) * f**3)
+    count = (table["unit"] == "U000").sum()
+    table = lacking(lacking(lacking(table, "U000", [5]), "U001", rng.permutation(count)[: count // 3]), "U002", [-1])
+    document = diagnose(table)
+    assert document["blocked_by"] == []
+    assert document["recommended"] == ["third_order"]
+    (notice,) = (text for text in document["warnings"] if "missing" in text)
+    assert notice.startswith(f"of {count} dwells of the lot are missing: U000 1 (5), U001 {count // 3} (")
+    assert f"U002 1 ({count - 1})" in notice
+
+
+def test_a_unit_without_most_of_its_dwells_is_refused(rng):
+    table = lots.lot(rng)
+    count = int((table["unit"] == "U000").sum())
+    few = rng.permutation(count - 1)[: count // 2 + 1]
+    document = diagnose(lacking(lacking(table, "U001", few), "U003", [2, 3]))
+    assert [(b["fault"], b["units"]) for b in document["blocked_by"]] == [("dropped_samples", ["U001"])]
+    assert ["U003 2 (2, 3)" in text for text in document["warnings"]] == [True]
+
+
+def test_dwells_that_were_numbered_again_are_no_truncated_file(rng):
+    table = lacking(lots.lot(rng), "U001", [5, 20, 21, 40])
+    own = table["unit"] == "U001"
+    table.loc[own, "dwell"] = np.arange(own.sum())
+    assert diagnose(table)["blocked_by"] == []
+
+
+def test_no_notice_is_given_of_dwells_left_out_on_purpose(rng):
+    table = lacking(lots.lot(rng), "U001", [5])
+    assert not any("missing" in text for text in examination(table, None, BASE, ["U001:5"]).document["warnings"])
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_found_where_units_lack_dwells(name, rng):
+    table = lots.lot(rng)
+    rows = table.index[table["unit"] == "U000"].to_numpy()
+    FAULTS[name](table, rows, rng)
+    table = lacking(lacking(table, "U000", [7]), "U002", [15, 44])
+    faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
+    assert faults == {(name.strip(), "U000")}
 
 
 def test_the_other_units_are_diagnosed(rng):

@@ -8,29 +8,47 @@ import pytest
 
 from inertial import effects as catalogue
 from inertial.criticism.bad_dwells import BadDwell, without
+from inertial.criticism.handling.table_slip import TableSlip
+from inertial.criticism.handling.unit_moved import UnitMoved
 from inertial.criticism.left_out import left_out
 from inertial.criticism.model import Model
 from inertial.criticism.problem import Problem
 from inertial.criticism.refinement import terms_of
+from inertial.criticism.term import Term
+from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
 
+from tables import HIDDEN
 from world import World, make
 
 BASE = ["bias", "scale", "misalignment"]
+SLIP = Term(TableSlip(), (("dwell", 17.0),))
+MOVED = Term(UnitMoved(), (("unit", 1.0), ("dwell", 4.0)))
 
 
-def model(effects: list[str]) -> Model:
+def model(effects: list[str], *handling: Term) -> Model:
     """A model of three units, two dwells of which are missing."""
     lot = lot_of(measured(make(World(units=3, poses=10), 20_261_122).dwells))
     lot = without(lot, [BadDwell(1, k, np.zeros(3), np.zeros(3)) for k in (2, 9)])
     problem = Problem(lot)
-    return Model(problem, terms_of(catalogue.get_all(effects), problem))
+    return Model(problem, [*terms_of(catalogue.get_all(effects), problem), *handling])
 
 
-def by_definition(of: Model, out: np.ndarray) -> tuple[np.ndarray, float]:
-    """Deviations (blocks, k) of dwells ``out``, and their log density, by a dense covariance of all blocks together."""
+def stretches(of: Model) -> np.ndarray:
+    """The stretch of time of each dwell, (n,)."""
+    n = of.problem.n
+    stretch = np.empty(n, dtype=np.intp)
+    stretch[np.argsort(of.problem.lot.state.time[0], kind="stable")] = np.arange(n) * 6 // n
+    return stretch
+
+
+def by_definition(of: Model, out: np.ndarray, kept: int = 0) -> tuple[np.ndarray, float]:
+    """Deviations (blocks, k) of dwells ``out``, and their log density, by a dense covariance of all blocks together.
+
+    kept : number of shared columns, the last ones, that keep the coefficients of all dwells
+    """
     space, blocks, n = of.space, of.problem.blocks, of.problem.n
     there = space.covariance.there
     precision = np.zeros((blocks * n, blocks * n))
@@ -43,26 +61,70 @@ def by_definition(of: Model, out: np.ndarray) -> tuple[np.ndarray, float]:
         columns[b, :, b] = of.local[b]
     h = np.concatenate([columns.reshape(blocks * n, -1), of.shared.reshape(blocks * n, -1)], axis=1)
     h = h / np.where((size := np.linalg.norm(h, axis=0)) > 0.0, size, 1.0)
+    y = of.problem.y.reshape(-1)
+    if kept:
+        every = np.linalg.pinv(h.T @ precision @ h, rcond=1e-12) @ (h.T @ precision @ y)
+        y, h = y - h[:, -kept:] @ every[-kept:], h[:, :-kept]
     p = precision - precision @ h @ np.linalg.pinv(h.T @ precision @ h, rcond=1e-12) @ h.T @ precision
     places = np.flatnonzero((out & there).reshape(-1))
     inner = p[np.ix_(places, places)]
-    right = (p @ of.problem.y.reshape(-1))[places]
+    right = (p @ y)[places]
     missed = np.full(blocks * n, np.nan)
     missed[places] = np.linalg.solve(inner, right)
     density = 0.5 * np.linalg.slogdet(inner)[1] - 0.5 * places.size * np.log(2.0 * np.pi) - 0.5 * right @ missed[places]
     return missed.reshape(blocks, n)[:, out], float(density)
 
 
-@pytest.mark.parametrize("effects", [BASE, [*BASE, "level_error"]])
-def test_dwells_left_out_are_predicted_as_by_the_covariance_of_all_blocks(effects: list[str]) -> None:
-    of = model(effects)
+@pytest.mark.parametrize(
+    ("effects", "handling", "kept"),
+    [
+        (BASE, (), 0),
+        ([*BASE, "level_error"], (), 0),
+        (BASE, (SLIP,), 2),
+        ([*BASE, "level_error"], (SLIP, MOVED), 5),
+    ],
+)
+def test_dwells_left_out_are_predicted_as_by_the_covariance_of_all_blocks(
+    effects: list[str], handling: tuple[Term, ...], kept: int
+) -> None:
+    of = model(effects, *handling)
     found = left_out(of)
-    n = of.problem.n
-    stretch = np.empty(n, dtype=np.intp)
-    stretch[np.argsort(of.problem.lot.state.time[0], kind="stable")] = np.arange(n) * 6 // n
+    stretch = stretches(of)
     total = 0.0
     for k in range(6):
-        missed, density = by_definition(of, stretch == k)
+        missed, density = by_definition(of, stretch == k, kept)
         np.testing.assert_allclose(found.missed["blocks of time"][:, stretch == k], missed, rtol=1e-5, atol=1e-11)
         total += density
     assert found.density["blocks of time"] == pytest.approx(total, rel=1e-8)
+
+
+def test_a_handling_error_that_is_judged_is_predicted_by_the_other_dwells_alone() -> None:
+    of = model(BASE, SLIP)
+    found = left_out(of, SLIP)
+    stretch = stretches(of)
+    for k in range(6):
+        missed, _ = by_definition(of, stretch == k)
+        np.testing.assert_allclose(found.missed["blocks of time"][:, stretch == k], missed, rtol=1e-5, atol=1e-11)
+
+
+def test_a_change_that_the_other_dwells_do_not_determine_is_not_judged_by_a_number() -> None:
+    # the unit moved before the fifth of thirty dwells: without the first stretch nothing is left of the side before
+    of = model(BASE, MOVED)
+    found = left_out(of, MOVED)
+    assert "poses" in found.density
+    assert "blocks of time" not in found.density
+    assert "blocks of time" in left_out(of).density
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+@pytest.mark.parametrize("name", ["misalignment_and_moved", "misalignment_and_slip"])
+def test_an_effect_beside_a_change_in_time_is_judged_by_dwells_left_out_and_recommended(name: str) -> None:
+    made = make(HIDDEN[name], 5_500_000)
+    document = diagnose(made.dwells, made.history)
+    fault, effect = document["classes"]
+    assert set(fault["effects"]) & set(made.told.names)
+    assert effect["effects"] == ["misalignment_temperature"]
+    assert document["recommended"] == ["misalignment_temperature"]
+    for group in (fault, effect):
+        assert group["heldout_after_ug"] < group["heldout_before_ug"]
+        assert group["heldout_after_ug"] < 4.0 * group["rms_after_ug"]

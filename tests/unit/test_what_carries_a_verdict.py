@@ -84,3 +84,14 @@ def test_a_converters_fault_in_every_unit_is_no_verdict_on_the_model(tmp_path):
     assert (document["adequate"], done.exit_code) == (None, 1)
     assert "every unit (2) has a data fault" in document["reason"]
     assert "Cannot be judged: every unit (2)" in page.read_text(encoding="utf-8")
+
+
+def test_missing_dwells_are_told_in_the_report_and_at_the_terminal(tmp_path):
+    table = make(World(units=2, poses=12), SEED).dwells
+    table = table.drop(index=table.index[(table["unit"] == "W002") & table["dwell"].isin([4, 9])])
+    table.to_parquet(tmp_path / "dwells.parquet")
+    page = tmp_path / "page.html"
+    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(page)])
+    notice = "of 36 dwells of the lot are missing: W002 2 (4, 9); these units are judged by the others"
+    assert notice in " ".join(done.stdout.split())
+    assert notice in page.read_text(encoding="utf-8")

@@ -3,7 +3,7 @@
 from inertial.criticism.faults.exchanges import changed_units, swapped_units, wrong_poses
 from inertial.criticism.faults.fault import Fault, Look
 from inertial.criticism.faults.outputs import noisy, outliers, quantised, stuck
-from inertial.criticism.faults.records import clock, dropped, truncated
+from inertial.criticism.faults.records import clock, dropped, missing_dwells, truncated
 from inertial.criticism.faults.responses import dead, flipped, scale_units
 from inertial.criticism.faults.temperatures import stale, temperature_units
 from inertial.criticism.readings import Readings
@@ -39,4 +39,4 @@ def find_faults(readings: Readings) -> list[Fault]:
     return [faults[u] for u in sorted(faults)]
 
 
-__all__ = ["Fault", "find_faults"]
+__all__ = ["Fault", "find_faults", "missing_dwells"]

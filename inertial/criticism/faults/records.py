@@ -7,19 +7,36 @@ import numpy as np
 from inertial.criticism.faults.fault import Fault, places_of
 from inertial.criticism.readings import Readings
 
+ENDS_EARLY = 3
+"""Dwells that the lot has after the last one of a unit, from which on the unit's record ends in the middle.
+
+One or two at the end are as likely missing as any others; a change within the last three could not be seen either.
+"""
+
+MOST_MISSING = 0.5
+"""Share of the dwells up to which a unit may lack some and is judged by the others.
+
+Derived: a plan has at least two dwells per coefficient as a rule, so that half of them still determine the model; a unit that
+has less than half of its dwells weighs less in the lot than what is unknown about the cause.
+"""
+
 
 def truncated(readings: Readings) -> Iterator[Fault]:
-    """Dwells that a unit lacks and the rest of the lot has: at the end, or in between."""
+    """A record that ends before the lot's, or that lacks most dwells; a unit with fewer gaps is judged by the dwells it has."""
     there = readings.there
     for unit, row in enumerate(there):
         missing = np.flatnonzero(~row)
         if not missing.size:
             continue
-        last = np.flatnonzero(row)[-1] if row.any() else -1
-        at_end = missing[missing > last]
-        name = "truncated_file" if at_end.size >= 0.5 * missing.size else "dropped_samples"
+        ended = _after_end(readings, unit)
+        if ended >= max(ENDS_EARLY, 0.5 * missing.size):
+            name = "truncated_file"
+        elif missing.size > MOST_MISSING * row.size or not row.any():
+            name = "dropped_samples"
+        else:
+            continue
         yield Fault(name, unit, places_of(missing), f"{missing.size} of {row.size} dwells of the lot are missing")
-    if there.all() and _cut_off(readings):
+    if _cut_off(readings):
         for unit in range(len(there)):
             yield Fault(
                 "truncated_file",
@@ -29,9 +46,32 @@ def truncated(readings: Readings) -> Iterator[Fault]:
             )
 
 
+def missing_dwells(readings: Readings, unit: int) -> tuple[int, ...]:
+    """Places of the dwells that a unit lacks and other units have."""
+    return places_of(np.flatnonzero(~readings.there[unit]))
+
+
+def _after_end(readings: Readings, unit: int) -> float:
+    """How many dwells the lot has after the end of a unit's record: by their numbers, and by the times of the other units.
+
+    Dwells that were numbered again without the missing ones end with the record of the others, and a clock that runs back ends
+    with its last number.
+    """
+    row = readings.there[unit]
+    others = np.delete(readings.time, unit, axis=0)
+    if not row.any() or not len(others):
+        return float(row.size)
+    typical = np.nanmedian(others, axis=0)
+    away = float(np.nanmedian(readings.time[unit] - typical))
+    own_day = abs(away) > float(np.nanmax(typical) - np.nanmin(typical))  # measured before or after the others
+    last = int(np.flatnonzero(row)[-1])
+    end = readings.time[unit, last] - (away if own_day else 0.0)
+    return min(float(row.size - 1 - last), float(np.median(np.sum(others > end, axis=1))))
+
+
 def _cut_off(readings: Readings) -> bool:
     """Whether the temperature's history runs on far behind the last dwell, which ends in the middle of a round of poses."""
-    time = readings.time[0]
+    time = np.nanmedian(readings.time, axis=0)
     if readings.history_end is None or readings.history_end - time[-1] < 0.15 * float(np.ptp(time)):
         return False
     _, counts = np.unique(np.round(readings.force[0], 3), axis=0, return_counts=True)
@@ -55,7 +95,7 @@ def dropped(readings: Readings) -> Iterator[Fault]:
     """Dwells with fewer samples than the lot has there, or than their duration holds."""
     if readings.count is None:
         return
-    if len(readings.count) > 2:
+    if len(readings.count) > 2 and not _of_own_lengths(readings):
         expected = np.nanmedian(readings.count, axis=0, keepdims=True)
     elif readings.duration is not None:
         rate = np.nanmedian(readings.count / np.maximum(readings.duration, 1e-9), axis=1, keepdims=True)
@@ -74,3 +114,11 @@ def dropped(readings: Readings) -> Iterator[Fault]:
                 places_of(places),
                 f"{places.size} dwells hold as little as {worst:.0%} of the samples",
             )
+
+
+def _of_own_lengths(readings: Readings) -> bool:
+    """Whether dwells of one number last differently long in different units, as where a unit's dwells were numbered again."""
+    if readings.duration is None:
+        return False
+    usual = np.nanmedian(readings.duration, axis=0, keepdims=True)
+    return bool(np.nanmean(np.abs(readings.duration / np.maximum(usual, 1e-9) - 1.0) > 0.1) > 0.1)
