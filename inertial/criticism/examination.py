@@ -113,7 +113,7 @@ class ExaminedRun:
         self.drift = drift
         self.barred |= drift.imitated
         self.beside = [t for t in self.beside if t.effect.id not in drift.imitated]
-        self.handled = [one for one in self.handled if one.effects.members[0].term.effect.id not in drift.imitated]
+        self.handled = [one for one in self.handled if one.term is None or one.term.effect.id not in drift.imitated]
         return True
 
     def model(self) -> Model:
