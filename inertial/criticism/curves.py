@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.candidate import Candidate
+from inertial.criticism.drivers import Part
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
 from inertial.criticism.space import Space
@@ -19,6 +20,7 @@ _TURNS = 8  # alternating estimates of sizes and shape
 class CurveFit:
     """A common curve beside a model.
 
+    part : what of the output follows the driver, as in :class:`inertial.criticism.drivers.Driver`
     model : the model with the curve in it
     rank : number of coefficients, of sizes and shape
     cost : penalised deviance, on the scale of the search
@@ -28,6 +30,7 @@ class CurveFit:
     model: Model
     rank: int
     cost: float
+    part: Part = "bias"
 
 
 def fit_curve(model: Model, driver: str, candidate: Candidate, ways: int = 1) -> CurveFit:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from inertial.criticism.drivers import Part
 from inertial.criticism.lot_part import LotPart
 from inertial.criticism.model import Model
 from inertial.criticism.term import Term
@@ -15,11 +16,13 @@ _TOGETHER = 2  # smallest number of changes and effects that may be one drift
 class Drift:
     """A drift that the search had taken for sudden changes.
 
-    driver : the recorded quantity that it follows; log_p : natural logarithm of the probability that noise follows it as much
+    driver : the recorded quantity that it follows; part : what of the output follows it
+    log_p : natural logarithm of the probability that noise follows it as much
     imitated : ids of the changes that only imitated it
     """
 
     driver: str
+    part: Part
     log_p: float
     imitated: frozenset[str]
 
@@ -48,4 +51,6 @@ def one_drift(part: LotPart, changes: Sequence[Term], further: Sequence[Term]) -
     fit, kept = instead
     remaining = {t.key for t in kept}
     imitated = frozenset(t.effect.id for t in held if t.key not in remaining)
-    return Drift(fit.driver, log_p_of_curve(base, fit, len(part.every_suspect)), imitated) if imitated else None
+    return (
+        Drift(fit.driver, fit.part, log_p_of_curve(base, fit, len(part.every_suspect)), imitated) if imitated else None
+    )

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations_with_replacement
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,10 @@ _CERTAIN = -600.0
 """Logarithm of a probability below which drivers are ranked by the share that they explain."""
 
 
+Part = Literal["bias", "scale", "axes", "transfer"]
+"""What of an output follows a driver: the bias, the scale factor, the directions of the axes, or the transfer curve."""
+
+
 @dataclass(frozen=True)
 class Driver:
     """Columns of a smooth dependence on one driver.
@@ -35,11 +40,13 @@ class Driver:
     name : as in the exchange format (``unit_C``, ``time_s``, a covariate), or ``pose``, ``approach``, ``temperature_rate``
     make : its columns
     values : (units, n) of the driver itself, None if it is not a single quantity
+    part : what of the output follows it
     """
 
     name: str
     make: Callable[[], Candidate]
     values: Array | None
+    part: Part = "bias"
 
     @property
     def candidate(self) -> Candidate:
@@ -87,9 +94,9 @@ def looks_of(problem: Problem) -> list[Driver]:
     state = problem.lot.state
     for name, values in (("unit_C", state.temperature), ("time_s", state.time)):
         if values is not None and varies(values):
-            looks.append(Driver(name, partial(_across_axes, problem, values), None))
+            looks.append(Driver(name, partial(_across_axes, problem, values), None, "axes"))
     if state.temperature is not None and varies(state.temperature):
-        looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), None))
+        looks.append(Driver("unit_C", partial(_transfer_curve, problem, state.temperature), None, "transfer"))
     return looks
 
 

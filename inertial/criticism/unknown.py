@@ -1,7 +1,7 @@
 """Effects outside the catalogue: one curve of one driver that is better than the effects that imitate it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from inertial import frames
 from inertial.criticism import decisions
 from inertial.criticism.candidate import Candidate
 from inertial.criticism.curves import CurveFit, fit_curve
-from inertial.criticism.drivers import curve, quantities, varies
+from inertial.criticism.drivers import Part, curve, quantities, varies
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
 from inertial.criticism.problem import Problem
@@ -38,16 +38,18 @@ class Suspect:
 
     values : (blocks, n), the driver itself, 0 … 1 over the run; None if it is not a single quantity
     ways : ways in which each block feels the dependence, as for :func:`inertial.criticism.curves.fit_curve`
+    part : what of the output follows the driver
     """
 
     driver: str
     candidate: Candidate
     values: Array | None = None
     ways: int = 1
+    part: Part = "bias"
 
     def fitted(self, model: Model) -> CurveFit:
         """The best curve of the driver beside a model."""
-        return fit_curve(model, self.driver, self.candidate, self.ways)
+        return replace(fit_curve(model, self.driver, self.candidate, self.ways), part=self.part)
 
 
 def suspects(problem: Problem) -> list[Suspect]:
@@ -65,7 +67,7 @@ def suspects(problem: Problem) -> list[Suspect]:
                 suspected.append(Suspect(name, _alike(problem, steps)))
             if not problem.lot.radial and knots > 2:
                 # the same dependence of the scale factors: what the driver changes is then felt along each axis
-                suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS)))))
+                suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
         own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
         suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))

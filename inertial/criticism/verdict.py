@@ -12,7 +12,7 @@ from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.comparison import rms as rms_of
 from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
-from inertial.criticism.drivers import Driver, looks_of
+from inertial.criticism.drivers import Driver, Part, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
 from inertial.criticism.heldout import fit_rms
@@ -29,11 +29,12 @@ from inertial.probability import passes
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A driver that the residuals follow, without an effect of the catalogue that explains it."""
+    """A driver that a part of the output follows, without an effect of the catalogue that explains it."""
 
     driver: str
     shape: str
     log_p: float
+    part: Part = "bias"
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     sound = passed is True and not searched.added and run.drift is None
     final, unexplained = (searched.model, None) if sound or unjudged else _beyond(search.part, base, searched, drivers)
     if unexplained is None and run.drift is not None and not unjudged:
-        unexplained = Unexplained(run.drift.driver, "curve", run.drift.log_p)
+        unexplained = Unexplained(run.drift.driver, "curve", run.drift.log_p, run.drift.part)
     return Verdict(
         run=run,
         search=search,
@@ -147,7 +148,7 @@ def _beyond(
             return instead
     best = max(convincing, key=lambda d: _worth(final, d))
     shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
-    return final, Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))))
+    return final, Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))), best.part)
 
 
 def _instead(
@@ -159,7 +160,7 @@ def _instead(
         return None
     fit, kept = instead
     log_p = log_p_of_curve(part.base, fit, len(suspected))
-    return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p)
+    return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p, fit.part)
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:

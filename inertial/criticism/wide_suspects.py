@@ -35,11 +35,11 @@ def wide_suspects(problem: Problem) -> list[Suspect]:
         own = curve(values, _KNOTS)  # (units or 1, n, d)
         if own.shape[-1] < _LEAST - 1:
             continue
-        suspected.append(Suspect(name, Candidate(across(along, own)[:, :, None, :], shared=False), ways=2))
+        suspected.append(Suspect(name, Candidate(across(along, own)[:, :, None, :], shared=False), ways=2, part="axes"))
         turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
         whole = np.broadcast_to(turned, (problem.blocks // 3, *turned.shape[1:]))
         columns = by_block(whole.reshape(*whole.shape[:3], -1))
-        suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=True)))
+        suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=True), part="axes"))
         columns = transfer(along, values, _FORCE_KNOTS)
-        suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=False)))
+        suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=False), part="transfer"))
     return suspected

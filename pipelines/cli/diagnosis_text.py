@@ -227,7 +227,7 @@ def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, 
     if not unexplained:
         return
     out.print(
-        f"\nSignificant, but of unknown cause: the error follows {unexplained['driver']} as a {unexplained['shape']} "
+        f"\nSignificant, but of unknown cause: {unexplained['text']} as a {unexplained['shape']} "
         f"(p {equal(unexplained['p_value'])}).",
         markup=False,
         soft_wrap=True,

@@ -32,10 +32,9 @@ def verdict(document: dict[str, Any]) -> str:
         return f"{told}; these figures are without the faults of the data: {'; '.join(spoilt)}{rest}."
     if named:
         return f"{told}; missing: {', and '.join(named)}."
-    driver = (document["unexplained"] or {}).get("driver")
     rest = "no recorded quantity explains the residual"
-    if driver:
-        rest = f"the residual follows {driver}, and no effect of the catalogue explains it"
+    if document["unexplained"]:
+        rest = f"{document['unexplained']['text']}, and no effect of the catalogue explains it"
     return f"{told}; {rest}."
 
 

@@ -25,6 +25,7 @@ from pipelines.diagnosis.result_rows import (
     white_noise_of,
     without_influence,
 )
+from pipelines.diagnosis.suggested_formula import what_follows
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot
 from schemas.errors import DataRejected
 
@@ -182,6 +183,8 @@ def document(
         else {
             "driver": diagnosis.unexplained.driver,
             "shape": diagnosis.unexplained.shape,
+            "part": diagnosis.unexplained.part,
+            "text": what_follows(diagnosis.unexplained),
             "p_value": probability(diagnosis.unexplained.log_p),
         },
         "unseen": list(diagnosis.unseen),

@@ -14,8 +14,25 @@ if TYPE_CHECKING:
     from inertial.state import State
 
 
+_PARTS = {
+    "bias": "the error",
+    "scale": "the scale factor",
+    "axes": "the directions of the axes",
+    "transfer": "the transfer curve",
+}
+
+
+def what_follows(unexplained: Unexplained) -> str:
+    """What of the output follows the driver, as text."""
+    verb = "follow" if unexplained.part == "axes" else "follows"
+    return f"{_PARTS[unexplained.part]} {verb} {unexplained.driver}"
+
+
 def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
     """A formula that follows the driver: a line, or a cubic about the middle of its range; None if the driver is no single one.
+
+    Of the scale factor and the axes it is times the forces along and across the axis; of the transfer curve the quantity is times
+    the square and the cube of the force.
 
     Parameters
     ----------
@@ -26,10 +43,18 @@ def offer(unexplained: Unexplained, state: State) -> dict[str, Any] | None:
     values = _values(name, state)
     if values is None or not name.isidentifier():
         return None
+    part = unexplained.part
+    columns = [name] if unexplained.shape == "line" else _cubic(name, values)
+    if part == "scale":
+        columns = [f"f*{_factor(c)}" for c in columns]
+    elif part == "axes":
+        columns = [f"{across}*{_factor(c)}" for across in ("fj", "fk") for c in columns]
+    elif part == "transfer":
+        columns = [f"{_scaled(name, values)}*f**{power}" for power in (2, 3)]
     return {
-        "id": f"{name.lower()}_bias",
-        "columns": [name] if unexplained.shape == "line" else _cubic(name, values),
-        "why": f"the residuals follow {unexplained.driver}; the cause is not known yet",
+        "id": f"{name.lower()}_{part}",
+        "columns": columns,
+        "why": f"{what_follows(unexplained)}; the cause is not known yet",
     }
 
 
@@ -51,6 +76,14 @@ def _values(name: str, state: State) -> np.ndarray | None:
 
 def _cubic(name: str, values: np.ndarray) -> list[str]:
     """Powers of the quantity scaled to about −1 … 1: unscaled powers would be nearly collinear."""
-    low, high = float(np.min(values)), float(np.max(values))
-    scaled = f"(({name} - {0.5 * (low + high):.4g}) / {max(0.5 * (high - low), 1e-12):.3g})"
+    scaled = _scaled(name, values)
     return [name, f"{scaled}**2", f"{scaled}**3"]
+
+
+def _scaled(name: str, values: np.ndarray) -> str:
+    low, high = float(np.min(values)), float(np.max(values))
+    return f"(({name} - {0.5 * (low + high):.4g}) / {max(0.5 * (high - low), 1e-12):.3g})"
+
+
+def _factor(column: str) -> str:
+    return column if column.isidentifier() or column.startswith("(") else f"({column})"

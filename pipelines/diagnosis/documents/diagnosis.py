@@ -138,6 +138,8 @@ class UnexplainedExcess(TypedDict):
     driver: str
     shape: str
     p_value: float
+    part: NotRequired[Annotated[str, "what follows the driver: bias, scale, axes or transfer, the transfer curve"]]
+    text: NotRequired[Annotated[str, "the same as a sentence without its end"]]
 
 
 class NextMeasurement(TypedDict):
