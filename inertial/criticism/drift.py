@@ -18,12 +18,14 @@ class Drift:
 
     driver : the recorded quantity that it follows; part : what of the output follows it
     log_p : natural logarithm of the probability that noise follows it as much
+    floor : noise of the measurement with the drift in the model, g
     imitated : ids of the changes that only imitated it
     """
 
     driver: str
     part: Part
     log_p: float
+    floor: float
     imitated: frozenset[str]
 
 
@@ -51,6 +53,7 @@ def one_drift(part: LotPart, changes: Sequence[Term], further: Sequence[Term]) -
     fit, kept = instead
     remaining = {t.key for t in kept}
     imitated = frozenset(t.effect.id for t in held if t.key not in remaining)
-    return (
-        Drift(fit.driver, fit.part, log_p_of_curve(base, fit, len(part.every_suspect)), imitated) if imitated else None
-    )
+    if not imitated:
+        return None
+    log_p = log_p_of_curve(base, fit, len(part.every_suspect))
+    return Drift(fit.driver, fit.part, log_p, fit.model.floor(), imitated)

@@ -29,12 +29,16 @@ from inertial.probability import passes
 
 @dataclass(frozen=True)
 class Unexplained:
-    """A driver that a part of the output follows, without an effect of the catalogue that explains it."""
+    """A driver that a part of the output follows, without an effect of the catalogue that explains it.
+
+    floor : noise of the measurement with the dependence in the model, g
+    """
 
     driver: str
     shape: str
     log_p: float
     part: Part = "bias"
+    floor: float = float("inf")
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,8 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     sound = passed is True and not searched.added and run.drift is None
     final, unexplained = (searched.model, None) if sound or unjudged else _beyond(search.part, base, searched, drivers)
     if unexplained is None and run.drift is not None and not unjudged:
-        unexplained = Unexplained(run.drift.driver, "curve", run.drift.log_p, run.drift.part)
+        drift = run.drift
+        unexplained = Unexplained(drift.driver, "curve", drift.log_p, drift.part, drift.floor)
     return Verdict(
         run=run,
         search=search,
@@ -107,7 +112,7 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
         unexplained=unexplained,
         removed=removed,
         rms=rms,
-        floor=final.floor(),
+        floor=final.floor() if unexplained is None else min(final.floor(), unexplained.floor),
         log_p=log_p,
         sound=sound,
         adequate=_adequate(sound=sound, named_data=named_data, unjudged=unjudged),
@@ -147,8 +152,11 @@ def _beyond(
         if instead is not None:
             return instead
     best = max(convincing, key=lambda d: _worth(final, d))
-    shape = "line" if best.candidate.columns.shape[-1] == 1 else "curve"
-    return final, Unexplained(best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))), best.part)
+    columns = best.candidate.of_blocks[:, :, 0, :]
+    shape, floor = "line" if columns.shape[-1] == 1 else "curve", final.with_curves(columns).floor()
+    return final, Unexplained(
+        best.name, shape, _driver_log_p(final, best) + float(np.log(len(drivers))), best.part, floor
+    )
 
 
 def _instead(
@@ -160,7 +168,9 @@ def _instead(
         return None
     fit, kept = instead
     log_p = log_p_of_curve(part.base, fit, len(suspected))
-    return Model(base.problem, [*base.terms, *kept]), Unexplained(fit.driver, "curve", log_p, fit.part)
+    return Model(base.problem, [*base.terms, *kept]), Unexplained(
+        fit.driver, "curve", log_p, fit.part, fit.model.floor()
+    )
 
 
 def _convincing(model: Model, driver: Driver, looks: int) -> bool:
