@@ -65,6 +65,9 @@ OWN = ("bias", "scale", "misalignment", "turn_on_bias")
 
 _FEW_UNITS = 4
 
+_VANISHED = 1e-100
+"""Size of a whitened column below which its squares leave the range of numbers."""
+
 
 def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: Array, size: Array) -> Array:
     """Coefficients shrunk towards the lot's mean, as far as their scatter over the units is smaller than their errors.
@@ -76,8 +79,11 @@ def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: 
     units = problem.lot.state.time.shape[0]
     if units < _FEW_UNITS or problem.lot.radial:
         return scaled
-    free = _shrinkable(model, scaled.shape[-1])
-    value = scaled / size
+    # a column that has died away (a warm-up of seconds, hours later) has no coefficient to shrink
+    seen = size > _VANISHED
+    free = _shrinkable(model, scaled.shape[-1]) & seen
+    size = np.where(seen, size, 1.0)
+    value = np.where(seen, scaled / size, 0.0)
     error2 = np.diagonal(covariance, axis1=-2, axis2=-1) / size**2
     by_axis = value.reshape(units, 3, -1)
     mean = by_axis.mean(axis=0)

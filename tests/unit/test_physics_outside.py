@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from inertial import effects
+from inertial.criticism.comparison import estimate
 from inertial.criticism.curves import fit_curve
 from inertial.criticism.drivers import across, curve, forces_along, transfer
 from inertial.criticism.examination import ExaminedRun
+from inertial.criticism.term import Term
 from inertial.criticism.wide_suspects import wide_suspects
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
@@ -140,3 +143,14 @@ def test_columns_across_the_axes_are_products_of_forces() -> None:
     middle = 0.5 * (values.min() + values.max())
     before = np.abs(values - middle) < 1e-9
     assert not np.any(own.reshape(2, 3, problem.n, -1)[np.repeat(before[:, None], 3, axis=1)])
+
+
+@pytest.mark.parametrize("shift", [1500.0, 1780.0, 1800.0, 1830.0, 1860.0, 3000.0])
+def test_an_effect_that_died_away_long_ago_leaves_the_range_of_numbers_quietly(shift: float) -> None:
+    made = make(World(units=4), SEED + 80)
+    dwells = made.dwells.assign(since_power_s=made.dwells["since_power_s"] + shift)
+    model = ExaminedRun(lot_of(measured(dwells, made.history), square=False), BASE).model()
+    # its columns are of 1e-140 g and less, the squares of some of them are no numbers; warnings are errors here
+    fit = estimate(model.with_term(Term(effects.get("warm_up"), (("tau", 10.0),))))
+    before = estimate(model)
+    np.testing.assert_allclose(fit.local[:, 1], before.local[:, 1], rtol=1e-5)
