@@ -10,7 +10,7 @@ from inertial import frames
 from inertial.criticism import decisions
 from inertial.criticism.candidate import Candidate
 from inertial.criticism.curves import CurveFit, fit_curve
-from inertial.criticism.drivers import Part, curve, quantities, varies
+from inertial.criticism.drivers import Part, curve, forces_along, quantities, varies
 from inertial.criticism.model import Model
 from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
 from inertial.criticism.problem import Problem
@@ -69,7 +69,7 @@ def suspects(problem: Problem) -> list[Suspect]:
                 # the same dependence of the scale factors: what the driver changes is then felt along each axis
                 suspected.append(Suspect(name, _columns(along_force(problem, curve(values, _FEW_KNOTS))), part="scale"))
     if not problem.lot.radial:
-        own = np.stack([state.along(axis) for axis in range(3)], axis=1).reshape(problem.blocks, problem.n)
+        own = forces_along(problem).reshape(problem.blocks, problem.n)
         suspected.append(Suspect("pose", _columns(curve(own, _KNOTS)), _unit_range(own)))
         suspected += _table(problem)
     suspected += [Suspect("time_s", _alike(problem, _swing(state.time, c))) for c in _CYCLES]
@@ -220,10 +220,8 @@ def _columns(columns: Array, *, shared: bool = False) -> Candidate:
 
 def along_force(problem: Problem, columns: Array) -> Array:
     """Columns (units, n, d) times the force along each axis, (blocks, n, d)."""
-    state = problem.lot.state
-    own = np.stack([state.along(axis) for axis in range(3)], axis=1)
-    wide = np.broadcast_to(columns[:, None], (*own.shape, columns.shape[-1]))
-    return (own[..., None] * wide).reshape(problem.blocks, problem.n, -1)
+    wide = forces_along(problem)[..., None] * columns[:, None]
+    return wide.reshape(problem.blocks, problem.n, -1)
 
 
 def _swing(time: Array, cycles: float) -> Array:

@@ -20,8 +20,9 @@ FIRST = {(case.kind, case.outcome): case for case in reversed(CASES)}
 )
 def test_a_fault_ends_as_the_matrix_says(case: Case) -> None:
     result = run_case(case)
-    if case.outcome == RECOVERED and row(case, result) not in PAGE.read_text(encoding="utf-8"):
-        # an answer within 0.15 s: where this machine stands still for as long, a dwell is spoilt; not twice
+    stalled = result.outcome == RECOVERED and not case.spoilt and any("no answer to" in why for why in result.spoilt)
+    if stalled and row(case, result) not in PAGE.read_text(encoding="utf-8"):
+        # answers come within 0.15 s: where this machine stands still for as long, a dwell is spoilt; not twice
         result = run_case(case)
     assert (result.outcome, result.message) == (case.outcome, result.message)
     assert case.says in result.message
