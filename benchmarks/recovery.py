@@ -32,7 +32,7 @@ from stations.plant.preset import Preset, load_preset, preset_names  # noqa: E40
 Array = np.ndarray
 EFFECTS = (
     "bias", "scale", "misalignment", "bias_temperature", "bias_temperature_quadratic", "scale_temperature",
-    "scale_temperature_quadratic", "misalignment_temperature", "third_order",
+    "scale_temperature_quadratic", "third_order",
 )  # fmt: skip
 TEMPERATURES = (-20.0, 25.0, 60.0)
 RATE, DWELL_S, MOVE_S, SOAK_S = 100.0, 10.0, 20.0, 1800.0
@@ -117,7 +117,6 @@ def truth_of(truths: list[Truth], names: tuple[tuple[tuple[str, str], ...], ...]
         matrix = gain[:, None] * (truth.misalignment @ truth.slot_rotation)
         for axis in range(3):
             across = iter(((axis + 1) % 3, (axis + 2) % 3))
-            across_t = iter(((axis + 1) % 3, (axis + 2) % 3))
             for c, (effect, _) in enumerate(names[axis]):
                 value = {
                     "bias": lambda a=axis, t=truth: t.bias_g[a],
@@ -128,9 +127,6 @@ def truth_of(truths: list[Truth], names: tuple[tuple[tuple[str, str], ...], ...]
                     "scale_temperature": lambda a=axis, m=matrix, t=truth: m[a, a] * t.scale_tempco[a],
                     "scale_temperature_quadratic": lambda a=axis, m=matrix, t=truth: (
                         m[a, a] * t.scale_tempco_quadratic[a]
-                    ),
-                    "misalignment_temperature": lambda a=axis, m=matrix, t=truth, it=across_t: (
-                        m[a, next(it)] * t.scale_tempco[a]
                     ),
                     "third_order": lambda a=axis, g=gain, t=truth: g[a] * t.cubic[a],
                 }[effect]()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from inertial import design
 from inertial.design import Values
 from inertial.effects import SensorEffect
-from inertial.fits.linear import response_matrix
+from inertial.fits.linear import force_along_axes, response_matrix
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -20,7 +20,10 @@ _STEPS = 12
 
 def predict(effects: Sequence[str], state: State, coefficients: Array, nonlinear: Values) -> Array:
     """Output of the model (..., n, 3), in the output's unit, for coefficients (..., 3, p); station effects left out."""
-    return _output(design.split(effects)[0], state, coefficients, nonlinear)
+    sensor = design.split(effects)[0]
+    response = response_matrix(coefficients, tuple(design.local_names(sensor, axis, nonlinear) for axis in range(3)))
+    felt = force_along_axes(response, state.force)
+    return _output(sensor, replace(state, felt=felt, memory={}), coefficients, nonlinear)
 
 
 def _output(sensor: Sequence[SensorEffect], state: State, coefficients: Array, nonlinear: Values) -> Array:
@@ -82,7 +85,7 @@ class _Inverse:
 
     def step(self, state: State, output: Array, force: Array) -> Array:
         """Change (..., n, 3) in g of a force (..., n, 3) in g towards the one that explains an output (..., n, 3)."""
-        felt = replace(state, force=force, felt=_felt(self._response, force), memory={})
+        felt = replace(state, force=force, felt=force_along_axes(self._response, force), memory={})
         left = output - _output(self._sensor, felt, self._coefficients, self._nonlinear)
         return np.einsum("...ij,...nj->...ni", self._inverse, left)
 
@@ -100,16 +103,10 @@ def output_covariance(
     """
     names = tuple(design.local_names(design.split(effects)[0], axis, nonlinear) for axis in range(3))
     response = response_matrix(coefficients, names)
-    seen = replace(state, felt=_felt(response, state.force), memory={})
+    seen = replace(state, felt=force_along_axes(response, state.force), memory={})
     columns = design.local_columns(design.split(effects)[0], seen, nonlinear)
     p = columns.shape[-1]
     blocks = covariance.reshape(3, p, 3, p)
     inner = np.einsum("inp,ipjq,jnq->nij", columns, blocks, columns, optimize=True)
     inverse = np.linalg.inv(response)
     return inverse @ inner @ inverse.T
-
-
-def _felt(response: Array, force: Array) -> Array:
-    """Force along the sensor's own axes, (..., n, 3), g."""
-    own = np.diagonal(response, axis1=-2, axis2=-1)
-    return np.einsum("...ij,...nj->...ni", response / own[..., :, None], force)

@@ -15,7 +15,7 @@ from inertial import design
 from inertial.correction import correct
 from inertial.design import Values
 from inertial.errors import NotIdentified
-from inertial.fits.linear import LotFit, response_matrix
+from inertial.fits.linear import LotFit, force_along_axes, response_matrix
 from inertial.norm_noise import PlausibleNoise, SolvedNorms
 from inertial.state import State
 
@@ -184,9 +184,7 @@ class _Work:
 
     def _at(self, theta: Array, force: Array) -> State:
         """The dwells with their force, also along the sensor's own axes."""
-        response = response_matrix(theta, self.names)
-        scale = np.diagonal(response, axis1=-2, axis2=-1)[..., None]
-        felt = np.einsum("uij,unj->uni", response / np.where(scale == 0.0, 1.0, scale), force)
+        felt = force_along_axes(response_matrix(theta, self.names), force)
         return replace(self.state, force=force, felt=felt, memory={})
 
     def advanced(self, theta: Array, cost: Array) -> tuple[Array, Array]:

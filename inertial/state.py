@@ -12,7 +12,7 @@ from inertial.errors import MissingInput
 
 Array = NDArray[np.float64]
 
-_DIMENSIONS = {"force": 3, "felt": 3, "slot": 1}
+_DIMENSIONS = {"force": 3, "felt": 3, "output_run": 3, "slot": 1}
 """Number of dimensions of the arrays of a lot of units; two for all others."""
 
 _REMEMBERED = 3_000_000
@@ -49,7 +49,9 @@ class State:
     outer, inner : (..., n), rad, table angles
     heading : (..., n), rad, direction about the vertical of units put down by hand (:func:`inertial.frames.horizontal`)
     slot : (...,), number of the fixture's slot
-    felt : (..., n, 3), g, force along the sensor's own axes where its misalignment is known: what a sharp nonlinearity answers to
+    felt : (..., n, 3), g, force along the sensor's own axes where its misalignment is known: what its gain and its nonlinearity
+        answer to
+    output_run : (..., n, 3), g, what bias and scale factor add to the output by their run with temperature, where it is known
     covariates : further recorded quantities by name, (..., n)
     """
 
@@ -67,6 +69,7 @@ class State:
     heading: Array | None = None
     slot: Array | None = None
     felt: Array | None = None
+    output_run: Array | None = None
     covariates: Mapping[str, Array] = field(default_factory=dict[str, Array])
     history: History | None = None
     memory: dict[tuple[object, ...], Array] = field(
@@ -93,6 +96,14 @@ class State:
     def along(self, axis: int) -> Array:
         """Specific force along the sensor's own axis, (..., n), g; along the fixture's where the misalignment is not known."""
         return (self.force if self.felt is None else self.felt)[..., axis]
+
+    def converted(self, axis: int) -> Array:
+        """What the electronics of an axis has at its input, (..., n), g: the force along it, and the run with temperature.
+
+        The steps of a converter, a limit or a threshold stand elsewhere in a warm unit.
+        """
+        along = self.along(axis)
+        return along if self.output_run is None else along + self.output_run[..., axis]
 
     @cached_property
     def theta(self) -> Array | None:

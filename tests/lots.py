@@ -54,9 +54,9 @@ def lot(
         f = force(angles, up)
         warm = np.repeat(temperatures, per_soak) + rng.normal(0.0, 0.3) + rng.normal(0.0, 0.005, len(angles))
         theta = (warm - 25.0)[:, None]
-        k = np.eye(3) + rng.normal(0.0, 0.004, (3, 3))
+        seen = f @ (np.eye(3) + rng.normal(0.0, 0.004, (3, 3))).T
         out = (
-            f @ k.T + rng.normal(0.0, 0.03, 3) + theta * rng.normal(0.0, 5e-5, 3) + theta * rng.normal(0.0, 1e-4, 3) * f
+            seen + rng.normal(0.0, 0.03, 3) + theta * rng.normal(0.0, 5e-5, 3) + theta * rng.normal(0.0, 1e-4, 3) * seen
         )
         if hidden is not None:
             out = out + hidden(f, warm, time, rng)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from noise import Noise, fractional
 from physics import PHYSICS
-from world import Lot, Scene, World, history_of, table_of
+from world import Lot, Scene, World, history_of, left_by_the_plain_model, table_of
 
 Floats = np.ndarray
 RAMP = 3.0 / 60.0  # K/s of the air
@@ -93,15 +93,14 @@ class Continued:
         noise = self._noise(first)
         floor = float(np.sqrt(np.mean((noise - noise.mean(axis=1, keepdims=True)) ** 2)))
         drawn = PHYSICS[blind.effect](hidden, blind.units, first)
-        shape = drawn(first)
-        size = blind.size * floor / _remaining(first, shape, thermal=len(blind.soaks) > 1)
+        left = left_by_the_plain_model(first, np.broadcast_to(drawn(first), first.output.shape))
+        size = blind.size * floor / float(np.sqrt(np.mean(left**2)))
         self.effect: Callable[[Any], Floats] = lambda s: size * drawn(s)
 
     def tables(self, further: list[Step] | None = None, *, quiet: bool = False) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Dwells and temperatures of the run, and of further steps where there are any; ``quiet`` without the noise."""
         scene = self._scene([*self.steps, *(further or [])])
         noise = self._noise(scene)
-        scene = replace(scene, output=self.lot.output(scene))
         output = scene.output + self.effect(scene) + (0.0 if quiet else noise)
         rng = np.random.default_rng([len(scene.start), int(1e6 * self.tau[0])])
         world = World(units=self.blind.units, noise=self.blind.noise)
@@ -152,11 +151,12 @@ class Continued:
         own = np.stack([np.interp(middle, fine, one) for one in sensors])
         around = np.broadcast_to(np.interp(middle, fine, fine_air), own.shape)
         n = len(steps)
-        return Scene(
+        scene = Scene(
             np.array([s.outer for s in steps]), np.array([s.inner for s in steps]), begin, np.full(n, 10.0),
             np.array([s.chamber for s in steps]), own, around, np.array([s.wait for s in steps]), fine, sensors,
-            np.array(fine_air), 1800.0, np.zeros((self.blind.units, n, 3)),
+            np.array(fine_air), 1800.0, *np.zeros((2, self.blind.units, n, 3)),
         )  # fmt: skip
+        return self.lot.seen(scene)
 
 
 @dataclass(frozen=True)
@@ -216,17 +216,3 @@ def _wander(noise: Noise, seconds: float, units: int, rng: np.random.Generator) 
     if noise.walk > 0.0:
         slow += noise.walk * np.cumsum(rng.standard_normal((3 * units, steps)), axis=1)
     return np.concatenate([np.zeros((3 * units, 1)), np.cumsum(slow, axis=1)], axis=1)
-
-
-def _remaining(scene: Scene, shape: Floats, *, thermal: bool) -> float:
-    """RMS of a shape (units, n, 3) after bias, scale, misalignment and, with soaks, their slopes over temperature."""
-    shape = np.broadcast_to(shape, (scene.temperature.shape[0], len(scene.start), 3))
-    total = 0.0
-    for unit, own in enumerate(shape):
-        columns = [np.ones(len(own)), *scene.force.T]
-        warm = scene.temperature[unit] - 25.0
-        if thermal:
-            columns += [warm * c for c in columns]
-        x = np.stack(columns, axis=1)
-        total += float(np.sum((own - x @ np.linalg.lstsq(x, own, rcond=None)[0]) ** 2))
-    return max(float(np.sqrt(total / shape.size)), 1e-12)

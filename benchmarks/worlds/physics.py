@@ -26,12 +26,12 @@ def _of_force(shape: Callable[[Floats], Floats]) -> Callable[..., Effect]:
 
 
 def _of_temperature(shape: Callable[[Floats, Floats], Floats]) -> Callable[..., Effect]:
-    """``shape(warm (units, n, 1), force (n, 3))`` gives (units, n, 3)."""
+    """``shape(warm (units, n, 1), force along the axes (units, n, 3))`` gives (units, n, 3)."""
 
     def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
         del scene
         size = _sizes(rng, units)[..., 0]
-        return lambda s: size[:, None] * shape((s.temperature - 25.0)[..., None], s.force)
+        return lambda s: size[:, None] * shape((s.temperature - 25.0)[..., None], s.along)
 
     return draw
 
@@ -193,7 +193,7 @@ def _of_scale(course: Callable[[Any], Floats]) -> Callable[..., Effect]:
     def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
         del scene
         size = _sizes(rng, units)[..., 0]
-        return lambda s: size[:, None] * course(s)[..., None] * s.force
+        return lambda s: size[:, None] * course(s)[..., None] * s.along
 
     return draw
 

@@ -55,7 +55,7 @@ class Scene:
 
     start, duration : of each dwell, s; soak : its place in the plan
     temperature : true, of the sensors; chamber : air
-    output : (units, n, 3), g, of the devices without noise and without what is hidden
+    output : (units, n, 3), g, of the devices without noise and without what is hidden; along : force along their axes
     """
 
     outer: Floats
@@ -71,6 +71,7 @@ class Scene:
     fine_air: Floats
     powered: float
     output: Floats
+    along: Floats
 
     @property
     def force(self) -> Floats:
@@ -105,7 +106,7 @@ def make(world: World, seed: int) -> Made:
     plan, device, first, second, third = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
     scene = _scene(world, plan, first)
     lot = Lot.drawn(device, world.units, world.differ)
-    scene, again = (replace(s, output=lot.output(s)) for s in (scene, _with_heat(scene, world, second)))
+    scene, again = (lot.seen(s) for s in (scene, _with_heat(scene, world, second)))
     noises = [
         1e-6 * dwell_noise(noise, s.start, s.duration, world.units, g, s.temperature.mean(axis=0))
         for noise, s, g in ((world.noise, scene, first), (world.fresh_noise or world.noise, again, second))
@@ -163,8 +164,17 @@ class Lot:
         if turned is not None:
             force = force + np.cross(turned, force)
         warm = (scene.temperature - 25.0)[..., None]
-        seen = np.einsum("uij,unj->uni", self.matrix, force)
-        return self.bias[:, None] + seen + warm * (self.bias_tempco[:, None] + self.scale_tempco[:, None] * force)
+        # warmth changes the gain of an axis, not where the axis points
+        gain = 1.0 + warm * self.scale_tempco[:, None]
+        return self.bias[:, None] + warm * self.bias_tempco[:, None] + gain * self._along(force)
+
+    def seen(self, scene: Scene) -> Scene:
+        """The scene with what the devices make of it."""
+        force = np.broadcast_to(scene.force, (len(self.bias), len(scene.start), 3))
+        return replace(scene, output=self.output(scene), along=self._along(force))
+
+    def _along(self, force: Floats) -> Floats:
+        return np.einsum("uij,unj->uni", self.matrix, force)
 
 
 def _scene(world: World, rng: np.random.Generator, heat: np.random.Generator) -> Scene:
@@ -198,7 +208,7 @@ def _scene(world: World, rng: np.random.Generator, heat: np.random.Generator) ->
     empty = np.zeros((world.units, 0))
     scene = Scene(
         np.array(outer), np.array(inner), np.array(start), duration, np.array(place), empty, empty, np.array(wait),
-        np.zeros(0), empty, np.zeros(0), 1800.0, empty,
+        np.zeros(0), empty, np.zeros(0), 1800.0, empty, empty,
     )  # fmt: skip
     return _with_heat(scene, world, heat)
 
@@ -236,20 +246,20 @@ def _hidden(world: World, scene: Scene, again: Scene, floor: float, rng: np.rand
         physics: Callable[..., Callable[[Scene], Floats]] = PHYSICS[name]
         effect = physics(rng, world.units, scene)
         shape = effect(scene)
-        left = float(np.sqrt(np.mean(_left(scene, shape) ** 2)))
+        left = float(np.sqrt(np.mean(left_by_the_plain_model(scene, shape) ** 2)))
         factor = size * floor / left
         added = [f + factor * effect(s) for f, s in zip(added, (scene, again), strict=True)]
     return added[0], added[1]
 
 
-def _left(scene: Scene, shape: Floats) -> Floats:
-    """What bias, scale, misalignment and (over temperature) their linear terms leave of an effect, (units, n, 3)."""
+def left_by_the_plain_model(scene: Scene, shape: Floats) -> Floats:
+    """What bias, scale, misalignment and (over temperature) the runs of bias and scale leave of an effect, (units, n, 3)."""
     out = np.empty_like(shape)
     for unit in range(len(shape)):
         warm = scene.temperature[unit] - 25.0
         for axis in range(3):
             columns = [np.ones(len(warm)), *scene.force.T]
-            columns += [warm, warm * scene.force[:, axis]] if np.ptp(warm) > 5.0 else []
+            columns += [warm, warm * scene.along[unit, :, axis]] if np.ptp(warm) > 5.0 else []
             x = np.stack(columns, axis=-1)
             out[unit, :, axis] = shape[unit, :, axis] - x @ np.linalg.lstsq(x, shape[unit, :, axis], rcond=None)[0]
     return out

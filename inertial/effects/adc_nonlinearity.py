@@ -25,7 +25,7 @@ class AdcNonlinearity(SensorEffect):
     def columns(self, state: State, axis: int, *, period: float, **nonlinear: float) -> Array:
         del nonlinear
         # sine and cosine by the tangent of half the angle, which numpy computes many at a time: a tenth of their time
-        half = np.tan(np.pi * state.along(axis) / period)
+        half = np.tan(np.pi * state.converted(axis) / period)
         square = half * half
         return stack(state, [2.0 * half / (1.0 + square), (1.0 - square) / (1.0 + square)])
 

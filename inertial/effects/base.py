@@ -68,7 +68,8 @@ class Effect(ABC):
     hides_behind : effects that take its place under poor plans
     breaker : what to measure so that it shows
     simplicity : rank among effects that the data cannot tell apart; the lowest is recommended
-    sharp : whether it answers to the force along the sensor's own axis so sharply that misalignment matters
+    sharp : whether it answers to the force along the sensor's own axis so sharply that misalignment matters: a change of gain
+        of some 1e-3 at a misalignment of some mrad, or a nonlinearity
     after : effects of lower order that are named first where they are called for as well
     memory : whether it depends on all that went before: its form is then the simplest of many
     vanishing : RMS of a column below which a plan does not excite it: products that only the angles' jitter keeps from zero

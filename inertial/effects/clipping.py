@@ -24,7 +24,7 @@ class Clipping(SensorEffect):
 
     def columns(self, state: State, axis: int, *, full_scale: float, **nonlinear: float) -> Array:
         del nonlinear
-        f = state.along(axis)
+        f = state.converted(axis)
         return stack(state, [np.clip(f, -full_scale, full_scale) - f])
 
     def names(self, axis: int) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ class DeadZone(SensorEffect):
 
     def columns(self, state: State, axis: int, *, width: float, **nonlinear: float) -> Array:
         del nonlinear
-        return stack(state, [-np.clip(state.along(axis), -width, width)])
+        return stack(state, [-np.clip(state.converted(axis), -width, width)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis

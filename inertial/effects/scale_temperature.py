@@ -1,4 +1,4 @@
-"""Scale factor that follows the sensor's temperature."""
+"""Scale factor that follows the sensor's temperature, along the sensor's own axis: S(θ)·M."""
 
 from typing import ClassVar
 
@@ -7,22 +7,22 @@ from inertial.state import State
 
 
 class ScaleTemperature(SensorEffect):
-    """Scale factor that follows the sensor's temperature."""
+    """Scale factor that follows the sensor's temperature, along the sensor's own axis: S(θ)·M."""
 
     id: ClassVar[str] = "scale_temperature"
     symbol: ClassVar[str] = "αT"
-    equation: ClassVar[str] = "αT·θ·fi"
+    equation: ClassVar[str] = "αT·θ·(fi + δj·fj + δk·fk)"
     source: ClassVar[str] = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug: ClassVar[tuple[float, float]] = (50.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("gravity_value",)
     breaker: ClassVar[str] = "opposed poses at every temperature"
     simplicity: ClassVar[int] = 4
+    sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
         theta = state.need("theta", self.id)
-        f = state.force[..., axis]
-        return stack(state, [theta * f])
+        return stack(state, [theta * state.along(axis)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis

@@ -1,4 +1,4 @@
-"""Curvature of the scale factor over temperature."""
+"""Curvature of the scale factor over temperature, along the sensor's own axis: S(θ)·M."""
 
 from typing import ClassVar
 
@@ -7,23 +7,23 @@ from inertial.state import State
 
 
 class ScaleTemperatureQuadratic(SensorEffect):
-    """Curvature of the scale factor over temperature."""
+    """Curvature of the scale factor over temperature, along the sensor's own axis: S(θ)·M."""
 
     id: ClassVar[str] = "scale_temperature_quadratic"
     symbol: ClassVar[str] = "αT2"
-    equation: ClassVar[str] = "αT2·θ²·fi"
+    equation: ClassVar[str] = "αT2·θ²·(fi + δj·fj + δk·fk)"
     source: ClassVar[str] = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 3000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ()
     breaker: ClassVar[str] = "opposed poses at four temperatures or more"
     simplicity: ClassVar[int] = 6
+    sharp: ClassVar[bool] = True
     after: ClassVar[tuple[str, ...]] = ("scale_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         del nonlinear
         theta = state.need("theta", self.id)
-        f = state.force[..., axis]
-        return stack(state, [theta**2 * f])
+        return stack(state, [theta**2 * state.along(axis)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis

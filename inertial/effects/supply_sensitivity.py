@@ -14,19 +14,20 @@ class SupplySensitivity(SensorEffect):
 
     id: ClassVar[str] = "supply_sensitivity"
     symbol: ClassVar[str] = "kV"
-    equation: ClassVar[str] = "kV·ΔV + K1V·ΔV·fi"
+    equation: ClassVar[str] = "kV·ΔV + K1V·ΔV·(fi + δj·fj + δk·fk)"
     source: ClassVar[str] = "mechanism: ratiometric output; power-supply rejection"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 5000.0)
     per: ClassVar[tuple[str, ...]] = ("V", "g·V")
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_temperature",)
     breaker: ClassVar[str] = "steps of the supply at constant temperature"
     simplicity: ClassVar[int] = 35
+    sharp: ClassVar[bool] = True
     primary: ClassVar[int | None] = 1
 
     def columns(self, state: State, axis: int, *, nominal: float, **nonlinear: float) -> Array:
         del nonlinear
         change = state.need("supply", self.id) - nominal
-        return stack(state, [change, change * state.force[..., axis]])
+        return stack(state, [change, change * state.along(axis)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         del axis

@@ -105,7 +105,10 @@ def fit_lot(
     """
     sensor, station = design.split(effects)
     if state.felt is None and any(e.sharp for e in sensor):
-        state = replace(state, felt=felt_force(state.force, output), memory={})
+        felt = felt_force(state.force, output, state.theta)
+        first = fit_lot(effects, replace(state, felt=felt, memory={}), output, standard_error, nonlinear=nonlinear)
+        better = own_axes(replace(state, felt=felt), first.response())
+        return first if better is None else fit_lot(effects, better, output, standard_error, nonlinear=nonlinear)
     values = design.starting_values([*sensor, *station], state)
     for name, given in (nonlinear or {}).items():
         values[name] = {**values.get(name, {}), **given}
@@ -193,13 +196,50 @@ class _Solution(NamedTuple):
     covariance: Array
 
 
-def felt_force(force: Array, output: Array) -> Array:
-    """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of bias and response."""
+_SAME_G = 1e-5
+"""Change of the force along an axis, g, that adds less than 0.1 µg to the run of a scale factor of 200 ppm/K over 35 K."""
+
+_WARM = 5.0
+"""Range of temperature, K, from which on the bias' run with it would be taken for response where poses differ between soaks."""
+
+
+def felt_force(force: Array, output: Array, theta: Array | None = None) -> Array:
+    """Specific force along the sensor's own axes, (..., n, 3), g, from a plain fit of response and bias.
+
+    Parameters
+    ----------
+    theta : (..., n), temperature above the reference, K: a bias that follows it is no response
+    """
     x = np.concatenate([np.ones((*force.shape[:-1], 1)), force], axis=-1)
+    if theta is not None and float(np.ptp(theta)) > _WARM:
+        warm = np.stack([theta, theta**2], axis=-1) / float(np.max(np.abs(theta)))
+        batch = np.broadcast_shapes(x.shape[:-1], warm.shape[:-1])
+        x = np.concatenate([np.broadcast_to(c, (*batch, c.shape[-1])) for c in (x, warm)], axis=-1)
     coefficients = pseudo_inverses(x) @ output
-    k = np.swapaxes(coefficients[..., 1:, :], -1, -2)
-    own = np.diagonal(k, axis1=-2, axis2=-1)
-    return np.einsum("...ij,...nj->...ni", k / np.where(own == 0.0, 1.0, own)[..., :, None], force)
+    return force_along_axes(np.swapaxes(coefficients[..., 1:4, :], -1, -2), force)
+
+
+def force_along_axes(response: Array, force: Array) -> Array:
+    """Specific force along the sensor's own axes, (..., n, 3), g: rows of the response (..., 3, 3) over their diagonal."""
+    return np.einsum("...ij,...nj->...ni", axis_rows(response), force)
+
+
+def own_axes(state: State, response: Array) -> State | None:
+    """The state with the force along the axes of a fitted response; None where it has that force already."""
+    felt = force_along_axes(response, state.force)
+    if state.felt is None:
+        return replace(state, felt=felt, memory={})
+    moved = np.max(np.abs(felt - state.felt), axis=(-2, -1), keepdims=True) > _SAME_G
+    # unit by unit: the coefficients of a unit do not depend on the others of its lot
+    return replace(state, felt=np.where(moved, felt, state.felt), memory={}) if np.any(moved) else None
+
+
+def axis_rows(response: Array) -> Array:
+    """Rows of a response (..., 3, 3) over their diagonal; a model without a scale factor has one of 1."""
+    own = np.diagonal(response, axis1=-2, axis2=-1)
+    rows = np.array(response / np.where(own == 0.0, 1.0, own)[..., :, None])
+    rows[..., range(3), range(3)] = 1.0
+    return rows
 
 
 def pseudo_inverses(columns: Array) -> Array:

@@ -94,10 +94,10 @@ def _varied(state: State) -> list[tuple[Driver, State]]:
     variants: list[tuple[Driver, State]] = []
     if state.outer is not None and state.inner is not None:
         outer, inner = state.outer + turn[0], state.inner + turn[1]
-        force = frames.force_from_angles(outer, inner)
-        variants.append(("force", replace(state, outer=outer, inner=inner, force=force, felt=None, memory={})))
+        turned = replace(state, outer=outer, inner=inner, force=frames.force_from_angles(outer, inner))
     else:
-        variants.append(("force", replace(state, force=np.roll(state.force, 1, axis=-1) + 0.1, felt=None, memory={})))
+        turned = replace(state, force=np.roll(state.force, 1, axis=-1) + 0.1)
+    variants.append(("force", replace(turned, felt=None, output_run=None, memory={})))
     begin = float(np.min(state.time))
     span = max(float(np.ptp(state.time)), 1.0)
     late = begin + span * ((state.time - begin) / span) ** 1.5
@@ -115,7 +115,7 @@ def _varied(state: State) -> list[tuple[Driver, State]]:
 
 _ROWS = (
     "time", "temperature", "chamber", "outer", "inner", "supply", "vibration", "since_move", "since_power", "power_off",
-    "felt",
+    "felt", "output_run",
 )  # fmt: skip
 
 

@@ -200,6 +200,7 @@ def extended(
         state,
         force=whole,
         felt=_felt(state, whole, response),
+        output_run=None,
         time=_joined(state.time, np.broadcast_to(begin + ran.time, wide)),
         temperature=_joined_if(state.temperature, apart[..., None] + ran.device),
         chamber=_joined_if(state.chamber, np.broadcast_to(ran.air, wide)),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inertial.fits.linear import axis_rows
 from inertial.state import T_REFERENCE
 from pipelines.certificates.statement import stated
 from pipelines.export.unit_noise import noise_of_units
@@ -199,15 +200,16 @@ def _one(
         values = calibration.value(effect)[u]
         if values.size:
             bias[power] = values[:, 0]
-    for power, effect in enumerate(SCALE):
-        values = calibration.value(effect)[u]
-        if values.size:
-            response[power][np.diag_indices(3)] = values[:, 0]
     for power, effect in enumerate(ACROSS):
         values = calibration.value(effect)[u]
         if values.size:
             for axis in range(3):
                 response[power, axis, [(axis + 1) % 3, (axis + 2) % 3]] = values[axis]
+    for power, effect in enumerate(SCALE):
+        values = calibration.value(effect)[u]
+        if values.size:
+            # the temperature acts on the whole row: S(θ)·M
+            response[power] += values * (axis_rows(response[0]) if power else np.eye(3))
     known = {*BIAS, *SCALE, *ACROSS}
     return UnitCalibration(
         unit=unit,

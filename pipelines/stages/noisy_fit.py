@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from inertial import design
-from inertial.fits.linear import LotFit, felt_force, fit_lot, pseudo_inverses
+from inertial.fits.linear import LotFit, felt_force, fit_lot, own_axes, pseudo_inverses
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
 from pipelines.stages.nonlinear import profiled
 from pipelines.tables.dwells import LotArrays
@@ -63,6 +63,10 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
     values = profiled(lot, effects, used)
     error = np.where(used[:, None], lot.standard_error, np.inf)
     plain = fit_lot(effects, lot.state, lot.output, error, nonlinear=values)
+    better = own_axes(lot.state, plain.response())
+    if better is not None:
+        lot = replace(lot, state=better)
+        plain = fit_lot(effects, lot.state, lot.output, error, nonlinear=values)
     known = lot.standard_error[:, used]
     spare = int(plain.dof.sum()) - plain.shared.size
     if spare < FEWEST_TO_SPARE or np.any(plain.dof < 1) or not np.all(np.isfinite(known) & (known > 0.0)):
@@ -76,7 +80,8 @@ def fitted_with_noise(lot: LotArrays, effects: Sequence[str]) -> NoisyFit:
 def _felt(lot: LotArrays, used: NDArray[np.bool_]) -> Array:
     """Force along the sensors' own axes at every dwell, (units, n, 3), g; misalignment from the dwells of the fit alone."""
     force, own = lot.state.force, lot.state.force[:, used]
-    turn = pseudo_inverses(own) @ felt_force(own, lot.output[:, used])
+    theta = None if lot.state.theta is None else np.broadcast_to(lot.state.theta, lot.output.shape[:2])[:, used]
+    turn = pseudo_inverses(own) @ felt_force(own, lot.output[:, used], theta)
     return force @ turn
 
 

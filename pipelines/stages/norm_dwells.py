@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial.correction import correct
-from inertial.fits.linear import response_matrix
+from inertial.fits.linear import force_along_axes, response_matrix
 from inertial.fits.wander import walk_kernel
 from inertial.noise.flicker import flicker_kernel
 from inertial.uncertainty.influences import MeasurementModel
@@ -77,7 +77,7 @@ def _one(
     force = correct(calibration.effects, state, readings.output, calibration.coefficients, calibration.nonlinear)
     response = response_matrix(calibration.coefficients, calibration.names)
     scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1))
-    felt = np.einsum("uij,unj->uni", response / scale[..., None], force)
+    felt = force_along_axes(response, force)
     state = replace(state, force=force, felt=felt, memory={})
     white, flicker, walk = (float(wander[name].iloc[0]) / MICRO for name in ("white_ug", "flicker_ug", "walk_ug"))
     direction = force[0] / np.linalg.norm(force[0], axis=-1, keepdims=True)

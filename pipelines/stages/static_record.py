@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial import design
+from inertial.fits.linear import force_along_axes
 from inertial.frames import force_from_angles
 from inertial.noise.resolution import step_of
 from inertial.state import State
@@ -144,8 +145,9 @@ def warmed(
     force = np.broadcast_to(force_from_angles(outer, inner), (when.size, 3))
     if not np.all(np.isfinite(force)):
         return Warmed(still, span, known=False)
-    columns = design.local_columns(effects, State(force=force, time=when, temperature=temperature), {})
     place = calibration.units.index(unit)
+    felt = force_along_axes(calibration.response[place], force)
+    columns = design.local_columns(effects, State(force=force, time=when, temperature=temperature, felt=felt), {})
     coefficients = np.concatenate([calibration.value(e.id)[place] for e in effects], axis=-1)
     change = np.einsum("anp,ap->na", columns, coefficients)
     along = np.stack([np.interp(time, when, part) for part in change.T], axis=1)

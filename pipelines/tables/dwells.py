@@ -14,6 +14,7 @@ import numpy as np
 
 from inertial.criticism.problem import Lot
 from inertial.criticism.readings import Readings
+from inertial.fits.linear import force_along_axes
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.state import State
 from pipelines.tables.dwell_table import DwellTable, state_of_table
@@ -201,8 +202,8 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     output = readings.output / scale[:, None, :]
     there = readings.there
     error = np.where(there[..., None], _white_error(readings, scale, output), np.inf)
-    felt = np.einsum("uij,unj->uni", response, measurement.state.force) + _run_with_temperature(measurement, scale)
-    state = replace(measurement.state, felt=felt, memory={})
+    felt, run = _felt_with_temperature(measurement, response, scale)
+    state = replace(measurement.state, felt=felt, output_run=run, memory={})
     return Lot(state, np.where(there[..., None], output, 0.0), error, response, scale=scale)
 
 
@@ -210,24 +211,30 @@ _WARM = 5.0
 """Range of temperature, K, from which on its linear terms are worth to be taken out of the force that a sensor answers to."""
 
 
-def _run_with_temperature(measurement: Measured, scale: Array) -> Array:
-    """What bias and scale add to the output by their run with temperature, (units, n, 3), g.
+def _felt_with_temperature(measurement: Measured, response: Array, scale: Array) -> tuple[Array, Array | None]:
+    """The force along the sensors' own axes, and what bias and scale add to the output by their run with temperature.
 
-    A sharp nonlinearity answers to the whole output: a converter's steps stand elsewhere in a warm unit.
+    Both (units, n, 3), g. The scale's run acts along the sensor's own axis, whose direction is found with it in two passes; None
+    where the temperature hardly changes.
     """
     state, readings = measurement.state, measurement.readings
+    felt = force_along_axes(response, state.force)
+    if state.theta is None or float(np.ptp(state.theta)) < _WARM or not readings.turned:
+        return felt, None
     run = np.zeros(readings.output.shape)
-    if state.theta is None or float(np.ptp(state.theta)) < _WARM:
-        return run
     force = np.broadcast_to(state.force, run.shape)
     for unit, theta in enumerate(np.broadcast_to(state.theta, run.shape[:2])):
         there = readings.there[unit]
         for axis in range(3):
-            linear = np.stack([theta, theta * force[unit, :, axis]], axis=-1)
-            x = np.concatenate([np.ones((len(theta), 1)), force[unit], linear], axis=-1)
-            coefficients = np.linalg.lstsq(x[there], readings.output[unit, there, axis], rcond=1e-9)[0]
-            run[unit, :, axis] = linear @ coefficients[-2:] / scale[unit, axis]
-    return run
+            for _ in range(2):
+                linear = np.stack([theta, theta * felt[unit, :, axis]], axis=-1)
+                x = np.concatenate([np.ones((len(theta), 1)), force[unit], linear], axis=-1)
+                coefficients, _, rank, _ = np.linalg.lstsq(x[there], readings.output[unit, there, axis], rcond=1e-9)
+                run[unit, :, axis] = linear @ coefficients[-2:] / scale[unit, axis]
+                own = coefficients[1 + axis]
+                if own != 0.0 and rank == x.shape[1]:
+                    felt[unit, :, axis] = force[unit] @ coefficients[1:4] / own
+    return felt, run
 
 
 def _white_error(readings: Readings, scale: Array, output: Array) -> Array:

@@ -18,7 +18,7 @@ from pipelines.tables import sound_lot
 from schemas.errors import DataRejected
 
 MODEL = ["bias", "scale", "misalignment"]
-DERIVED_LATER = {"felt", "memory"}
+DERIVED_LATER = {"felt", "output_run", "memory"}
 SURROUNDINGS = [
     row for row in RECORDED if row.column not in ("time_s", "power_off_s", "slot", "outer_deg", "inner_deg")
 ]
@@ -207,5 +207,5 @@ def test_every_recorded_quantity_is_in_the_state(lot):
 
 
 def test_every_field_of_the_state_is_a_recorded_quantity():
-    other = {"force", "felt", "covariates", "history", "memory"}
+    other = {"force", "felt", "output_run", "covariates", "history", "memory"}
     assert {item.name for item in fields(State)} == other | set(BY_ATTRIBUTE)

@@ -258,8 +258,10 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     for row in dwells.itertuples():  # a second implementation: K⁻¹(ã − b) with θ = T − 25
         theta = row.unit_C - 25.0
         b = [own[a, "bias", "K0"] + theta * own[a, "bias_temperature", "kT"] for a in "xyz"]
-        k = np.array([[own[a, "scale", "K1"] + theta * own[a, "scale_temperature", "aT"] if a == o
-                       else own[a, "misalignment", f"K{a}{o}"] for o in "xyz"] for a in "xyz"])  # fmt: skip
+        k = np.array(
+            [[own[a, "scale", "K1"] if a == o else own[a, "misalignment", f"K{a}{o}"] for o in "xyz"] for a in "xyz"]
+        )
+        k *= [[1.0 + theta * own[a, "scale_temperature", "aT"] / own[a, "scale", "K1"]] for a in "xyz"]
         force = np.linalg.solve(k, np.array([row.out_x, row.out_y, row.out_z]) - b)
         errors.append(1e6 * (np.linalg.norm(force) - np.linalg.norm([row.force_x, row.force_y, row.force_z])))
     np.testing.assert_allclose(c.adjustment.found_rms_ug, np.sqrt(np.mean(np.square(errors))), rtol=1e-6)

@@ -6,7 +6,7 @@ import pytest
 from inertial import poses
 from inertial.errors import NotIdentified
 from inertial.fits import linear
-from inertial.fits.linear import fit_lot
+from inertial.fits.linear import felt_force, fit_lot
 from inertial.fits.normal_equations import inverses
 from inertial.frames import force_from_angles
 from inertial.state import State
@@ -42,9 +42,10 @@ def test_units_in_pieces_are_the_units_alone(rng: np.random.Generator, weights: 
             one, other = getattr(fit, name)[unit], getattr(alone, name)
             np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
         theta, f = heat - 25.0, state.force
+        along = felt_force(f, out[unit], theta)
         for axis in range(3):
             j, k = (axis + 1) % 3, (axis + 2) % 3
-            columns = [np.ones(72), f[:, axis], f[:, j], f[:, k], theta, theta**2, theta * f[:, axis]]
+            columns = [np.ones(72), f[:, axis], f[:, j], f[:, k], theta, theta**2, theta * along[:, axis]]
             weight = 1.0 / error[unit, :, axis] if weighted else np.ones(72)
             plain = np.linalg.lstsq(np.array(columns).T * weight[:, None], out[unit, :, axis] * weight, rcond=None)[0]
             np.testing.assert_allclose(fit.coefficients[unit, axis], plain, rtol=1e-8, atol=1e-12)

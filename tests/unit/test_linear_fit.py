@@ -1,5 +1,7 @@
 """The batched fit against plain least squares, its refusals, and the correction that undoes it."""
 
+from dataclasses import replace
+
 import lots
 import numpy as np
 import pytest
@@ -48,9 +50,10 @@ def test_equals_lstsq_unit_by_unit_and_axis_by_axis(rng):
 def test_weights_equal_lstsq_of_weighted_rows(rng):
     state, output, *_ = state_and_output(rng)
     error = rng.uniform(1e-5, 5e-5, output.shape)
-    fit = fit_lot(THERMAL, state, output, error)
+    along = state.force[..., 0] + 0.004 * state.force[..., 1] - 0.002 * state.force[..., 2]
+    fit = fit_lot(THERMAL, replace(state, felt=np.repeat(along[..., None], 3, axis=-1)), output, error)
     f, theta = state.force[0], state.theta[0]
-    h = np.stack([np.ones(len(f)), f[:, 0], f[:, 1], f[:, 2], theta, theta * f[:, 0]], axis=1) / error[0, :, :1]
+    h = np.stack([np.ones(len(f)), f[:, 0], f[:, 1], f[:, 2], theta, theta * along[0]], axis=1) / error[0, :, :1]
     expected, *_ = np.linalg.lstsq(h, output[0, :, 0] / error[0, :, 0], rcond=None)
     np.testing.assert_allclose(fit.coefficients[0, 0], expected, rtol=1e-7, atol=1e-12)
     np.testing.assert_allclose(fit.covariance[0, 0], np.linalg.inv(h.T @ h), rtol=1e-6)

@@ -43,13 +43,11 @@ def noiseless(lot: Lot, scene: Scene, active: Active) -> Floats:
         if physics.stress is not None:
             force = physics.stress(scene, force, amplitude)
     warmth = (scene.temperature - REFERENCE_C)[..., None]
-    # The tempco of the gain acts along the fixture's axis: times the misalignment it would be a misalignment that moves with
-    # temperature, an effect of its own and many floors large.
-    seat = nominal_force(scene)
+    # what temperature changes is the gain of an axis, not where the axis points
     output = (
         lot.bias[:, None]
-        + lot.gain()[:, None] * force
-        + warmth * (lot.bias_tempco[:, None] + lot.scale_tempco[:, None] * seat)
+        + lot.gain()[:, None] * (1.0 + warmth * lot.scale_tempco[:, None]) * force
+        + warmth * lot.bias_tempco[:, None]
     )
     for physics, amplitude in active:
         if physics.signal is not None:
