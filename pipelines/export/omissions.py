@@ -26,7 +26,6 @@ _CUBE = np.array([corner for corner in product((-1.0, 0.0, 1.0), repeat=3) if an
 DIRECTIONS = _CUBE / np.linalg.norm(_CUBE, axis=1)[:, None]
 """The 26 directions (26, 3) of faces, edges and corners of a cube: specific forces of 1 g."""
 
-_OFF = 1.0 - np.eye(3)
 BIAS, BIAS_T = "bias", "temperature dependence of the bias"
 SCALE, SCALE_T = "scale", "temperature dependence of the scale"
 ACROSS, ACROSS_T = "misalignment", "temperature dependence of the misalignment"
@@ -51,20 +50,23 @@ def omitted(unit: UnitCalibration, parts: Sequence[str], nominal: float = 0.0) -
 
 
 def _without(unit: UnitCalibration, part: str, nominal: float) -> UnitCalibration:
-    bias, response = unit.bias.copy(), unit.response.copy()
+    bias, response = unit.bias.copy(), unit.response[0].copy()
+    # S(θ)·M, and what of the axes turns with temperature besides
+    gains = np.diagonal(unit.response[1:], axis1=1, axis2=2) / np.diag(response)
+    turned = unit.response[1:] - gains[..., None] * response
     if part == BIAS:
         bias[0] = 0.0
     elif part == BIAS_T:
         bias[1:] = 0.0
     elif part == SCALE:
-        response[0] += np.diag((nominal or float(np.mean(np.diag(response[0])))) - np.diag(response[0]))
+        response += np.diag((nominal or float(np.mean(np.diag(response)))) - np.diag(response))
     elif part == SCALE_T:
-        response[1:] *= _OFF
+        gains = np.zeros_like(gains)
     elif part == ACROSS:
-        response[0] *= np.eye(3)
+        response *= np.eye(3)
     else:
-        response[1:] *= np.eye(3)
-    return replace(unit, bias=bias, response=response)
+        turned = np.zeros_like(turned)
+    return replace(unit, bias=bias, response=np.concatenate([response[None], gains[..., None] * response + turned]))
 
 
 def comment_lines(parts: Sequence[tuple[str, float]], total_ug: float) -> list[str]:
