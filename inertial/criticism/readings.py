@@ -83,16 +83,22 @@ class Readings:
         return (self.output - model) / np.where(self.scale > 0.0, self.scale, 1.0)[:, None, None]
 
 
-def robust_fit(force: Array, output: Array) -> Array:
+def robust_fit(force: Array, output: Array, theta: Array | None = None) -> Array:
     """Bias and response (3, 4) that the majority of dwells agrees on: least squares reweighted by Tukey's biweight.
 
     Dwells are weighed by the norm of their residual over the three axes, so that a wrong pose loses all three together.
+
+    Parameters
+    ----------
+    theta : (n,), temperature above the reference, K: the slopes of all four over it are fitted too, and follow them, (3, 8)
     """
     there = np.isfinite(output).all(axis=-1)
-    x = np.concatenate([np.ones((int(there.sum()), 1)), force[there]], axis=-1)
-    y = output[there]
+    x = np.concatenate([np.ones((len(force), 1)), force], axis=-1)
+    if theta is not None:
+        x = np.concatenate([x, theta[:, None] * x], axis=-1)
+    x, y = x[there], output[there]
     weight = np.ones(len(y))
-    coefficients = np.zeros((4, 3))
+    coefficients = np.zeros((x.shape[1], 3))
     for turn in range(_ROUNDS):
         coefficients = np.linalg.lstsq(x * weight[:, None], y * weight[:, None], rcond=1e-9)[0].astype(np.float64)
         size = np.linalg.norm(y - x @ coefficients, axis=1)
@@ -103,7 +109,7 @@ def robust_fit(force: Array, output: Array) -> Array:
         weight = (
             np.sqrt(1.0 / np.maximum(size, 0.1 * middle)) if turn < 5 else _biweight(size / (_TUKEY * 1.5 * middle))
         )
-        if np.count_nonzero(weight) < 5:
+        if np.count_nonzero(weight) <= x.shape[1]:
             break
     return coefficients.T
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.criticism.problem import Lot
-from inertial.criticism.readings import Readings
+from inertial.criticism.readings import Readings, robust_fit
 from inertial.fits.linear import force_along_axes
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.state import State
@@ -207,6 +207,7 @@ def lot_of(measurement: Measured, like: Measured | None = None, *, square: bool 
     return Lot(state, np.where(there[..., None], output, 0.0), error, response, scale=scale)
 
 
+_COLUMNS = 8  # bias and response, and their slopes over temperature
 _WARM = 5.0
 """Range of temperature, K, from which on its linear terms are worth to be taken out of the force that a sensor answers to."""
 
@@ -214,7 +215,7 @@ _WARM = 5.0
 def _felt_with_temperature(measurement: Measured, response: Array, scale: Array) -> tuple[Array, Array | None]:
     """The force along the sensors' own axes, and what bias and scale add to the output by their run with temperature.
 
-    Both (units, n, 3), g. The scale's run acts along the sensor's own axis, whose direction is found with it in two passes; None
+    Both (units, n, 3), g. The axes are those at the reference temperature, by a fit that no wrong pose or bad dwell turns; no run
     where the temperature hardly changes.
     """
     state, readings = measurement.state, measurement.readings
@@ -224,16 +225,14 @@ def _felt_with_temperature(measurement: Measured, response: Array, scale: Array)
     run = np.zeros(readings.output.shape)
     force = np.broadcast_to(state.force, run.shape)
     for unit, theta in enumerate(np.broadcast_to(state.theta, run.shape[:2])):
+        x = np.concatenate([np.ones((len(theta), 1)), force[unit]], axis=-1)
         there = readings.there[unit]
-        for axis in range(3):
-            for _ in range(2):
-                linear = np.stack([theta, theta * felt[unit, :, axis]], axis=-1)
-                x = np.concatenate([np.ones((len(theta), 1)), force[unit], linear], axis=-1)
-                coefficients, _, rank, _ = np.linalg.lstsq(x[there], readings.output[unit, there, axis], rcond=1e-9)
-                run[unit, :, axis] = linear @ coefficients[-2:] / scale[unit, axis]
-                own = coefficients[1 + axis]
-                if own != 0.0 and rank == x.shape[1]:
-                    felt[unit, :, axis] = force[unit] @ coefficients[1:4] / own
+        if np.linalg.matrix_rank(np.concatenate([x, theta[:, None] * x], axis=-1)[there]) < _COLUMNS:
+            continue  # the poses of the soaks do not determine the axes and their gain's run
+        own = robust_fit(force[unit], readings.output[unit], theta)
+        felt[unit] = force_along_axes(own[:, 1:4], force[unit])
+        gain = np.diagonal(own[:, 5:]) / np.where(np.diagonal(own[:, 1:4]) == 0.0, 1.0, np.diagonal(own[:, 1:4]))
+        run[unit] = theta[:, None] * (own[:, 4] / scale[unit] + gain * felt[unit])
     return felt, run
 
 
