@@ -17,6 +17,8 @@ for _name in ("COLUMNS", "LINES"):
     # workers of pytest-xdist have those of a terminal; the output of the tests goes into pipes
     os.environ.pop(_name, None)
 
+pytest_plugins = ("left_open",)
+
 FOLDERS = ("unit", "property", "contract", "reference", "faults", "e2e", "blind")
 
 

@@ -20,7 +20,7 @@ from pipelines.tables.samples import PROCEDURE
 from pipelines.tables.summaries import summarised
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     import pandas as pd
 
@@ -113,11 +113,16 @@ def _verify(job: Job, run: Run) -> Tables:
     return verify_tables(_lot(run), coefficients, covariance, predictions)
 
 
-def _noise(job: Job, run: Run) -> Tables:
-    del job
+def static_inputs(run: Run) -> tuple[Iterable[pd.DataFrame], *tuple[pd.DataFrame, ...]]:
+    """The samples of the static record of a captured run, its readings, and the tables that calibrate it."""
     readings, *tables = (run.table(name) for name in ("readings", "coefficients", "covariance", "history"))
     static = set(readings.loc[readings["kind"] == "allan", "record"])
-    return noise(_records(run).samples(static), readings, *tables)
+    return _records(run).samples(static), readings, *tables
+
+
+def _noise(job: Job, run: Run) -> Tables:
+    del job
+    return noise(*static_inputs(run))
 
 
 _BUDGETED = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")

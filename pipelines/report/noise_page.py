@@ -1,4 +1,4 @@
-"""Allan deviation or spectrum of a record as a picture, and as one HTML page with its tables."""
+"""Allan deviation, another statistic or spectrum of a record as a picture, and as one HTML page with its tables."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ PAGE = """\
 <p class="lead">{{ document.source }} · {{ document.samples }} samples at {{ number(document.rate_hz) }} Hz</p>
 {{ picture | safe }}
 {% if document.terms %}
-<h2>Noise terms</h2>
+<h2>Noise terms of the Allan deviation</h2>
 <table>
 <tr><th>channel</th><th>term</th><th>name</th><th class="n">value</th>
 <th class="n">lower end</th><th class="n">upper end or limit</th><th>unit</th></tr>
@@ -104,7 +104,8 @@ def draw(document: dict[str, Any], ending: str) -> bytes:
 def noise_page(document: dict[str, Any]) -> str:
     """One HTML page that needs no other file."""
     svg = draw(document, ".svg").decode()
-    title = "Power spectral density" if "spectra" in document else "Allan deviation"
+    name = document.get("statistic_name", "")
+    title = "Power spectral density" if "spectra" in document else name[:1].upper() + name[1:]
     return fill(
         PAGE,
         title=title,
@@ -126,7 +127,7 @@ def _colour(name: str, place: int) -> str:
 
 
 def _curves(place: Axes, document: dict[str, Any]) -> None:
-    """Every curve with its intervals, and the mixture of terms that explains it."""
+    """Every curve with the intervals it has, and the mixture of terms that explains it."""
     for k, curve in enumerate(document["curves"]):
         tau, deviation = np.array(curve["tau_s"]), np.array(curve["deviation"])
         bars = np.abs(np.stack([deviation - curve["low"], np.array(curve["high"]) - deviation]))
@@ -144,7 +145,8 @@ def _curves(place: Axes, document: dict[str, Any]) -> None:
         )
         if curve["fitted"] is not None:
             place.plot(tau, curve["fitted"], "-", color=colour, linewidth=1.4)
-    place.set(xlabel="averaging time τ / s", ylabel=f"Allan deviation / {document['unit'] or 'unit of the record'}")
+    unit = document["deviation_unit"] or "unit of the record"
+    place.set(xlabel="averaging time τ / s", ylabel=f"{document['statistic_name']} / {unit}")
 
 
 def _spectra(place: Axes, document: dict[str, Any]) -> None:

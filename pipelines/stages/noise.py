@@ -55,9 +55,47 @@ def noise(
     ----------
     history : temperatures between the dwells; nothing is subtracted if None
     """
+    record = static_record(samples, readings, coefficients, covariance, history)
+    if record is None:
+        return _nothing()
+    channels, rate, size = record.channels, record.rate_hz, record.size
+    curves, rows = list[pd.DataFrame](), list[tuple[object, ...]]()
+    for group in alike(channels):
+        curve = overlapping(np.stack([one.record for one in group]), rate / size)
+        terms = limits_where_unexplained(curve, fit_terms(curve))
+        terms = without_digits(terms, [one.digits for one in group], rate)
+        curves.append(_curve_rows(group, curve, terms))
+        rows += [row for place, one in enumerate(group) for row in _term_rows(one, terms, place)]
+        rows += [row for one in group for row in _stability_row(one, rate / size)]
+    rows += [row for one in channels if one.silent for row in _silent_rows(one)]
+    order = {(one.unit, one.axis): place for place, one in enumerate(channels)}
+    rows.sort(key=lambda row: order[str(row[0]), str(row[1])])
+    return {
+        "allan": _sorted(pd.concat(curves, ignore_index=True), order) if curves else _nothing()["allan"],
+        "noise": pd.DataFrame(rows, columns=TERM_COLUMNS),
+    }
+
+
+@dataclass(frozen=True)
+class StaticRecord:
+    """The static record of a run; ``size`` : samples, at ``rate_hz``, of which each value of the channels is the mean."""
+
+    channels: list[StaticChannel]
+    rate_hz: float
+    size: int
+
+
+def static_record(
+    samples: Iterable[pd.DataFrame],
+    readings: pd.DataFrame,
+    coefficients: pd.DataFrame,
+    covariance: pd.DataFrame,
+    history: pd.DataFrame | None = None,
+) -> StaticRecord | None:
+    """The channels of every calibrated unit; None where no record was taken or no unit is calibrated."""
     static = readings[(readings["kind"] == "allan") & (readings["status"] == "ok")]
     if static.empty or coefficients.empty:
-        return _nothing()
+        return None
     calibration = read_calibration(coefficients, covariance)
     records = set(static["record"])
     size = -(-int(static.loc[static["unit"].isin(calibration.units), "n"].max()) // MOST_SAMPLES)
@@ -72,25 +110,11 @@ def noise(
         for unit in calibration.units
         for channel in _channels(series, calibration, unit, static[static["unit"] == unit], rate, history)
     ]
-    curves, rows = list[pd.DataFrame](), list[tuple[object, ...]]()
-    for group in _alike(channels):
-        curve = overlapping(np.stack([one.record for one in group]), rate / series.size)
-        terms = limits_where_unexplained(curve, fit_terms(curve))
-        terms = without_digits(terms, [one.digits for one in group], rate)
-        curves.append(_curve_rows(group, curve, terms))
-        rows += [row for place, one in enumerate(group) for row in _term_rows(one, terms, place)]
-        rows += [row for one in group for row in _stability_row(one, rate / series.size)]
-    rows += [row for one in channels if one.silent for row in _silent_rows(one)]
-    order = {(one.unit, one.axis): place for place, one in enumerate(channels)}
-    rows.sort(key=lambda row: order[str(row[0]), str(row[1])])
-    return {
-        "allan": _sorted(pd.concat(curves, ignore_index=True), order) if curves else _nothing()["allan"],
-        "noise": pd.DataFrame(rows, columns=TERM_COLUMNS),
-    }
+    return StaticRecord(channels, rate, series.size)
 
 
 @dataclass(frozen=True)
-class _Channel:
+class StaticChannel:
     """One axis of one unit: its record (n,) in µg without the response to its temperature, or the reason why there is none."""
 
     unit: str
@@ -108,7 +132,7 @@ def _channels(
     static: pd.DataFrame,
     rate: float,
     history: pd.DataFrame | None,
-) -> list[_Channel]:
+) -> list[StaticChannel]:
     output = series.of(unit)
     scale = np.diagonal(calibration.response[calibration.units.index(unit)]) / MICRO
     if len(static):
@@ -118,7 +142,7 @@ def _channels(
     else:
         warm = Warmed(np.zeros_like(output), float("nan"), known=True)
     return [
-        _Channel(
+        StaticChannel(
             unit=unit,
             axis=letter,
             record=(output[:, axis] - warm.change[:, axis]) / scale[axis],
@@ -151,7 +175,7 @@ def _why_silent(values: np.ndarray) -> str:
     return ""
 
 
-def _alike(channels: list[_Channel]) -> list[list[_Channel]]:
+def alike(channels: list[StaticChannel]) -> list[list[StaticChannel]]:
     """The usable channels, grouped by length of record."""
     lengths = dict.fromkeys(len(one.record) for one in channels if not one.silent)
     return [[one for one in channels if not one.silent and len(one.record) == length] for length in lengths]
@@ -185,7 +209,7 @@ def limits_where_unexplained(curve: AllanCurve, terms: NoiseTerms) -> NoiseTerms
     )
 
 
-def _curve_rows(channels: list[_Channel], curve: AllanCurve, terms: NoiseTerms) -> pd.DataFrame:
+def _curve_rows(channels: list[StaticChannel], curve: AllanCurve, terms: NoiseTerms) -> pd.DataFrame:
     c, t = (i.ravel() for i in np.indices(curve.deviation.shape))
     return pd.DataFrame(
         {
@@ -206,7 +230,7 @@ def _fitted(curve: AllanCurve, terms: NoiseTerms) -> np.ndarray:
     return np.where(explained, model_deviation(terms, curve.tau), np.nan)
 
 
-def _term_rows(channel: _Channel, terms: NoiseTerms, place: int) -> list[tuple[object, ...]]:
+def _term_rows(channel: StaticChannel, terms: NoiseTerms, place: int) -> list[tuple[object, ...]]:
     rows = list[tuple[object, ...]]()
     for symbol, term in terms.one(place).items():
         value = np.nan if term.value is None else term.value
@@ -221,14 +245,14 @@ def _term_rows(channel: _Channel, terms: NoiseTerms, place: int) -> list[tuple[o
     return [*rows, (channel.unit, channel.axis, B_BOUND, np.nan, 0.0, bound, False, "µg", "")]
 
 
-def _stability_row(channel: _Channel, rate: float) -> list[tuple[object, ...]]:
+def _stability_row(channel: StaticChannel, rate: float) -> list[tuple[object, ...]]:
     """The bias stability over the last hour of the record; none where it is shorter."""
     stability = bias_stability(channel.record, rate)
     where = (channel.unit, channel.axis, TERM)
     return [] if stability is None else [(*where, *stability, True, "µg", channel.warmth)]
 
 
-def _silent_rows(channel: _Channel) -> list[tuple[object, ...]]:
+def _silent_rows(channel: StaticChannel) -> list[tuple[object, ...]]:
     """Rows of an unusable channel: no value, no limit, and the reason."""
     units = {"Q": "µg·s", "N": "µg/√Hz", N_ONE_SIDED: "µg/√Hz", "B": "µg", "K": "µg/√s", "R": "µg/s", B_BOUND: "µg"}
     return [

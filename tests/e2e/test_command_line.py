@@ -56,6 +56,18 @@ def test_list_show_and_report_find_the_run(archive: Path) -> None:
     assert ask(archive, "report")["report"].endswith("report.html")
 
 
+def test_every_statistic_of_the_static_record_of_a_run_is_made_from_its_samples(archive: Path) -> None:
+    usual = ask(archive, "allan", "latest")
+    total = ask(archive, "allan", "latest", "--statistic", "total")
+    assert (total["statistic"], total["deviation_unit"], usual["deviation_unit"]) == ("total", "µg", "µg")
+    assert [curve["channel"] for curve in total["curves"]] == [curve["channel"] for curve in usual["curves"]]
+    assert total["terms"] == usual["terms"]
+    for mine, own in zip(total["curves"], usual["curves"], strict=True):
+        # at one sample the total deviation has two more differences than the Allan deviation, and no other
+        assert mine["deviation"][0] == pytest.approx(own["deviation"][0], rel=0.01)
+    assert ask(archive, "allan", "latest", "--statistic", "mtie")["deviation_unit"] == "m/s"
+
+
 def test_show_prints_a_table(archive: Path) -> None:
     rows = ask(archive, "show", "latest", "coefficients")["rows"]
     assert rows[0]["effect"] == "bias"

@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import allantools
 import numpy as np
 import pandas as pd
 import pytest
@@ -49,7 +50,6 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_deviations_are_those_of_allantools(record: Path) -> None:
-    allantools = pytest.importorskip("allantools")
     allan = document("allan", record, "--time", "t", "--unit", "g")
     table = pd.read_csv(record)
     assert allan["samples"] == 40_000
@@ -85,6 +85,47 @@ def test_the_density_gives_the_deviation_and_the_level_of_white_noise(record: Pa
     assert spectrum["median_amplitude"] == pytest.approx(N * np.sqrt(2.0), rel=0.03)
     np.testing.assert_allclose(spectrum["deviation_from_density"], spectrum["deviation"], rtol=0.15)
     np.testing.assert_allclose(spectrum["deviation"], N / np.sqrt(spectrum["tau_s"]), rtol=0.15)
+
+
+@pytest.mark.parametrize(
+    ("statistic", "peer", "factor", "unit"),
+    [
+        ("modified", "mdev", 1.0, "g"),
+        ("hadamard", "ohdev", 1.0, "g"),
+        ("total", "totdev", 1.0, "g"),
+        ("time", "tdev", 9.80665, "m/s"),
+        ("tie", "tierms", 9.80665, "m/s"),
+        ("mtie", "mtie", 9.80665, "m/s"),
+    ],
+)
+def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have_one(
+    record: Path, tmp_path: Path, statistic: str, peer: str, factor: float, unit: str
+) -> None:
+    words = ("allan", record, "--time", "t", "--unit", "g", "--statistic", statistic, "--columns", "ax")
+    found = document(*words, "--plot", tmp_path / "a.png", "--page", tmp_path / "a.html")
+    assert (found["statistic"], found["deviation_unit"]) == (statistic, unit)
+    curve = found["curves"][0]
+    values = pd.read_csv(record)["ax"].to_numpy()
+    expected = getattr(allantools, peer)(values, rate=RATE, data_type="freq", taus=np.array(curve["tau_s"]))[1]
+    np.testing.assert_allclose(curve["deviation"], factor * expected, rtol=1e-9)
+    if statistic in {"tie", "mtie"}:
+        assert set(curve["low"]) == {None}
+    else:
+        assert all(
+            low < value < high
+            for low, value, high in zip(*(curve[k] for k in ("low", "deviation", "high")), strict=True)
+        )
+    name = found["statistic_name"]
+    assert f"<h1>{name[0].upper()}{name[1:]}</h1>" in (tmp_path / "a.html").read_text(encoding="utf-8")
+    printed = run(*words).stdout
+    assert name.split()[0] in printed
+    assert ("no interval" in printed) == (statistic in {"tie", "mtie"})
+
+
+def test_a_statistic_that_does_not_exist_is_refused_with_the_nearest(record: Path) -> None:
+    message = refused("allan", record, "--time", "t", "--statistic", "hadamart")
+    assert "--statistic: found 'hadamart', one of allan, modified, hadamard" in message
+    assert "did you mean hadamard" in message
 
 
 def test_plots_and_pages_are_written(record: Path, tmp_path: Path) -> None:

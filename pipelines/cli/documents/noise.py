@@ -8,14 +8,17 @@ from typing_extensions import TypedDict
 
 
 class AllanChannel(TypedDict):
-    """The overlapping Allan deviation of a channel."""
+    """The overlapping Allan deviation, or another statistic, of a channel."""
 
     channel: str
     tau_s: list[float]
-    deviation: Annotated[list[float], "in `unit`"]
-    low: list[float]
-    high: list[float]
-    fitted: Annotated[list[float] | None, "deviation of the fitted terms; null: no mixture explains the curve"]
+    deviation: Annotated[list[float], "in `deviation_unit`"]
+    low: Annotated[list[float | None], "null: no interval"]
+    high: Annotated[list[float | None], "null: no interval"]
+    fitted: Annotated[
+        list[float] | None,
+        "Allan deviation of the fitted terms; null: no mixture explains the curve, or another statistic",
+    ]
 
 
 class NoiseTermRow(TypedDict):
@@ -32,16 +35,19 @@ class NoiseTermRow(TypedDict):
 
 
 class AllanDocument(TypedDict):
-    """``allan --json``: the overlapping Allan deviation of a record and its noise terms."""
+    """``allan --json``: the overlapping Allan deviation of a record, or another statistic, and the noise terms."""
 
     source: str
     unit: Annotated[str, "of the output; empty if not given"]
     rate_hz: float
     samples: int
+    statistic: Literal["allan", "modified", "hadamard", "total", "time", "tie", "mtie"]
+    statistic_name: str
+    deviation_unit: Annotated[str, "m/s, or `unit`·s, for `time`, `tie` and `mtie`; `unit` for the others"]
     confidence: Annotated[float, "of the intervals of the curve"]
     term_confidence: Annotated[float, "of the intervals and limits of the terms"]
     curves: list[AllanChannel]
-    terms: list[NoiseTermRow]
+    terms: Annotated[list[NoiseTermRow], "of the overlapping Allan deviation"]
     notes: list[str]
 
 

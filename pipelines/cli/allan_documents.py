@@ -1,0 +1,177 @@
+"""What ``allan`` prints: curves and noise terms of a series or a captured run, in the order of the document."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from inertial.noise.allan import CONFIDENCE, overlapping
+from inertial.noise.terms import NAMES, fit_terms, model_deviation
+from pipelines.chain.chain import static_inputs
+from pipelines.importers.series import EvenSeries
+from pipelines.stages.noise import FEWEST, UNEXPLAINED_P, alike, limits_where_unexplained, static_record
+from pipelines.tables.frames import rows_of
+from schemas.errors import DataRejected, WrongUse
+
+if TYPE_CHECKING:
+    from inertial.noise.terms import NoiseTerms
+    from pipelines.archive import Run
+
+    Array = np.ndarray
+
+ALLAN = {"statistic": "allan", "statistic_name": "overlapping Allan deviation"}
+
+
+def allan_document(series: EvenSeries, spacing: str = "octave", statistic: str = "allan") -> dict[str, Any]:
+    """Curves and terms of every channel of a series.
+
+    Raises
+    ------
+    DataRejected
+        The record is too short, or no channel changes.
+    """
+    n = series.values.shape[1]
+    if n < FEWEST:
+        raise DataRejected(f"{series.where}: {n} samples, {FEWEST} are needed for five terms; record longer")
+    alive = [k for k in range(len(series.names)) if np.ptp(series.values[k]) > 0.0]
+    if not alive:
+        raise DataRejected(
+            f"{series.where}: no channel ever changes, noise is needed; check the channels and the digits"
+        )
+    curve = overlapping(series.values[alive], series.rate_hz, "decade" if spacing == "decade" else "octave")
+    fitted = fit_terms(curve)
+    terms = limits_where_unexplained(curve, fitted)
+    explained = fitted.p_value >= UNEXPLAINED_P
+    names = [series.names[k] for k in alive]
+    notes = [f"{series.names[k]}: the output never changes" for k in range(len(series.names)) if k not in alive]
+    notes += [
+        f"{name}: no mixture of the five terms explains the curve; the limits are what the whole curve allows"
+        for name, known in zip(names, explained, strict=True)
+        if not known
+    ]
+    shown, unit, about, model = curve, series.unit, ALLAN, model_deviation(terms, curve.tau)
+    if statistic != ALLAN["statistic"]:
+        from pipelines.stages.deviations import STATISTICS, deviations
+
+        kind = STATISTICS[statistic]
+        shown = deviations(kind, series.values[alive], series.unit, curve, fitted, explained=explained)
+        unit, about, model = shown.unit, {"statistic": statistic, "statistic_name": kind.name}, None
+    return {
+        "source": series.where,
+        "unit": series.unit,
+        "rate_hz": series.rate_hz,
+        "samples": n,
+        **about,
+        "deviation_unit": unit,
+        "confidence": curve.confidence,
+        "term_confidence": terms.confidence,
+        "curves": [
+            {
+                "channel": name,
+                "tau_s": shown.tau.tolist(),
+                "deviation": shown.deviation[k].tolist(),
+                "low": shown.low[k].tolist(),
+                "high": shown.high[k].tolist(),
+                "fitted": model[k].tolist() if model is not None and explained[k] else None,
+            }
+            for k, name in enumerate(names)
+        ],
+        "terms": [row for k, name in enumerate(names) for row in _term_rows(name, terms, k, series.unit)],
+        "notes": notes,
+    }
+
+
+def _term_rows(channel: str, terms: NoiseTerms, place: int, unit: str) -> list[dict[str, Any]]:
+    return [
+        {
+            "channel": channel, "term": symbol, "name": term.name, "value": term.value, "low": term.low,
+            "high": term.high, "identified": term.identified, "unit": term.unit.format(unit or "unit"),
+        }
+        for symbol, term in terms.one(place).items()
+    ]  # fmt: skip
+
+
+def allan_of_run(run: Run) -> dict[str, Any]:
+    """Curves and terms that a captured run has of its static record, in µg, the channels named unit and axis.
+
+    Raises
+    ------
+    WrongUse
+        The run has none.
+    """
+    if not {"allan", "noise"} <= set(run.tables()) or run.table("allan").empty:
+        raise WrongUse(
+            f"run {run.id}: it has no static record, one is needed; run a recipe with static_record_s above 0"
+        )
+    curves, noise = run.table("allan"), run.table("noise")
+    readings = run.table("readings")
+    static = readings[readings["kind"] == "allan"]
+    channels = []
+    for (unit, axis), own in curves.groupby(["unit", "axis"], sort=False):
+        columns = ("tau_s", "deviation_ug", "low_ug", "high_ug")
+        tau, deviation, low, high = (own[name].tolist() for name in columns)
+        fitted = own["fitted_ug"].tolist() if own["fitted_ug"].notna().all() else None
+        channels.append(
+            {
+                "channel": f"{unit} {axis}",
+                "tau_s": tau,
+                "deviation": deviation,
+                "low": low,
+                "high": high,
+                "fitted": fitted,
+            }
+        )
+    rows = [
+        {
+            "channel": f"{row['unit']} {row['axis']}", "term": row["term"], "name": NAMES[row["term"]],
+            "value": row["value"] if row["identified"] else None, "low": row["low"], "high": row["high"],
+            "identified": bool(row["identified"]), "unit": row["unit_text"],
+        }
+        for row in rows_of(noise) if row["term"] in NAMES
+    ]  # fmt: skip
+    notes = list(dict.fromkeys(f"{r['unit']} {r['axis']}: {r['note']}" for r in rows_of(noise) if r.get("note")))
+    return {
+        "source": f"run {run.id}",
+        "unit": "µg",
+        "rate_hz": float(static["rate_hz"].iloc[0]),
+        "samples": int(static["n"].max()),
+        **ALLAN,
+        "deviation_unit": "µg",
+        "confidence": CONFIDENCE,
+        "term_confidence": 0.95,
+        "curves": channels,
+        "terms": rows,
+        "notes": notes,
+    }
+
+
+def statistic_of_run(run: Run, spacing: str, statistic: str) -> dict[str, Any]:
+    """Another statistic of the static record of a captured run, made from its samples; the terms are those of the run.
+
+    Raises
+    ------
+    WrongUse
+        The run has no static record.
+    """
+    document = allan_of_run(run)
+    record = static_record(*static_inputs(run))
+    assert record is not None
+    parts = [
+        allan_document(
+            EvenSeries(
+                tuple(f"{one.unit} {one.axis}" for one in channels),
+                np.stack([one.record for one in channels]),
+                record.rate_hz / record.size,
+                "µg",
+                document["source"],
+            ),
+            spacing,
+            statistic,
+        )
+        for channels in alike(record.channels)
+    ]
+    if record.size > 1:
+        document["notes"].append(f"the record is averaged over {record.size} samples before the statistic is made")
+    shown = {key: parts[0][key] for key in ("statistic", "statistic_name", "deviation_unit")}
+    return {**document, **shown, "curves": [curve for part in parts for curve in part["curves"]]}

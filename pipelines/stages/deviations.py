@@ -1,0 +1,209 @@
+"""Other statistics of an Allan record: modified, Hadamard, total and time deviation, TIE and MTIE.
+
+Values and degrees of freedom are those of allantools, except of MTIE. The overlapping Allan deviation is not among them: see
+docs/decisions/statistics-of-records.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import allantools
+import numpy as np
+from allantools import ci
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from inertial.distributions import chi2_quantile
+from inertial.noise.allan import CONFIDENCE
+from inertial.noise.flicker import FLICKER_FLOOR
+from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from inertial.noise.allan import AllanCurve
+    from inertial.noise.terms import NoiseTerms
+
+    Array = NDArray[np.float64]
+
+POWER = {"Q": 2, "N": 0, "B": -1, "K": -2}
+"""Exponent α of the frequency in the density of each noise term, as the degrees of freedom need it; a ramp is no noise."""
+
+TOTAL_BIAS = {0: 0.0, -1: 1.0 / (3.0 * np.log(2.0)), -2: 0.75}
+"""a of the total variance by α: its expectation is smaller than the Allan variance by 1 − a·τ/T, T the length of the record
+(Greenhall, Howe and Percival, IEEE Trans. UFFC 46 (1999) 1183; NIST SP 1065, 5.2.11)."""
+
+TABLED = 8
+"""Samples of an averaging time from which the table of degrees of freedom of the total variance holds: for white noise at one
+sample it gives 1.5·n, the differences have n/1.5 (coverage of the interval 0.50 instead of 0.68)."""
+
+M_S2 = {"g": STANDARD_GRAVITY_M_S2, "mg": STANDARD_GRAVITY_M_S2 / 1e3, "µg": STANDARD_GRAVITY_M_S2 / MICRO, "m/s²": 1.0}
+"""m/s² in the units of an output whose integral is a velocity in m/s."""
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """A statistic of a record of an output.
+
+    Parameters
+    ----------
+    compute : deviations (t,) of a record (n,) at a rate (Hz) and averaging times (t,) samples; unit of the output, or of its
+        integral if ``integral``
+    parts : shortest record, in averaging times
+    freedom : degrees of freedom of the variance at α, m and n; None: the statistic has no interval
+    bias : expectation of the variance over the one that it estimates, at α and m/n
+    sees_ramp : whether a ramp of the output is part of the deviation
+    """
+
+    name: str
+    compute: Callable[[Array, float, Array], Array]
+    parts: int = 3
+    freedom: Callable[[int, int, int], float] | None = None
+    bias: Callable[[int, float], float] = lambda *_: 1.0
+    integral: bool = False
+    sees_ramp: bool = True
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """A statistic of records (c, n): times (t,) s; deviation and ends of its interval (c, t), NaN where there is no interval."""
+
+    tau: Array
+    deviation: Array
+    low: Array
+    high: Array
+    unit: str
+
+
+def _of_allantools(name: str) -> Callable[[Array, float, Array], Array]:
+    """A deviation of allantools; the averaging times it gets are those it returns."""
+
+    def compute(record: Array, rate_hz: float, m: Array) -> Array:
+        return np.asarray(getattr(allantools, name)(record, rate=rate_hz, data_type="freq", taus=m / rate_hz)[1])
+
+    return compute
+
+
+def _mtie(record: Array, rate_hz: float, m: Array) -> Array:
+    """Largest range of the integral in any window of m steps: allantools.mtie, which visits every sample of every window."""
+    phase = np.concatenate([[0.0], np.cumsum(record - record.mean()) / rate_hz])
+    out = np.empty(m.size)
+    for i, size in enumerate(int(steps) + 1 for steps in m):
+        inside = slice(size // 2, phase.size - (size - 1 - size // 2))
+        out[i] = np.max(maximum_filter1d(phase, size)[inside] - minimum_filter1d(phase, size)[inside])
+    return out
+
+
+def _modified_freedom(alpha: int, m: int, n: int) -> float:
+    return ci.edf_greenhall(alpha, 2, m, n + 1, overlapping=True, modified=True)
+
+
+def _hadamard_freedom(alpha: int, m: int, n: int) -> float:
+    return ci.edf_greenhall(alpha, 3, m, n + 1, overlapping=True, modified=False)
+
+
+def _total_freedom(alpha: int, m: int, n: int) -> float:
+    """Known for α = 0, −1 and −2 only. At a few samples the total variance is the Allan variance."""
+    if alpha not in TOTAL_BIAS:
+        return np.nan
+    return ci.edf_greenhall(alpha, 2, m, n + 1, overlapping=True) if m < TABLED else ci.edf_totdev(n, m, alpha)
+
+
+STATISTICS = {
+    "modified": Statistic("modified Allan deviation", _of_allantools("mdev"), 4, _modified_freedom),
+    "hadamard": Statistic(
+        "overlapping Hadamard deviation", _of_allantools("ohdev"), 4, _hadamard_freedom, sees_ramp=False
+    ),
+    "total": Statistic(
+        "total deviation",
+        _of_allantools("totdev"),
+        freedom=_total_freedom,
+        bias=lambda alpha, share: 1.0 - TOTAL_BIAS.get(alpha, 0.0) * share,
+    ),
+    "time": Statistic("time deviation", _of_allantools("tdev"), 4, _modified_freedom, integral=True),
+    "tie": Statistic("RMS time interval error", _of_allantools("tierms"), integral=True),
+    "mtie": Statistic("maximum time interval error", _mtie, integral=True),
+}
+
+
+def deviations(
+    statistic: Statistic,
+    records: Array,
+    unit: str,
+    curve: AllanCurve,
+    terms: NoiseTerms,
+    *,
+    explained: NDArray[np.bool_],
+) -> Deviations:
+    """A statistic of records, at the averaging times of their Allan curve that it allows.
+
+    The intervals (68.27 %) have the degrees of freedom of the noise term that is largest at each averaging time. There is none
+    where a ramp is the largest, where no mixture explains the curve, and where no degrees of freedom are known.
+
+    Parameters
+    ----------
+    records : (c, n), in ``unit``; the mean of each is taken out before it is integrated
+    curve, terms : of the same records
+    explained : (c,) whether the terms explain the curve
+    """
+    m = curve.m[statistic.parts * curve.m <= curve.n]
+    tau = m / curve.rate_hz
+    raw = np.stack([statistic.compute(record, curve.rate_hz, m.astype(np.float64)) for record in records])
+    relative = np.stack(
+        [
+            _interval(statistic, _largest(terms.mixture[k], tau, statistic), m, curve.n)
+            if explained[k]
+            else np.full((2, m.size), np.nan)
+            for k in range(len(records))
+        ]
+    )
+    factor, unit = _integrated(unit) if statistic.integral else (1.0, unit)
+    value = factor * raw
+    return Deviations(tau, value, value * relative[:, 0], value * relative[:, 1], unit)
+
+
+def _integrated(unit: str) -> tuple[float, str]:
+    """Factor and unit of an integral over time: m/s where the output is an acceleration."""
+    return (M_S2[unit], "m/s") if unit in M_S2 else (1.0, f"{unit or 'unit'}·s")
+
+
+def _largest(mixture: Array, tau: Array, statistic: Statistic) -> list[int | None]:
+    """α of the term with the largest share of the Allan variance at each averaging time; None for a ramp."""
+    q, n, b, k, r = mixture[:, None]
+    ramp = r**2 * tau**2 / 2.0 if statistic.sees_ramp else np.zeros_like(tau)
+    shares = np.stack(
+        [3.0 * q**2 / tau**2, n**2 / tau, np.broadcast_to((FLICKER_FLOOR * b) ** 2, tau.shape), k**2 * tau / 3.0, ramp]
+    )
+    powers = [*POWER.values(), None]
+    return [powers[place] for place in np.argmax(shares, axis=0)]
+
+
+def _interval(statistic: Statistic, powers: list[int | None], m: NDArray[np.int64], n: int) -> Array:
+    """Ends (2, t) of the interval over the deviation."""
+    rows = [
+        (np.nan, 1.0) if alpha is None else (_freedom(statistic, alpha, int(k), n), statistic.bias(alpha, int(k) / n))
+        for alpha, k in zip(powers, m, strict=True)
+    ]
+    freedom, bias = np.array(rows).T
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    known = np.isfinite(freedom)
+    out = np.full((2, m.size), np.nan)
+    for row, p in zip(out, (1.0 - tail, tail), strict=True):
+        row[known] = np.sqrt(freedom[known] / (bias[known] * chi2_quantile(p, freedom[known])))
+    return out
+
+
+@lru_cache(maxsize=512)
+def _freedom(statistic: Statistic, alpha: int, m: int, n: int) -> float:
+    """Degrees of freedom; NaN where the formulas have no case."""
+    if statistic.freedom is None:
+        return np.nan
+    try:
+        return float(statistic.freedom(alpha, m, n))
+    except NotImplementedError:
+        # white noise of the integral, and few windows: allantools lacks that formula of Greenhall and Riley
+        return np.nan
