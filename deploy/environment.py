@@ -71,13 +71,13 @@ def set_up(name: str, folder: Path, *, asked: bool = False) -> None:
     lock = ROOT / f"requirements-{name}.lock"
     why = wrong_with(folder, asked=asked)
     if why:
-        _say(f"{folder.name}: {why}; it is made anew")
+        _say(f"{folder.relative_to(ROOT)}: {why}; it is made anew")
         shutil.rmtree(folder)
     if not why and any(_is_current(folder, one) for one in (name, *HELD_BY.get(name, ()))):
         return
-    count = len(re.findall(r"^\w", lock.read_text(encoding="utf-8"), re.MULTILINE))
+    python = f"Python {platform.python_version()}"
     _say(
-        f"installing {count} packages of {lock.name} into {folder.name} with Python {platform.python_version()}: about a minute"
+        f"installing the libraries of {lock.name} into {folder.relative_to(ROOT)} with {python}: it takes about a minute"
     )
     begun = time.monotonic()
     if not folder.is_dir():

@@ -54,17 +54,18 @@ def release(folder: Path) -> list[Path]:
     if folder.is_dir():
         shutil.rmtree(folder)
     wheel, source = build(folder)
-    lock = folder / LOCK.name
-    shutil.copyfile(LOCK, lock)
+    locks = [folder / name for name in (LOCK.name, "requirements-all.lock")]
+    for lock in locks:
+        shutil.copyfile(ROOT / lock.name, lock)
     project = project_of(ROOT)
-    sums = {path.name: _sha256(path) for path in (wheel, source, lock)}
+    sums = {path.name: _sha256(path) for path in (wheel, source, *locks)}
     bom = folder / f"{project['name']}-{project['version']}.cdx.json"
     content = bill(LOCK.read_text(encoding="utf-8"), project, release_time(), sums)
     bom.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     sums[bom.name] = _sha256(bom)
     listed = folder / SUMS
     listed.write_text("".join(f"{value}  {name}\n" for name, value in sums.items()), encoding="utf-8")
-    return [wheel, source, lock, bom, listed]
+    return [wheel, source, *locks, bom, listed]
 
 
 def _run(tree: Path, hook: str, folder: Path) -> str:
