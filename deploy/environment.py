@@ -26,7 +26,7 @@ OF_ANOTHER = {"crate"}
 
 PROBE = "import importlib.util as u, sys; print(*sys.version_info[:2], sep='.') if u.find_spec('pip') else sys.exit(1)"
 UNREACHED = r"(?:Retrying \(|Max retries exceeded|name resolution|[Cc]onnection ?(?:Error|refused|reset)|timed out)"
-COLLECTED = re.compile(r"^(?:Collecting|Processing|Building wheels? for collected packages:?) (\S+)", re.MULTILINE)
+COLLECTED = re.compile(r"^(?:Collecting|Processing) (\S+)", re.MULTILINE)
 FAILURES = (
     (
         re.compile(r"DO NOT MATCH THE HASHES.*?\n\s+(?P<name>\S+) from ", re.DOTALL),
@@ -39,7 +39,7 @@ FAILURES = (
         "free 2 GB and try again",
     ),
     (
-        re.compile(r"Failed (?:to build|building wheel for)\D*?'?(?P<name>[\w.-]+)|to build wheel did not run"),
+        re.compile(r"Failed building wheel for (?P<name>\S+)|Failed to build|to build wheel did not run"),
         "there is no wheel for {system}, and it cannot be built here",
         "take a Python of 3.11 to 3.14 with PYTHON=…, on a system that the library has wheels for",
     ),
@@ -128,7 +128,7 @@ def reason(text: str, lock: Path, folder: Path) -> str:
         "python": folder / "bin" / "python",
         "system": f"Python {platform.python_version()} on {platform.system()} {platform.machine()}",
     }
-    collected = COLLECTED.findall(text) or ["pip"]
+    collected = [one.rpartition("/")[2] for one in COLLECTED.findall(text)] or ["pip"]
     for pattern, found, remedy in FAILURES:
         hit = pattern.search(text)
         if hit is not None:
