@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import traceback
 from pathlib import Path
@@ -34,6 +35,17 @@ def not_installed(problem: BaseException | None) -> str | None:
         return None
     lines = str(problem).strip().splitlines()
     found = "is not installed" if missing else f"cannot be loaded ({lines[0] if lines else 'no reason is given'})"
+    return to_complete(library, found)
+
+
+def missing_in(log: str) -> str | None:
+    """The same for the output of a process of this environment; None where it names no missing library."""
+    names = re.findall(r"^ModuleNotFoundError: No module named '([\w]+)", log, re.MULTILINE)
+    return to_complete(names[-1], "is not installed") if names and names[-1] not in _OWN else None
+
+
+def to_complete(library: str, found: str) -> str:
+    """The line about a library: what is wrong with it, and the call that installs what the lock has."""
     lock = shipped(LOCK)
     words = f"--no-deps --require-hashes -r {lock}" if lock is not None else "tumbleline"
     return (

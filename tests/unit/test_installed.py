@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from pipelines.flows import local
 from pipelines.workbench.services import work
+from schemas.errors import TumblelineError
 from schemas.installed import not_installed
 
 START = "import sys; sys.modules[{missing!r}] = None; sys.argv[0] = 'tumbleline'; from pipelines.__main__ import main; main()"
@@ -89,3 +91,29 @@ def test_work_of_the_workbench_says_it_too(
     assert state == "failed"
     assert text.startswith("the library 'absent_two' is not installed")
     assert "absent_two" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("last", "status", "told"),
+    [
+        (
+            "ModuleNotFoundError: No module named 'absent.part'",
+            2,
+            "orchestrator: the library 'absent' is not installed: ",
+        ),
+        ("OSError: something else", 3, "orchestrator: its server ended with status 3; read "),
+    ],
+)
+def test_a_server_that_ends_at_its_start_says_which_library_it_lacks(
+    last: str, status: int, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = tmp_path / "server.log"
+    log.write_text("ModuleNotFoundError: No module named 'of_an_earlier_start'\n", encoding="utf-8")
+    server = tmp_path / "python"
+    server.write_text(f'#!/bin/sh\necho "{last}" >&2\nexit 3\n', encoding="utf-8")
+    server.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(server))
+    with pytest.raises(TumblelineError) as caught:
+        local._start(tmp_path, lambda: None)
+    assert caught.value.exit_status == status
+    assert str(caught.value).startswith(told)
