@@ -3,7 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 CRATE := $(VENV)/crate-validator
+# folders or files of tests, in place of all: make pytest TESTS=tests/unit
+TESTS ?=
 # one more than processors: a worker waits a fifth of its time, for servers, watchdogs and browsers
+UV ?= uv
 WORKERS ?= $(shell expr $$(nproc) + 1)
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -11,8 +14,9 @@ export PREFECT_SERVER_ANALYTICS_ENABLED = false
 export DO_NOT_TRACK = 1
 # empty: the tests start some hundred processes, whose modules and assertions are compiled once and kept
 export PYTHONDONTWRITEBYTECODE =
+export PYTHONS TESTS WORKERS
 
-.PHONY: run test help check lint types layers pytest test-slow debian clean locks bench release docs
+.PHONY: run test help check lint types layers pytest test-slow test-pythons debian clean locks locks-check uv bench release docs FORCE
 
 run: $(VENV)/.run  ## set up and run the main job on the simulated station
 	$(BIN)/tumbleline run || [ $$? -eq 1 ]  # 1: the run is done and a unit missed its limits, which is a result
@@ -35,10 +39,13 @@ layers: $(VENV)/.dev
 	$(BIN)/lint-imports
 
 pytest: $(VENV)/.dev $(CRATE)/.done debian
-	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS) --dist worksteal
+	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS) --dist worksteal $(TESTS)
 
 test-slow: $(VENV)/.dev $(CRATE)/.done debian  ## suites that take minutes
 	$(BIN)/python -m pytest -m slow
+
+test-pythons:  ## set up, main job and tests in a fresh clone, for each Python that is found; or PYTHONS="python3.12 …", TESTS=tests/unit
+	@$(PYTHON) -m deploy.pythons
 
 bench: $(VENV)/.bench  ## figures of docs/reference/measured.md in a short form
 	$(BIN)/python -m benchmarks
@@ -52,43 +59,54 @@ docs: $(VENV)/.docs  ## the documents as a site that is searched without a netwo
 debian:  ## programs of other makers that tests talk to: mbpoll, chromium
 	@sh deploy/debian-packages.sh
 
-$(VENV)/bin/python:
-	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Python 3.11 or newer is needed; set PYTHON=python3.11")'
-	$(PYTHON) -m venv $(VENV)
+# one line where the Python is not one that the locks are for; it is plain enough for any Python
+SUPPORTED := import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 14) else "Python %d.%d is not supported, 3.11 to 3.14 is needed; say which, as in: make PYTHON=python3.13" % sys.version_info[:2])
+# a Python that somebody names replaces the environment of another one; else the environment that is there is kept
+ASKED := $(if $(filter file default undefined,$(origin PYTHON)),,--asked)
 
-# the lock is complete: without resolving, older pips cannot stumble over extras that a pinned package is asked for with
-define install
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r $(1)
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@touch $@
+define set_up
+	@with=$(PYTHON); \
+	if [ -z "$(ASKED)" ] && $(BIN)/python -c '$(SUPPORTED)' 2>/dev/null; then with=$(BIN)/python; fi; \
+	if ! command -v $$with >/dev/null; then echo "set-up: there is no program '$$with'; say which Python, as in: make PYTHON=python3.13" >&2; exit 1; fi; \
+	$$with -c '$(SUPPORTED)' && $$with deploy/environment.py $(1) $(ASKED)
 endef
 
-$(VENV)/.run: requirements-run.lock pyproject.toml | $(VENV)/bin/python
-	$(call install,requirements-run.lock)
-
-$(VENV)/.dev: requirements-dev.lock pyproject.toml | $(VENV)/bin/python
-	$(call install,requirements-dev.lock)
-	@touch $(VENV)/.run
-
-$(VENV)/.bench: requirements-bench.lock pyproject.toml | $(VENV)/bin/python
-	$(call install,requirements-bench.lock)
-	@touch $(VENV)/.run $(VENV)/.dev
-
-$(VENV)/.docs: requirements-docs.lock pyproject.toml | $(VENV)/bin/python
-	$(call install,requirements-docs.lock)
+# asked each time: the script knows whether something is to be done
+$(VENV)/.run $(VENV)/.all $(VENV)/.dev $(VENV)/.bench $(VENV)/.docs: FORCE
+	$(call set_up,$(patsubst .%,%,$(notdir $@)) $(VENV))
 
 # a validator of another maker, in an environment of its own: it asks for older libraries than the product has
-$(CRATE)/.done: requirements-crate.lock | $(VENV)/bin/python
-	$(PYTHON) -m venv $(CRATE)
-	$(CRATE)/bin/pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r requirements-crate.lock
-	@touch $@
+$(CRATE)/.done: FORCE | $(VENV)/.dev
+	$(call set_up,crate $(CRATE))
 
-locks:  ## resolve the locks anew (needs uv)
-	uv pip compile pyproject.toml --extra build --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-run.lock
-	uv pip compile pyproject.toml --extra build --extra dev --extra pdf --extra recordings --extra signatures --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-dev.lock
-	uv pip compile pyproject.toml --extra build --extra dev --extra pdf --extra recordings --extra signatures --extra bench --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-bench.lock
-	uv pip compile pyproject.toml --extra build --extra docs --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-docs.lock
-	echo 'roc-validator>=0.13' | uv pip compile - --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header -o requirements-crate.lock
+FORCE:
+
+# universal: one lock for every Python from 3.11 on, by markers; versions stay as they are unless UPGRADE=--upgrade is given
+define lock
+	$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-strip-extras --no-emit-index-url --no-annotate --no-header \
+		$(UPGRADE) $(4) $(patsubst %,--extra %,$(2)) $(patsubst %,--constraint requirements-%.lock,$(3)) --output-file requirements-$(1).lock
+endef
+CRATE_NEEDS := roc-validator>=0.13
+USERS := build pdf recordings signatures
+
+locks: uv  ## resolve the locks anew (needs uv); UPGRADE=--upgrade moves versions
+	$(call lock,run,build,,pyproject.toml)
+	$(call lock,all,$(USERS),run,pyproject.toml)
+	$(call lock,dev,$(USERS) dev,all,pyproject.toml)
+	$(call lock,bench,$(USERS) dev bench,dev,pyproject.toml)
+	$(call lock,docs,build docs,dev,pyproject.toml)
+	@echo '$(CRATE_NEEDS)' > build/crate.in
+	$(call lock,crate,,,build/crate.in)
+	@rm build/crate.in
+
+locks-check: uv  ## resolve every lock for every Python, with wheels alone (needs uv and the index; installs nothing)
+	@for lock in requirements-*.lock; do for python in 3.11 3.12 3.13 3.14; do \
+		$(UV) pip install --quiet --dry-run --python-version $$python --only-binary :all: --require-hashes --target build/nothing -r $$lock \
+		&& echo "$$lock holds for Python $$python" || exit 1; done; done
+
+uv:
+	@command -v $(UV) >/dev/null || { echo "locks: there is no program '$(UV)', which resolves them; install it, as with 'pipx install uv', or name it with UV=…" >&2; exit 1; }
+	@mkdir -p build
 
 clean:  ## take away what was made here, but no archive: it holds measurements
 	rm -rf $(VENV) build dist *.egg-info .hypothesis .ruff_cache .import_linter_cache

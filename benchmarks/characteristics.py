@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before numpy
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE / "worlds"), str(HERE.parent)]
+sys.path[:0] = [str(HERE / "worlds"), str(HERE.parent)]
+sys.path.append(str(HERE))  # last: tests have modules of the same names
 
 import noise_kinds  # noqa: E402
 import numpy as np  # noqa: E402

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE / "worlds"), str(HERE.parent)]
+sys.path[:0] = [str(HERE / "worlds"), str(HERE.parent)]
+sys.path.append(str(HERE))  # last: tests have modules of the same names
 
 from decision_parts import rate, run_of  # noqa: E402
 from noise import Noise  # noqa: E402

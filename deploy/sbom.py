@@ -7,7 +7,6 @@ are those of the installed distributions of the same version; a library that is 
 from __future__ import annotations
 
 import json
-import re
 import sys
 import tomllib
 import uuid
@@ -15,26 +14,19 @@ from datetime import UTC, datetime
 from importlib import metadata
 from os import environ
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from schemas.locks import PYTHONS, Pin, on_linux, pins
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 ROOT = Path(__file__).resolve().parents[1]
 LOCK = ROOT / "requirements-run.lock"
-PIN = re.compile(r"^([\w.-]+)(?:\[[\w, -]+\])?==([^\s;\\]+)")
-HASH = re.compile(r"--hash=sha256:([0-9a-f]{64})")
 SPACE = uuid.UUID("6f1c1d5e-0f0c-5d4e-9b65-0d6f1f3b7a10")
-
-
-def pins(lock: str) -> dict[str, tuple[str, list[str]]]:
-    """Version and SHA-256 of the files of each library of a lock, by its normalised name."""
-    by_name: dict[str, tuple[str, list[str]]] = {}
-    for entry in re.split(r"\n(?=\S)", lock.strip()):
-        pin = PIN.match(entry)
-        if pin is not None:
-            by_name[canonicalize_name(pin[1])] = (pin[2], HASH.findall(entry))
-    return by_name
 
 
 def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, str] | None = None) -> dict[str, Any]:
@@ -47,7 +39,9 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
     when : time of the release
     hashes : SHA-256 of the files of the release, by name
     """
-    locked = pins(lock)
+    locked: dict[str, list[Pin]] = {}
+    for pin in pins(lock):
+        locked.setdefault(pin.name, []).append(pin)
     name, version = project["name"], project["version"]
     own = {
         "type": "application",
@@ -61,7 +55,7 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
             {"name": "tumbleline:release:sha256", "value": f"{value}  {file}"} for file, value in (hashes or {}).items()
         ],
     }
-    direct = [_reference(lib, locked[lib][0]) for lib in sorted(_needed(project["dependencies"])) if lib in locked]
+    listed = [pin for _, same in sorted(locked.items()) for pin in same]
     content = {
         "bomFormat": "CycloneDX",
         "specVersion": "1.6",
@@ -71,28 +65,32 @@ def bill(lock: str, project: dict[str, Any], when: datetime, hashes: dict[str, s
             "timestamp": when.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z"),
             "component": own,
         },
-        "components": [_component(lib, pin, sums) for lib, (pin, sums) in sorted(locked.items())],
+        "components": [_component(pin) for pin in listed],
         "dependencies": [
-            {"ref": own["bom-ref"], "dependsOn": direct},
-            *({"ref": _reference(lib, locked[lib][0]), "dependsOn": _below(lib, locked)} for lib in sorted(locked)),
+            {"ref": own["bom-ref"], "dependsOn": _references(project["dependencies"], locked)},
+            *({"ref": _reference(pin.name, pin.version), "dependsOn": _below(pin, locked)} for pin in listed),
         ],
     }
     json.dumps(content, allow_nan=False)
     return content
 
 
-def _component(name: str, version: str, sums: list[str]) -> dict[str, Any]:
-    """A library; the hashes of the lock are those of its files for several systems, so they are properties."""
-    licence = _licence(name, version)
+def _component(pin: Pin) -> dict[str, Any]:
+    """A library; the hashes of the lock are those of its files for several systems, so they are properties.
+
+    What the lock installs on some Pythons or systems only is optional, with the marker that says where.
+    """
+    licence = _licence(pin.name, pin.version)
+    where = [{"name": "tumbleline:lock:marker", "value": str(pin.marker)}] if pin.marker else []
     return {
         "type": "library",
-        "bom-ref": _reference(name, version),
-        "name": name,
-        "version": version,
-        "scope": "required",
+        "bom-ref": _reference(pin.name, pin.version),
+        "name": pin.name,
+        "version": pin.version,
+        "scope": "optional" if pin.marker else "required",
         **({"licenses": [licence]} if licence else {}),
-        "purl": _reference(name, version),
-        "properties": [{"name": "tumbleline:lock:sha256", "value": one} for one in sums],
+        "purl": _reference(pin.name, pin.version),
+        "properties": [*where, *({"name": "tumbleline:lock:sha256", "value": one} for one in pin.hashes)],
     }
 
 
@@ -111,17 +109,20 @@ def _licence(name: str, version: str) -> dict[str, Any]:
     return {"license": {"name": text}} if text else {}
 
 
-def _below(name: str, locked: dict[str, tuple[str, list[str]]]) -> list[str]:
+def _below(pin: Pin, locked: dict[str, list[Pin]]) -> list[str]:
     """References of the libraries of the lock that an installed library needs, without its extras."""
-    held = _installed(name, locked[name][0])
-    needed = _needed(held.get_all("Requires-Dist") or ()) if held is not None else set()
-    return [_reference(lib, locked[lib][0]) for lib in sorted(needed) if lib in locked]
+    held = _installed(pin.name, pin.version)
+    return _references(held.get_all("Requires-Dist") or (), locked) if held is not None else []
 
 
-def _needed(requirements: Any) -> set[str]:
-    """Normalised names of the requirements that hold on this Python, without extras."""
+def _references(requirements: Iterable[str], locked: dict[str, list[Pin]]) -> list[str]:
+    """References of the requirements that hold on any Python of the locks: the bill is that of all of them."""
     parsed = [Requirement(one) for one in requirements]
-    return {canonicalize_name(r.name) for r in parsed if r.marker is None or r.marker.evaluate({"extra": ""})}
+    environments = [{**on_linux(python), "extra": ""} for python in PYTHONS]
+    needed = {
+        canonicalize_name(r.name) for r in parsed if r.marker is None or any(map(r.marker.evaluate, environments))
+    }
+    return [_reference(pin.name, pin.version) for lib in sorted(needed) for pin in locked.get(lib, ())]
 
 
 def _installed(name: str, version: str) -> Any:

@@ -193,6 +193,11 @@ def main() -> None:
                 f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",
                 UNUSABLE,
             )
+        from schemas.installed import not_installed
+
+        missing = not_installed(problem)
+        if missing is not None:
+            _leave(missing, UNUSABLE)
         from pipelines.cli.unexpected import write_report
 
         _leave(write_report(problem), UNEXPECTED)

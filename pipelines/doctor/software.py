@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import re
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,17 +12,14 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 from pipelines.doctor.check import Check
+from schemas.locks import pins
 from schemas.shipped import PRODUCT, shipped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 PART = "software"
-TESTED = "3.11"
-"""The version of Python that the tests run on and the lock is for."""
-
 LOCK = "requirements-run.lock"
-PIN = re.compile(r"^([\w.-]+)(?:\[[\w, -]+\])?==([^\s;\\]+)", re.MULTILINE)
 SHOWN = 5
 DEVELOPMENT = {"build", "dev", "bench", "docs"}  # extras of those who change the product, not of those who use it
 
@@ -45,10 +41,18 @@ def _python() -> Check:
     needed = metadata.metadata(PRODUCT)["Requires-Python"] or ""
     if version not in SpecifierSet(needed, prereleases=True):
         return Check(PART, "Python", "fault", version, needed, "install the product in an environment of that version")
-    if not version.startswith(f"{TESTED}."):
-        remedy = f"install the product in an environment of Python {TESTED} where it is validated"
-        return Check(PART, "Python", "warning", f"{version}, not tested", f"{TESTED}, which the tests run on", remedy)
+    tested = _tested()
+    if version.rpartition(".")[0] not in tested:
+        remedy = "install the product in an environment of one of these where it is validated"
+        needed = f"{', '.join(tested)}, which the tests run on"
+        return Check(PART, "Python", "warning", f"{version}, not tested", needed, remedy)
     return Check(PART, "Python", "good", version)
+
+
+def _tested() -> list[str]:
+    """The versions of Python that the product declares: those that its tests have run on."""
+    classes = metadata.metadata(PRODUCT).get_all("Classifier") or ()
+    return [one.rpartition(" :: ")[2] for one in classes if one.startswith("Programming Language :: Python :: 3.")]
 
 
 def _product() -> Check:
@@ -109,13 +113,16 @@ def _pinned() -> Check:
         return Check(
             PART, "lock", "not configured", f"{LOCK} is not installed", "", "install the product from its wheel"
         )
-    pins = {canonicalize_name(name): version for name, version in PIN.findall(path.read_text(encoding="utf-8"))}
-    held = {canonicalize_name(one.name): one.version for one in metadata.distributions()}
+    locked = {pin.name: pin.version for pin in pins(path.read_text(encoding="utf-8")) if pin.holds()}
+    held: dict[str, str] = {canonicalize_name(one.name): one.version for one in metadata.distributions()}
     other = [
-        f"{name} {held[name]}, not {pins[name]}" for name in sorted(pins) if name in held and held[name] != pins[name]
+        f"{name} {held[name]}, not {version}"
+        for name, version in sorted(locked.items())
+        if name in held and held[name] != version
     ]
     if not other:
-        return Check(PART, "lock", "good", f"{len(pins.keys() & held.keys())} libraries have the versions of the lock")
+        same = len(locked.keys() & held.keys())
+        return Check(PART, "lock", "good", f"{same} libraries have the versions of the lock")
     more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
     return Check(
         PART,

@@ -27,7 +27,8 @@ from pipelines.flows.server_check import check_server
 from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
 from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
-from schemas.errors import ArchiveUnusable, StationTimeout
+from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
+from schemas.installed import missing_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -192,7 +193,9 @@ def _running(home: Path) -> tuple[int, str] | None:
 
 def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
     port, key = _free_port(), new_key()
-    with os.fdopen(_private_file(home / "server.log", os.O_APPEND), "ab") as log:
+    log_path = home / "server.log"
+    before = log_path.stat().st_size if log_path.exists() else 0
+    with os.fdopen(_private_file(log_path, os.O_APPEND), "ab") as log:
         process = subprocess.Popen(  # noqa: S603 - our own module, by our own interpreter
             [sys.executable, "-m", "pipelines.flows.server", "--port", str(port), "--until-unused", str(home)],
             # the key in the environment: the arguments of a process are there for everybody to read
@@ -212,10 +215,12 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
     end = time.monotonic() + STARTUP_S
     while not _answers(port):
         if process.poll() is not None or time.monotonic() > end:
-            raise StationTimeout(
-                f"orchestrator: its server does not answer after {STARTUP_S} s (status {process.poll()}); read "
-                f"{home / 'server.log'}, or run with --direct"
-            )
+            missing = missing_in(log_path.read_bytes()[before:].decode("utf-8", errors="replace"))
+            if missing is not None:
+                raise TumblelineError(f"orchestrator: {missing}")
+            status = process.poll()
+            found = f"does not answer after {STARTUP_S} s" if status is None else f"ended with status {status}"
+            raise StationTimeout(f"orchestrator: its server {found}; read {log_path}, or run with --direct")
         time.sleep(POLL_S)
     with os.fdopen(_private_file(home / ADDRESS, os.O_TRUNC), "w", encoding="utf-8") as file:
         json.dump({"port": port, "pid": process.pid, "key": key}, file)

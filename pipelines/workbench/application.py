@@ -20,6 +20,7 @@ from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.lots import Stale
 from pipelines.workbench.state import PageState
 from schemas.errors import TumblelineError
+from schemas.installed import not_installed
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator
@@ -73,7 +74,7 @@ def _not_there(request: Request, problem: Exception) -> Response:
 
 def _defect(request: Request, problem: Exception) -> Response:
     text = f"a defect of the program: {type(problem).__name__}: {problem}; the server's log has the details"
-    return _answer(request, text, 500)
+    return _answer(request, not_installed(problem) or text, 500)
 
 
 def _answer(request: Request, text: str, status: int) -> Response:

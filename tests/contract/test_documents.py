@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 from typer.testing import CliRunner
 
+from deploy.release import unpack
 from docs.documents_page import PAGE, documents, head_of, page
 from inertial.dynamics.second_order import transfer
 from inertial.dynamics.settling import step_response
@@ -95,8 +95,7 @@ WITHOUT_OPTION = (["archive", "key"],)
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A kept archive whose units are certified, and a model file."""
     folder = tmp_path_factory.mktemp("kept")
-    with tarfile.open(KEPT) as archive:
-        archive.extractall(folder / "archive", filter="data")
+    unpack(KEPT, folder / "archive")
     certify = ["certify", "latest", "--json", "--archive", str(folder / "archive")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(certifying, "refuse_unstated", lambda run: None)  # certified by the version that made the archive

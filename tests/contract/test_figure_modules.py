@@ -1,13 +1,13 @@
 """Every figure of merit that is found: limits files may name it, it says what it needs, has a value, a label and documents."""
 
 import sys
-import tarfile
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from deploy.release import unpack
 from docs.figures_page import PAGE, page
 from pipelines.archive import Archive
 from pipelines.archive.keys import sources
@@ -29,8 +29,7 @@ FIGURE = FigureKind("{name}", "µg", "label", {order}, lambda tables: rms(tables
 def kept(tmp_path_factory: pytest.TempPathFactory):
     """The run of a kept archive."""
     folder = tmp_path_factory.mktemp("kept")
-    with tarfile.open(KEPT) as kept:
-        kept.extractall(folder, filter="data")
+    unpack(KEPT, folder)
     return Archive(folder).run("latest")
 
 

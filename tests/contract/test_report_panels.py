@@ -1,11 +1,11 @@
 """Every panel of a run's report that is found: it has a place, a heading and documents, and one file adds one."""
 
 import re
-import tarfile
 from pathlib import Path
 
 import pytest
 
+from deploy.release import unpack
 from pipelines.archive import Archive
 from pipelines.report import panel, render
 from pipelines.report.context import ReportContext
@@ -29,8 +29,7 @@ NOT_OF_OLD_RUNS = {  # the kept archive has no such columns, and states no uncer
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> ReportContext:
     folder = tmp_path_factory.mktemp("kept")
-    with tarfile.open(KEPT) as kept:
-        kept.extractall(folder, filter="data")
+    unpack(KEPT, folder)
     return ReportContext(Archive(folder).run("latest"), {})
 
 

@@ -16,7 +16,14 @@ from test_packaging import ROOT, SHIPPED, tracked
 from deploy.release import build
 
 SHARE = "share/tumbleline/"
-SAMPLES = ("deploy/recipes", "deploy/stations", "deploy/systemd", "deploy/prefect.yaml", "requirements-run.lock")
+SAMPLES = (
+    "deploy/recipes",
+    "deploy/stations",
+    "deploy/systemd",
+    "deploy/prefect.yaml",
+    "requirements-run.lock",
+    "requirements-all.lock",
+)
 LOADS = """
 import json, sys
 from pathlib import Path

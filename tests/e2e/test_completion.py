@@ -4,11 +4,11 @@ import os
 import shutil
 import subprocess
 import sys
-import tarfile
 from pathlib import Path
 
 import pytest
 
+from deploy.release import unpack
 from pipelines.cli import COMMANDS, _OnDemand
 from pipelines.cli.candidates import SOURCES, candidates_of
 
@@ -28,8 +28,7 @@ pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A home in which the completion is installed, and a working folder with an archive and a recipe."""
     folder = tmp_path_factory.mktemp("home")
-    with tarfile.open(KEPT) as archive:
-        archive.extractall(folder / "archive", filter="data")
+    unpack(KEPT, folder / "archive")
     (folder / "recipes").mkdir()
     (folder / "recipes" / "my.toml").write_text("", encoding="utf-8")
     done = bash("tumbleline --install-completion; true", folder)

@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
 
 from truth import Spec, make_run
 
+from deploy.release import unpack
 from pipelines.cli import main, terminal
 from pipelines.jobs.model_files import read_model, versions
 
@@ -219,10 +220,7 @@ def test_other_questions_keep_their_words() -> None:
 
 @pytest.mark.slow
 def test_a_run_of_an_archive_is_improved_and_its_next_line_names_the_archive(tmp_path: Path) -> None:
-    import tarfile
-
-    with tarfile.open(Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz") as kept:
-        kept.extractall(tmp_path / "kept", filter="data")
+    unpack(Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz", tmp_path / "kept")
     words = ("--archive", tmp_path / "kept", "--out", tmp_path / "m.toml", "--effects", f"{PLAIN},scale_temperature")
     status, out, _ = run("improve", "latest", *words, "--json", typed="\n" * 9)
     document = json.loads(out)

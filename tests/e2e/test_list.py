@@ -1,12 +1,12 @@
 """`list`: result, station and origin of every run, within 80 columns."""
 
 import json
-import tarfile
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from deploy.release import unpack
 from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli import app
@@ -17,8 +17,7 @@ KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
     """A kept archive of an older version, with one run more that computes its only run again, and one that has just begun."""
-    with tarfile.open(KEPT) as kept:
-        kept.extractall(tmp_path, filter="data")
+    unpack(KEPT, tmp_path)
     folder = next(path.parent for path in tmp_path.rglob("runs") if path.is_dir())
     store = Archive(folder)
     old = store.run("latest")

@@ -1,12 +1,12 @@
 """Archives that older versions wrote open: ``tests/archives`` keeps a small one of every version of the schema."""
 
-import tarfile
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble
 
+from deploy.release import unpack
 from pipelines.archive import Archive, Run, parquet
 from pipelines.certificates import Ledger
 from pipelines.certificates.measured import measured_on
@@ -27,8 +27,7 @@ FRAME = pd.DataFrame({"unit": ["A", "B"], "value": [1.0, 2.0]})
 
 @pytest.fixture(params=KEPT, ids=lambda path: path.name.partition(".")[0])
 def run(request: pytest.FixtureRequest, tmp_path: Path) -> Run:
-    with tarfile.open(request.param) as kept:
-        kept.extractall(tmp_path / "archive", filter="data")
+    unpack(request.param, tmp_path / "archive")
     return Archive(tmp_path / "archive").run("latest")
 
 

@@ -17,6 +17,7 @@ from pipelines.report.reasons import plain_reason
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.services.lots import write_state
 from schemas.errors import OperatorNeeded, TumblelineError
+from schemas.installed import not_installed
 
 if TYPE_CHECKING:
     from pipelines.chain.attendance import Answer, Prompt
@@ -80,9 +81,8 @@ def measure(place: Path) -> str:
         pages.put(phase="failed", question=None, problem=str(problem))
         return "failed"
     except Exception as problem:
-        pages.put(
-            phase="failed", question=None, problem=f"a defect of the program: {type(problem).__name__}: {problem}"
-        )
+        defect = f"a defect of the program: {type(problem).__name__}: {problem}"
+        pages.put(phase="failed", question=None, problem=not_installed(problem) or defect)
         raise
     return "done"
 

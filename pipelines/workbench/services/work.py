@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.workbench.results import Diagnosed
 from schemas.errors import TumblelineError
+from schemas.installed import not_installed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -28,10 +29,8 @@ def done_in_process(kind: str, request: Mapping[str, Any], report_progress: Repo
         return "failed", str(problem)
     except Exception as problem:  # noqa: BLE001 - a defect: the page says so, the details go to the server's log
         traceback.print_exc()
-        return (
-            "failed",
-            f"a defect of the program ({type(problem).__name__}: {problem}); the server's log has the details",
-        )
+        defect = f"a defect of the program ({type(problem).__name__}: {problem}); the server's log has the details"
+        return "failed", not_installed(problem) or defect
 
 
 def _inputs(request: Mapping[str, Any], where: str) -> tuple[Any, Any, list[str] | None]:

@@ -1,0 +1,131 @@
+"""The set-up says what is missing and what to do, begins anew what was stopped, and leaves alone what is whole."""
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from deploy import environment
+from deploy.environment import NotSetUp, reason, set_up, wrong_with
+
+LOCK, FOLDER = Path("requirements-run.lock"), Path(".venv")
+TAMPERED = """Collecting rich==15.0.0 (from -r requirements-run.lock (line 7))
+Processing ./files/six-1.17.0-py2.py3-none-any.whl (from -r requirements-run.lock (line 1))
+ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE. If you have updated the package versions, please ...
+    six==1.17.0 from file:///files/six-1.17.0-py2.py3-none-any.whl#sha256=47 (from -r requirements-run.lock (line 1)):
+        Expected sha256 4721beef
+             Got        4721f391
+"""
+UNREACHED = """WARNING: Retrying (Retry(total=0)) after connection broken by 'NewConnectionError('...')': /simple/six/
+ERROR: Could not find a version that satisfies the requirement six==1.17.0 (from versions: none)
+ERROR: No matching distribution found for six==1.17.0
+"""
+NOT_BUILT = """Processing ./broken-1.0.tar.gz (from -r b.txt (line 1))
+  ERROR: Failed building wheel for broken
+Failed to build broken
+ERROR: Could not build wheels for broken, which is required to install pyproject.toml-based projects
+"""
+NOT_BEGUN = """Processing ./files/broken-1.0.tar.gz (from -r b.txt (line 1))
+  × Getting requirements to build wheel did not run successfully.
+"""
+FULL = "Collecting scipy==1.17.1\nERROR: Could not install packages due to an OSError: [Errno 28] No space left on device\n"
+OTHER = "Collecting scipy==1.17.1\nERROR: something new\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "package", "found", "remedy"),
+    [
+        (TAMPERED, "six==1.17.0", "not that of requirements-run.lock", "pip cache purge"),
+        (UNREACHED, "six==1.17.0", "cannot be reached", "check network and proxy"),
+        (UNREACHED.partition("\n")[2], "six==1.17.0", "does not deliver this version for Python 3", "pip config list"),
+        (NOT_BUILT, "broken", "there is no wheel for Python 3", "with PYTHON="),
+        (NOT_BEGUN, "broken-1.0.tar.gz", "there is no wheel for Python 3", "with PYTHON="),
+        (FULL, "scipy==1.17.1", "no space is left on the disk of .venv", "free 2 GB"),
+        (OTHER, "scipy==1.17.1", "pip ended with 'ERROR: something new'", "try again"),
+        ("", "pip", "pip ended with ''", "try again"),
+    ],
+)
+def test_what_pip_says_becomes_package_cause_and_remedy(text: str, package: str, found: str, remedy: str) -> None:
+    told = reason(text, LOCK, FOLDER)
+    assert told.startswith(f"{package}: ")
+    assert found in told
+    assert remedy in told
+    assert "\n" not in told
+
+
+def made(folder: Path, root: Path, python: str | None = sys.executable) -> Path:
+    (folder / "bin").mkdir(parents=True)
+    (folder / ".made").write_text(json.dumps({"root": str(root)}), encoding="utf-8")
+    if python is not None:
+        (folder / "bin" / "python").symlink_to(python)
+    return folder
+
+
+def test_an_environment_that_is_not_whole_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(environment, "ROOT", tmp_path)
+    assert wrong_with(tmp_path / "none") == ""
+    assert wrong_with(made(tmp_path / "good", tmp_path)) == ""
+    assert wrong_with(tmp_path / "good", asked=True) == ""
+    assert "is gone" in wrong_with(made(tmp_path / "gone", tmp_path, "/nowhere/python3"))
+    assert "is gone" in wrong_with(made(tmp_path / "broken", tmp_path, shutil.which("false")))
+    assert wrong_with(made(tmp_path / "moved", Path("/elsewhere"))) == "it was made in /elsewhere"
+    (made(tmp_path / "stopped", tmp_path) / ".made").unlink()
+    assert wrong_with(tmp_path / "stopped") == "its set-up was not finished"
+    monkeypatch.setattr(environment, "_version", lambda _: "3.99")
+    assert wrong_with(tmp_path / "good") == ""
+    assert wrong_with(tmp_path / "good", asked=True).startswith("it has Python 3.99, ")
+
+
+@pytest.fixture
+def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A tree with a lock of one library, whose wheel lies in a folder; no network."""
+    monkeypatch.setattr(environment, "ROOT", tmp_path)
+    for name in [name for name in os.environ if name.startswith("PIP_")]:
+        monkeypatch.delenv(name)
+    for name, value in {"CONFIG_FILE": os.devnull, "NO_INDEX": "1", "FIND_LINKS": str(tmp_path / "wheels")}.items():
+        monkeypatch.setenv(f"PIP_{name}", value)
+    wheel = tmp_path / "wheels" / "tiny_one-1.0-py3-none-any.whl"
+    wheel.parent.mkdir()
+    texts = {
+        "tiny_one.py": "",
+        "tiny_one-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: tiny-one\nVersion: 1.0\n",
+        "tiny_one-1.0.dist-info/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    record = "".join(f"{name},,\n" for name in [*texts, "tiny_one-1.0.dist-info/RECORD"])
+    with zipfile.ZipFile(wheel, "w") as file:
+        for name, text in {**texts, "tiny_one-1.0.dist-info/RECORD": record}.items():
+            file.writestr(name, text)
+    value = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    (tmp_path / "requirements-crate.lock").write_text(f"tiny-one==1.0 --hash=sha256:{value}\n", encoding="utf-8")
+    (tmp_path / "pyproject.toml").write_text("", encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_an_environment_is_made_completed_and_then_left_alone(tree: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tree / ".venv"
+    set_up("crate", folder)
+    first, last = capsys.readouterr().out.splitlines()
+    assert "installing the libraries of requirements-crate.lock into .venv with Python 3" in first
+    assert "about a minute" in first
+    assert last.startswith("set-up: installed in ")
+    assert subprocess.run([folder / "bin" / "python", "-c", "import tiny_one"], check=False).returncode == 0
+    set_up("crate", folder)
+    assert capsys.readouterr().out == ""
+
+    (folder / ".made").unlink()  # as a set-up leaves it that is stopped
+    (folder / "lib" / "torn").write_text("", encoding="utf-8")
+    set_up("crate", folder)
+    assert ".venv: its set-up was not finished; it is made anew" in capsys.readouterr().out
+    assert not (folder / "lib" / "torn").exists()
+
+    (tree / "requirements-crate.lock").write_text(f"not-there==2.0 --hash=sha256:{'0' * 64}\n", encoding="utf-8")
+    with pytest.raises(NotSetUp, match=r"^not-there==2\.0: your package index does not deliver .*install\.log\)$"):
+        set_up("crate", folder)
+    assert wrong_with(folder) == ""  # nothing was changed
