@@ -119,7 +119,11 @@ def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
     from stations.plant.preset import load_preset  # a station of hardware has no plant
 
     preset = load_preset(recipe.device, station.simulation.preset_overrides)
-    return recipe.model_copy(update={"stability": preset.stability})
+    own = preset.stability
+    if own is not None and preset.zero_level > 0.0:
+        electrical = {"supply_V": preset.supply_V, "zero_level_g": preset.zero_level / preset.scale}
+        own = own.model_copy(update=electrical)
+    return recipe.model_copy(update={"stability": own})
 
 
 def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:

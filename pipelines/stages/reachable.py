@@ -78,7 +78,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     """
     if terms.stated is None:
         return []
-    nominal = _nominal(effects, planned.fit)
+    nominal = _nominal(effects, planned.fit, 0.0 if terms.stability is None else terms.stability.zero_level_g)
     model = with_device_temperature(nominal, np.eye(3), terms.stability)
     at = DwellConditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
     source = sensitivity(model, planned.fit, *influences(terms.stated, at, terms.stability))
@@ -97,11 +97,12 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     return out
 
 
-def _nominal(effects: Sequence[str], state: State) -> MeasurementModel:
+def _nominal(effects: Sequence[str], state: State, zero_level_g: float) -> MeasurementModel:
+    usual = {"scale": 1.0, "bias": zero_level_g}
     sensor, station = design.split(effects)
     values = design.starting_values([*sensor, *station], state)
     names = [design.local_names(sensor, axis, values) for axis in range(3)]
-    coefficients = np.array([[1.0 if effect == "scale" else 0.0 for effect, _ in own] for own in names])
+    coefficients = np.array([[usual.get(effect, 0.0) for effect, _ in own] for own in names])
     return MeasurementModel(tuple(effects), coefficients, values)
 
 
