@@ -76,15 +76,30 @@ def refuse_unreachable(job: Measuring) -> None:
     terms = planned_terms(job.recipe, job.station, job.limits)
     if terms.stated is None or not job.recipe.tumbles:
         return  # without the multi-position test no figure rests on the budget
-    dwells = planned_dwells(job.recipe, job.station)
-    quiet = PlannedDwells(*dwells, covariance=np.eye(dwells.fit.time.size), run_ug=0.0, instability_ug=0.0)
-    wrong = unreachable(reachable(quiet, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
+    planned = without_noise(job.recipe, job.station)
+    wrong = unreachable(reachable(planned, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
     if wrong:
         raise RecipeInvalid(
-            f"recipe {job.recipe.name} on station {job.station.name}: {wrong[0]}, noise of the device left out; raise the "
-            "limit, or improve what rules it (see 'tumbleline plan')",
+            f"recipe {job.recipe.name} on station {job.station.name}: no unit can meet its limits, noise of the device left out: "
+            f"{'; '.join(wrong)}; nothing was moved; raise the limits in {job.recipe.limits}, or lower the uncertainty of the "
+            f"largest contribution in [uncertainty]{_supply_not_measured(terms)} (see 'tumbleline plan')",
             key="limits",
         )
+
+
+def without_noise(recipe: Recipe, station: StationConfig) -> PlannedDwells:
+    """The dwells that a recipe plans, of a device of no noise: their weights are alike, and nothing is added to them."""
+    dwells = planned_dwells(recipe, station)
+    weights = 1e-24 * np.eye(dwells.fit.time.size)
+    return PlannedDwells(*dwells, covariance=weights, run_ug=0.0, instability_ug=0.0)
+
+
+def _supply_not_measured(terms: BudgetTerms) -> str:
+    """What to do about the supply of a device that follows it, where it is not measured."""
+    supply = None if terms.stated is None else terms.stated.supply
+    if supply is None or terms.stability is None or terms.stability.ratiometric == 0.0 or supply.ratio_measured:
+        return ""
+    return "; the output follows the supply: measure that of each slot, supply = { u_ppm = …, ratio_measured = true }"
 
 
 def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:

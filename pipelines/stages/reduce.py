@@ -79,11 +79,11 @@ def reduced_summaries(
         **_forces(dwells, local_gravity_m_s2 / STANDARD_GRAVITY_M_S2),
     )
     if follows is not None:
-        dwells = _at_nominal_supply(dwells, follows)
+        dwells = at_nominal_supply(dwells, follows)
     return dwells.sort_values(["unit", "dwell"], ignore_index=True)
 
 
-def _at_nominal_supply(dwells: pd.DataFrame, follows: FollowedSupply) -> pd.DataFrame:
+def at_nominal_supply(dwells: pd.DataFrame, follows: FollowedSupply) -> pd.DataFrame:
     """The dwells with the outputs that the devices had at their nominal supply, by the supply measured in each dwell.
 
     The whole output follows, the level at 0 g included: 1 ppm of supply moves the bias of 1.5 V at 0.3 V/g by 5 µg.
