@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import pandas as pd
+    from numpy.typing import NDArray
 
 KEPT = (
     *("unit", "slot", "record", "kind", "pose", "soak", "duration_s"),
@@ -35,6 +36,10 @@ class FollowedSupply(NamedTuple):
 
     nominal_V: float
     share: float
+
+    def ratio(self, supply: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Output over that at the nominal supply, of measured supplies in V."""
+        return 1.0 + self.share * (supply / self.nominal_V - 1.0)
 
 
 def reduce(
@@ -97,9 +102,8 @@ def at_nominal_supply(dwells: pd.DataFrame, follows: FollowedSupply) -> pd.DataF
             f"reduce: unit {row['unit']}, dwell {row['dwell']}: supply {supply[bad[0]]:g} V, a measured supply is needed, for "
             f"the output follows it; check the meter of slot {row['slot']}, or take ratio_measured out of [uncertainty]"
         )
-    ratio = 1.0 + follows.share * (supply / follows.nominal_V - 1.0)
-    own = [*MEANS, *SPREADS]
-    return dwells.assign(**{name: dwells[name].to_numpy(dtype=float) / ratio for name in own})
+    ratio = follows.ratio(supply)
+    return dwells.assign(**{name: dwells[name].to_numpy(dtype=float) / ratio for name in (*MEANS, *SPREADS)})
 
 
 def _forces(dwells: pd.DataFrame, magnitude_g: float) -> dict[str, np.ndarray]:

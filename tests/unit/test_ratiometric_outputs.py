@@ -188,6 +188,28 @@ def test_the_true_bias_and_scale_lie_within_their_stated_uncertainty(lots: list[
     assert np.max(size) < 1000.0  # without the measurement the spread of the supplies is 5000 µg of bias
 
 
+def test_a_recording_at_another_supply_is_corrected_to_the_same_force(lots: list[SimpleNamespace], tmp_path: Path):
+    lot = lots[0]
+    dwells = lot.run.table("dwells")
+    own = dwells[(dwells["unit"] == "C0") & (dwells["kind"] == "dwell")].sort_values("time_s")
+    columns = ["time_s", "out_x", "out_y", "out_z", "unit_C"]
+    raw = own[columns].assign(supply_V=2.97)  # the dwells are at 3 V: at 2.97 V each output is a hundredth lower
+    raw[["out_x", "out_y", "out_z"]] *= 0.99
+    raw.to_csv(tmp_path / "raw.csv", index=False)
+    words = ["--calibration", f"{lot.run.id}:C0", "--archive", str(lot.run.path.parents[1]), "--failed"]
+    out = tmp_path / "corrected.csv"
+    done = command(["correct", str(tmp_path / "raw.csv"), *words, "--output", str(out)])
+    assert done.returncode == 0, done.stderr
+    force = pd.read_csv(out)[[f"force_{axis}_g" for axis in AXES]].to_numpy()
+    assert np.abs(force - own[[f"force_{axis}" for axis in AXES]].to_numpy()).max() < 1e-3
+    raw.drop(columns="supply_V").to_csv(tmp_path / "bare.csv", index=False)
+    refused = command(["correct", str(tmp_path / "bare.csv"), *words])
+    assert refused.returncode == 2
+    assert "add a column supply_V" in refused.stderr
+    exported = command(["export", lot.run.id, *words[2:], "--format", "json"])
+    assert "the coefficients hold at 3 V of supply" in exported.stderr
+
+
 def test_the_noise_of_a_sample_is_the_density_times_the_root_of_the_filters_bandwidth():
     for bandwidth, millivolt in ((100.0, 0.84), (25.0, 0.42), (400.0, 1.68)):
         preset = load_preset("analogue", {"noise_bandwidth_hz": bandwidth})
