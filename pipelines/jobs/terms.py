@@ -142,7 +142,7 @@ def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
 
 
 def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
-    """Refuse a recipe whose entries are not traced, or whose local gravity is not the station's.
+    """Refuse a recipe whose entries are not traced, whose local gravity is not the station's, or that lacks its nominal supply.
 
     Raises
     ------
@@ -154,7 +154,14 @@ def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
             refuse_untraced(recipe.uncertainty, station.reference, simulated=station.kind == "simulated")
         except ValueError as problem:
             raise RecipeInvalid(f"recipe {recipe.name}: {problem}", key="uncertainty") from None
-    stated = merged(station.uncertainty, recipe.uncertainty)
+    stated, own = merged(station.uncertainty, recipe.uncertainty), recipe.stability
+    measured = stated is not None and stated.supply is not None and stated.supply.ratio_measured
+    if own is not None and own.ratiometric > 0.0 and own.supply_V is None and measured:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: key 'stability.supply_V': missing, station {station.name} measures the supply that the "
+            "output follows, and the nominal one is needed; add supply_V = … in V to [stability]",
+            key="stability.supply_V",
+        )
     if stated is None or stated.gravity is None:
         return
     value, u = stated.gravity.value, stated.gravity.relative().u

@@ -9,7 +9,6 @@ from pipelines.stages.contributions import merged
 from pipelines.stages.reduce import FollowedSupply
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotTables
-from schemas.errors import RecipeInvalid
 from schemas.validity import CertificateTerms, Stability
 
 if TYPE_CHECKING:
@@ -67,17 +66,14 @@ class BudgetTerms:
 
     @property
     def follows(self) -> FollowedSupply | None:
-        """How the outputs follow a supply that is measured; None where it is not measured, or they do not follow it."""
+        """How the outputs follow a supply that is measured; None where it is not measured, or they do not follow it.
+
+        None as well for runs of earlier versions, which state no nominal supply and are as they were read.
+        """
         own = self.stability
         supply = None if self.stated is None else self.stated.supply
-        if own is None or not own.ratiometric > 0.0 or supply is None or not supply.ratio_measured:
+        if own is None or own.supply_V is None or supply is None or not supply.ratio_measured or own.ratiometric == 0.0:
             return None
-        if own.supply_V is None:
-            raise RecipeInvalid(
-                "recipe: [stability] says ratiometric without supply_V, the measured supply needs the nominal one; "
-                "add supply_V = … to [stability]",
-                key="stability.supply_V",
-            )
         return FollowedSupply(own.supply_V, own.ratiometric)
 
     def document(self) -> dict[str, Any]:

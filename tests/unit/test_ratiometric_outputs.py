@@ -30,6 +30,15 @@ STATION = ROOT / "deploy" / "stations" / "simulated.toml"
 UNITS = tuple(f"C{k}" for k in range(6))
 
 
+def changed(folder: Path, source: Path, **texts: str) -> Path:
+    text = source.read_text(encoding="utf-8")
+    for old, new in texts.values():
+        assert old in text
+        text = text.replace(old, new)
+    (folder / source.name).write_text(text, encoding="utf-8")
+    return folder / source.name
+
+
 def readings(plant, at_s: list[int]) -> np.ndarray:
     """Supplies (n, slots) that the meter reads at whole seconds, over the nominal voltage."""
     rows, now = [], 0
@@ -82,12 +91,11 @@ def test_a_dwell_without_its_supply_is_refused(supply: float):
         at_nominal_supply(dwells(supply), FollowedSupply(3.0, 1.0))
 
 
-def test_a_ratiometric_device_without_its_nominal_supply_is_refused_by_name():
-    terms = Request(recipe=str(RECIPE), station=STATION).job()
-    bare = terms.recipe.stability.model_copy(update={"supply_V": None})
-    planned = planned_terms(terms.recipe.model_copy(update={"stability": bare}), terms.station, terms.limits)
-    with pytest.raises(RecipeInvalid, match="add supply_V"):
-        _ = planned.follows
+def test_a_ratiometric_device_without_its_nominal_supply_is_refused_by_name(tmp_path: Path):
+    changed(tmp_path, RECIPE.with_name("analogue.limits.toml"))
+    recipe = changed(tmp_path, RECIPE, supply=("supply_V = 3.0\n", ""))
+    with pytest.raises(RecipeInvalid, match=r"'stability\.supply_V': missing, station simulated measures the supply"):
+        Request(recipe=str(recipe), station=STATION).job()
 
 
 def test_the_supply_counts_with_the_level_at_0_g():
@@ -101,15 +109,6 @@ def test_the_supply_counts_with_the_level_at_0_g():
     assert reachable(without_noise(job.recipe, job.station), half, job.recipe.effects)[0].parts[
         "supply"
     ] == pytest.approx(50.0, rel=1e-3)
-
-
-def changed(folder: Path, source: Path, **texts: str) -> Path:
-    text = source.read_text(encoding="utf-8")
-    for old, new in texts.values():
-        assert old in text
-        text = text.replace(old, new)
-    (folder / source.name).write_text(text, encoding="utf-8")
-    return folder / source.name
 
 
 MEASURED = 'supply = { u_ppm = 20.0, ratio_measured = true, scope = "station", source = "supply_reading_ppm of the simulation" }'
