@@ -135,12 +135,11 @@ def truth_of(truths: list[Truth], names: Names) -> Array:
 def compared(name: str, options: argparse.Namespace) -> None:
     """Prints one device's figures."""
     preset = load_preset(name)
-    noise = DwellNoise(
-        1e-6 * preset.noise_density_ug, 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug
-    )
     base = load_recipe().model_copy(
         update={"device": name, "effects": list(STARTING_MODEL), "static_record_s": 0.0, "name": name.lower()}
     )
+    white = preset.sampled_density_ug(base.rate_hz)
+    noise = DwellNoise(1e-6 * white, 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug)
     levels = tuple(float(part) for part in options.temperatures.split(","))
     station = load_station()
     against = plan_context(textbook(base, levels), station, noise)

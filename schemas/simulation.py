@@ -52,6 +52,8 @@ class Simulation(Strict):
     slot_lag_s: Bounds = (90.0, 200.0)
     slot_gradient_K: NotNegative = 0.1
     supply_spread: NotNegative = 1e-3
+    supply_drift: NotNegative = 1e-4
+    supply_reading_ppm: NotNegative = 20.0
     preset_overrides: dict[str, Number] = Field(default_factory=dict[str, float])
     hidden: list[Hidden] = Field(default_factory=list[Hidden])
     faults: list[FaultOrder] = Field(default_factory=list[FaultOrder])
@@ -61,4 +63,5 @@ class Simulation(Strict):
     def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without what is not stated: captures of earlier versions keep their names."""
         content = handler(self)
-        return {name: value for name, value in content.items() if name != "reference_errors" or value is not None}
+        later = {"supply_drift", "supply_reading_ppm", "reference_errors"}
+        return {name: value for name, value in content.items() if name not in later or name in self.model_fields_set}

@@ -124,7 +124,10 @@ class Settling(Entry):
 
 
 class Supply(RelativeEntry):
-    """Supply of a device whose output follows it; nothing remains where the ratio is measured and divided out."""
+    """Supply of a device whose output follows it, or, where each slot's is measured and divided out, that ratio.
+
+    A reader whose converter is referred to the device's supply measures the ratio as well.
+    """
 
     ratio_measured: bool = False
     scope: Scope = "run"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from schemas.bounds import Celsius, NotNegative, Number, Positive, Seconds, Text
 from schemas.strict import Strict
@@ -47,7 +47,9 @@ class Stability(Strict):
         due date
     horizon_days : longest period that the figures hold for
     temperature_of : whose temperature the user corrects with
-    ratiometric : whether the output follows the supply
+    ratiometric : share of the supply's relative change that the output follows; true is 1
+    supply_V : nominal supply, to which the output is referred where the supply is measured
+    zero_level_g : nominal output at 0 g over the scale: what the supply and the gain of the reader act on at 0 g
     bias_temperature_ug_K, scale_temperature_ppm_K : for models without temperature terms
     exact : nothing changes beyond the run; for simulated stations only
     """
@@ -60,7 +62,9 @@ class Stability(Strict):
     horizon_days: Positive
     source: Literal["history", "data_sheet"]
     temperature_of: Literal["device", "slot", "chamber"] = "device"
-    ratiometric: bool = False
+    ratiometric: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = 0.0
+    supply_V: Positive | None = None
+    zero_level_g: Number = 0.0
     bias_temperature_ug_K: NotNegative = 0.0
     scale_temperature_ppm_K: NotNegative = 0.0
     note: Text = ""

@@ -51,7 +51,7 @@ SOURCES = {
     "slot_rotation_mrad of the simulation": "simulation: rotation of the slots",
     "slot_gradient_K of the simulation": "simulation: gradient in the slots",
     "slot_lag_s of the simulation": "simulation: thermal lag of the slots",
-    "supply_spread of the simulation": "simulation: spread of the supply",
+    "supply_reading_ppm of the simulation": "simulation: measurement of the supply",
 }
 DECLARATION = (
     "The results relate only to the item calibrated, in the condition in which it was received, and to the stated conditions. "

@@ -81,7 +81,14 @@ def _validate(job: Job, run: Run) -> Tables:
 
 def _reduce(job: Job, run: Run) -> Tables:
     tables = run.table("readings"), run.table("verdicts")
-    return {"dwells": reduced_summaries(_summaries(job, run), *tables, job.recipe.local_gravity_m_s2)}
+    gravity, follows = job.recipe.local_gravity_m_s2, budget_terms(job).follows
+    return {"dwells": reduced_summaries(_summaries(job, run), *tables, gravity, follows)}
+
+
+def _reduced_with(job: Job) -> dict[str, Any]:
+    follows = budget_terms(job).follows
+    own = {} if follows is None else {"supply": follows._asdict()}
+    return {"local_gravity_m_s2": job.recipe.local_gravity_m_s2, **own}
 
 
 _converted: dict[tuple[str, str, str], LotTables] = {}
@@ -181,7 +188,7 @@ STAGES: tuple[Stage, ...] = (
         name="reduce",
         inputs=(RECORDS, "readings", "verdicts"),
         outputs=("dwells",),
-        parameters=lambda job: {"local_gravity_m_s2": job.recipe.local_gravity_m_s2},
+        parameters=_reduced_with,
         call=_reduce,
         modules=("pipelines.stages.reduce", _TABLES),
     ),

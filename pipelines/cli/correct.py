@@ -83,8 +83,9 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.export.corrected import corrected, fit_of_unit
-    from pipelines.export.recording import read_recording
+    from pipelines.export.recording import at_nominal_supply, read_recording
     from pipelines.jobs.model_files import use_formulas_of
+    from pipelines.jobs.terms import archived_terms
     from schemas.errors import DONE, PART_FAILED
 
     name, _, unit = calibration.partition(":")
@@ -93,6 +94,9 @@ def command(
     fit = fit_of_unit(run, unit, failed=failed, revoked=revoked)
     with error_console().status(f"reading {file.name}"):
         recording = read_recording(file, [c.strip() for c in columns.split(",") if c.strip()], time=time, rate_hz=rate)
+    terms = archived_terms(run.about)
+    if terms is not None and terms.follows is not None:
+        recording = at_nominal_supply(recording, terms.follows)
     done = corrected(recording, fit, _tracking(run, recording, force, gravity, turn_on, step, at_rest=at_rest))
     if output is not None:
         _write(recording, done, output)

@@ -142,10 +142,17 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.certificates.days import today
     from pipelines.export import revoked_units
+    from pipelines.jobs.terms import archived_terms
 
     given, day = {c.unit for c in chosen}, today()
     lines = [f"left out: {unit}, {one.sentence()}" for unit, one in revoked_units(run).items() if unit not in given]
     lines += [f"{c.unit}: {c.certified}" for c in chosen if c.certificate is not None and not c.certificate.holds(day)]
+    terms = archived_terms(run.about)
+    if terms is not None and terms.follows is not None:
+        lines.append(
+            f"the coefficients hold at {terms.follows.nominal_V:g} V of supply: multiply the raw output by that over the "
+            "measured supply before they are applied, or read it with a converter that is referred to the supply"
+        )
     bare = [c.unit for c in chosen if c.certificate is None]
     if bare:
         lines.append(f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' gives them a period of validity")

@@ -9,6 +9,10 @@ from pipelines.cli.options import console, print_table, short
 TITLES = {
     "bias": "bias",
     "scale": "scale",
+    "misalignment": "misalignment",
+    "bias_temperature": "bias over temperature",
+    "scale_temperature": "scale over temperature",
+    "verification_norm": "magnitude in a verification pose",
     "bias_error": "error by the references alone",
     "bias_error_period": "error over the period, RMS",
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from pipelines.stages.reduce import FollowedSupply
 
     Array = NDArray[np.float64]
 
@@ -81,6 +83,17 @@ def read_recording(
     if set(FORCE_COLUMNS) <= set(there):
         known = np.stack([_numbers(table[name]) for name in FORCE_COLUMNS], axis=1)
     return CorrectableRecording(moments, output, _state(table, moments, {*chosen, time or TIME}, where), known, where)
+
+
+def at_nominal_supply(recording: CorrectableRecording, follows: FollowedSupply) -> CorrectableRecording:
+    """The recording with the outputs at the nominal supply, as the calibration has them; its supply is needed."""
+    supply = recording.state.supply
+    if supply is None or not np.all(supply > 0.0):
+        raise DataRejected(
+            f"{recording.name}: the output follows the supply and was calibrated at {follows.nominal_V:g} V, the measured "
+            "supply is needed; add a column supply_V in V"
+        )
+    return replace(recording, output=recording.output / follows.ratio(supply)[:, None])
 
 
 def _state(table: pd.DataFrame, time: Array, used: set[str], where: str) -> State:

@@ -76,15 +76,30 @@ def refuse_unreachable(job: Measuring) -> None:
     terms = planned_terms(job.recipe, job.station, job.limits)
     if terms.stated is None or not job.recipe.tumbles:
         return  # without the multi-position test no figure rests on the budget
-    dwells = planned_dwells(job.recipe, job.station)
-    quiet = PlannedDwells(*dwells, covariance=np.eye(dwells.fit.time.size), run_ug=0.0, instability_ug=0.0)
-    wrong = unreachable(reachable(quiet, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
+    planned = without_noise(job.recipe, job.station)
+    wrong = unreachable(reachable(planned, terms, job.recipe.effects), job.limits, terms.certificate.validity_months)
     if wrong:
         raise RecipeInvalid(
-            f"recipe {job.recipe.name} on station {job.station.name}: {wrong[0]}, noise of the device left out; raise the "
-            "limit, or improve what rules it (see 'tumbleline plan')",
+            f"recipe {job.recipe.name} on station {job.station.name}: no unit can meet its limits, noise of the device left out: "
+            f"{'; '.join(wrong)}; nothing was moved; raise the limits in {job.recipe.limits}, or lower the uncertainty of the "
+            f"largest contribution in [uncertainty]{_supply_not_measured(terms)} (see 'tumbleline plan')",
             key="limits",
         )
+
+
+def without_noise(recipe: Recipe, station: StationConfig) -> PlannedDwells:
+    """The dwells that a recipe plans, of a device of no noise: their weights are alike, and nothing is added to them."""
+    dwells = planned_dwells(recipe, station)
+    weights = 1e-24 * np.eye(dwells.fit.time.size)
+    return PlannedDwells(*dwells, covariance=weights, run_ug=0.0, instability_ug=0.0)
+
+
+def _supply_not_measured(terms: BudgetTerms) -> str:
+    """What to do about the supply of a device that follows it, where it is not measured."""
+    supply = None if terms.stated is None else terms.stated.supply
+    if supply is None or terms.stability is None or terms.stability.ratiometric == 0.0 or supply.ratio_measured:
+        return ""
+    return "; the output follows the supply: measure that of each slot, supply = { u_ppm = …, ratio_measured = true }"
 
 
 def archived_terms(about: Mapping[str, Any]) -> BudgetTerms | None:
@@ -119,11 +134,15 @@ def with_stability(recipe: Recipe, station: StationConfig) -> Recipe:
     from stations.plant.preset import load_preset  # a station of hardware has no plant
 
     preset = load_preset(recipe.device, station.simulation.preset_overrides)
-    return recipe.model_copy(update={"stability": preset.stability})
+    own = preset.stability
+    if own is not None and preset.zero_level > 0.0:
+        electrical = {"supply_V": preset.supply_V, "zero_level_g": preset.zero_level / preset.scale}
+        own = own.model_copy(update=electrical)
+    return recipe.model_copy(update={"stability": own})
 
 
 def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
-    """Refuse a recipe whose entries are not traced, or whose local gravity is not the station's.
+    """Refuse a recipe whose entries are not traced, whose local gravity is not the station's, or that lacks its nominal supply.
 
     Raises
     ------
@@ -135,7 +154,14 @@ def refuse_contradictions(recipe: Recipe, station: StationConfig) -> None:
             refuse_untraced(recipe.uncertainty, station.reference, simulated=station.kind == "simulated")
         except ValueError as problem:
             raise RecipeInvalid(f"recipe {recipe.name}: {problem}", key="uncertainty") from None
-    stated = merged(station.uncertainty, recipe.uncertainty)
+    stated, own = merged(station.uncertainty, recipe.uncertainty), recipe.stability
+    measured = stated is not None and stated.supply is not None and stated.supply.ratio_measured
+    if own is not None and own.ratiometric > 0.0 and own.supply_V is None and measured:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: key 'stability.supply_V': missing, station {station.name} measures the supply that the "
+            "output follows, and the nominal one is needed; add supply_V = … in V to [stability]",
+            key="stability.supply_V",
+        )
     if stated is None or stated.gravity is None:
         return
     value, u = stated.gravity.value, stated.gravity.relative().u

@@ -25,7 +25,7 @@ def noise_of(recipe: Recipe, device: str, density: float | None, wander: float |
     if density is not None and wander is not None:
         return DwellNoise(density * UG, wander * UG / FLICKER_FLOOR)
     preset = load_preset(device or recipe.device)
-    white = preset.noise_density_ug if density is None else density
+    white = preset.sampled_density_ug(recipe.rate_hz) if density is None else density
     if wander is not None:
         return DwellNoise(white * UG, wander * UG / FLICKER_FLOOR)
     return DwellNoise(white * UG, preset.bias_instability_ug * UG, preset.rate_random_walk_ug * UG)

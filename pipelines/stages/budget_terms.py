@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipelines.stages.contributions import merged
+from pipelines.stages.reduce import FollowedSupply
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotTables
 from schemas.validity import CertificateTerms, Stability
@@ -62,6 +63,18 @@ class BudgetTerms:
     soak_min_s: float
     dwell_s: float
     room_C: float
+
+    @property
+    def follows(self) -> FollowedSupply | None:
+        """How the outputs follow a supply that is measured; None where it is not measured, or they do not follow it.
+
+        None as well for runs of earlier versions, which state no nominal supply and are as they were read.
+        """
+        own = self.stability
+        supply = None if self.stated is None else self.stated.supply
+        if own is None or own.supply_V is None or supply is None or not supply.ratio_measured or own.ratiometric == 0.0:
+            return None
+        return FollowedSupply(own.supply_V, own.ratiometric)
 
     def document(self) -> dict[str, Any]:
         """As JSON values."""

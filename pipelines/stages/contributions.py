@@ -163,9 +163,8 @@ def remainder(at: DwellConditions, tau_s: float) -> Array:
 def _electrical(
     stated: Uncertainty, at: DwellConditions, stability: Stability | None
 ) -> Iterator[tuple[str, Errors, float]]:
-    follows = stability is not None and stability.ratiometric
-    if stated.supply is not None and follows and not stated.supply.ratio_measured:
-        yield "supply", Errors(gain=1.0), stated.supply.standard().u
+    if stated.supply is not None and stability is not None and stability.ratiometric > 0.0:
+        yield "supply", Errors(gain=stability.ratiometric), stated.supply.standard().u
     own = [(axis, float(at.scale[axis])) for axis in range(3)]
     if stated.reader is not None:
         yield "reader_gain", Errors(gain=1.0), stated.reader.standard("gain").u

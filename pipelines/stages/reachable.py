@@ -10,10 +10,11 @@ import numpy as np
 from inertial import design
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
-from inertial.uncertainty.propagation import fit_design, propagated, rms_over
+from inertial.uncertainty.propagation import fit_design, norm_errors, propagated, rms_over
 from pipelines.stages.budget import with_device_temperature
 from pipelines.stages.contributions import DwellConditions, influences
 from pipelines.stages.period import ageing_u
+from pipelines.stages.quantities import EFFECTS
 from schemas.decisions import GRADES
 from schemas.units import AXES, MICRO
 
@@ -30,7 +31,18 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 DAY_S = 86_400.0
-FIGURES = {"bias_error": "bias_error_ug", "bias_error_period": "bias_error_period_ug"}
+LEAST_SHARE = 0.01
+"""Smallest share of a contribution that a reason names."""
+FIGURES = {
+    "bias_error": ("bias_error_ug", 1.0),
+    "bias_error_period": ("bias_error_period_ug", 1.0),
+    "verification_norm": ("verification_norm_ug", 1.0),
+    "bias": ("zero_g_offset_mg", 1e-3),
+    "misalignment": ("misalignment_mrad", 1e-3),
+    "bias_temperature": ("bias_temperature_ug_K", 1.0),
+    "scale_temperature": ("scale_temperature_ppm_K", 1.0),
+}
+"""Figures that may have limits by the quantity whose uncertainty is theirs, with the figure's unit per unit of the quantity."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +90,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     """
     if terms.stated is None:
         return []
-    nominal = _nominal(effects, planned.fit)
+    nominal = _nominal(effects, planned.fit, 0.0 if terms.stability is None else terms.stability.zero_level_g)
     model = with_device_temperature(nominal, np.eye(3), terms.stability)
     at = DwellConditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
     source = sensitivity(model, planned.fit, *influences(terms.stated, at, terms.stability))
@@ -87,7 +99,7 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     names = np.array(source.contributions, dtype=object)
     noise = fit.gain @ planned.covariance @ np.swapaxes(fit.gain, -1, -2)
     out: list[Reach] = []
-    for effect, unit in (("bias", "µg"), ("scale", "ppm")):
+    for effect, unit in EFFECTS.items():
         for axis, letter in enumerate(AXES):
             for column in [k for k, (name, _) in enumerate(fit.names[axis]) if name == effect]:
                 own = float(np.sqrt(noise[axis, column, column]))
@@ -97,11 +109,12 @@ def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]
     return out
 
 
-def _nominal(effects: Sequence[str], state: State) -> MeasurementModel:
+def _nominal(effects: Sequence[str], state: State, zero_level_g: float) -> MeasurementModel:
+    usual = {"scale": 1.0, "bias": zero_level_g}
     sensor, station = design.split(effects)
     values = design.starting_values([*sensor, *station], state)
     names = [design.local_names(sensor, axis, values) for axis in range(3)]
-    coefficients = np.array([[1.0 if effect == "scale" else 0.0 for effect, _ in own] for own in names])
+    coefficients = np.array([[usual.get(effect, 0.0) for effect, _ in own] for own in names])
     return MeasurementModel(tuple(effects), coefficients, values)
 
 
@@ -135,7 +148,15 @@ def _errors(
             out.append(
                 Reach("bias_error_period", letter, "µg", float(np.sqrt(sum(v**2 for v in whole.values()))), whole)
             )
-    return out
+    return [*out, _norm(errors, state, names)]
+
+
+def _norm(errors: Array, state: State, names: Array) -> Reach:
+    """Magnitude at the pose of the verification where it is least certain."""
+    along = MICRO * norm_errors(errors, state.force)
+    worst = along[int(np.argmax(np.sum(along**2, axis=-1)))]
+    parts = {group: float(np.sqrt(np.sum(worst[names == group] ** 2))) for group in dict.fromkeys(names.tolist())}
+    return Reach("verification_norm", "norm", "µg", float(np.sqrt(np.sum(worst**2))), parts)
 
 
 def _later(planned: PlannedDwells, terms: BudgetTerms) -> dict[str, float] | None:
@@ -157,12 +178,15 @@ def _later(planned: PlannedDwells, terms: BudgetTerms) -> dict[str, float] | Non
 
 
 def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[str]:
-    """Why limits cannot be met, a sentence each: U of the references, or the error expected over the period, exceeds them."""
+    """Why limits cannot be met, a sentence each: U of the references, or the error expected over the period, exceeds them.
+
+    A unit whose U exceeds the limit is not decided, whatever its value is: every unit of the lot would be.
+    """
     from pipelines.stages.budget_rows import LABELS
 
     out: list[str] = []
     worst = {q: max((r for r in reaches if r.quantity == q), key=lambda r: r.u, default=None) for q in FIGURES}
-    for quantity, figure in FIGURES.items():
+    for quantity, (figure, factor) in FIGURES.items():
         one = worst[quantity]
         needed = limits.figures[figure].max if figure in limits.figures else None
         if quantity == "bias_error_period":
@@ -170,9 +194,16 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
         if one is None or needed is None:
             continue
         period = quantity == "bias_error_period"
-        reached = one.u if period else limits.coverage_factor * one.u
+        reached = factor * (one.u if period else limits.coverage_factor * one.u)
         if reached > needed:
+            unit = limits.figures[figure].unit if figure in limits.figures else one.unit
             what = f"error expected over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
-            rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in list(one.shares.items())[:3])
-            out.append(f"{figure}: limit {needed:.3g} µg, {what} {reached:.3g} µg ({rulers})")
+            shares = [(name, share) for name, share in one.shares.items() if share >= LEAST_SHARE][:3]
+            rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in shares)
+            out.append(f"{figure}: limit {shown(needed)} {unit}, {what} {shown(reached)} {unit} ({rulers})")
     return out
+
+
+def shown(value: float) -> str:
+    """A value with three digits, without an exponent."""
+    return f"{float(f'{value:.3g}'):g}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,12 +11,14 @@ from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE
 from pipelines.tables.dwell_table import covariates
 from pipelines.tables.samples import PROCEDURE, STATIC
 from pipelines.tables.summaries import MEANS, SPREADS, summarised
+from schemas.errors import DataRejected
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import pandas as pd
+    from numpy.typing import NDArray
 
 KEPT = (
     *("unit", "slot", "record", "kind", "pose", "soak", "duration_s"),
@@ -27,6 +29,17 @@ KEPT = (
 )
 WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)
 """Of runs that switch their devices off and on."""
+
+
+class FollowedSupply(NamedTuple):
+    """Nominal supply, V, and the share of its relative change that the output follows."""
+
+    nominal_V: float
+    share: float
+
+    def ratio(self, supply: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Output over that at the nominal supply, of measured supplies in V."""
+        return 1.0 + self.share * (supply / self.nominal_V - 1.0)
 
 
 def reduce(
@@ -42,7 +55,11 @@ def reduce(
 
 
 def reduced_summaries(
-    summaries: pd.DataFrame, readings: pd.DataFrame, verdicts: pd.DataFrame, local_gravity_m_s2: float
+    summaries: pd.DataFrame,
+    readings: pd.DataFrame,
+    verdicts: pd.DataFrame,
+    local_gravity_m_s2: float,
+    follows: FollowedSupply | None = None,
 ) -> pd.DataFrame:
     """Dwells of the accepted units, in order of measurement.
 
@@ -52,6 +69,7 @@ def reduced_summaries(
     readings : of the whole run; the reference force comes from the encoder readings.
     verdicts : of the validate stage.
     local_gravity_m_s2 : at the station; the force is stated in standard g.
+    follows : how the outputs follow the measured supply; they are referred to the nominal one then
     """
     accepted = set(verdicts.loc[~verdicts["refused"], "unit"])
     means = summaries.loc[summaries["unit"].isin(accepted), ["unit", "record", *MEANS, *SPREADS, "n"]]
@@ -65,7 +83,27 @@ def reduced_summaries(
         dwell=dwells["record"],
         **_forces(dwells, local_gravity_m_s2 / STANDARD_GRAVITY_M_S2),
     )
+    if follows is not None:
+        dwells = at_nominal_supply(dwells, follows)
     return dwells.sort_values(["unit", "dwell"], ignore_index=True)
+
+
+def at_nominal_supply(dwells: pd.DataFrame, follows: FollowedSupply) -> pd.DataFrame:
+    """The dwells with the outputs that the devices had at their nominal supply, by the supply measured in each dwell.
+
+    The whole output follows, the level at 0 g included: 1 ppm of supply moves the bias of 1.5 V at 0.3 V/g by 5 µg.
+    """
+    column = BY_ATTRIBUTE["supply"].column
+    supply = dwells[column].to_numpy(dtype=float)
+    bad = np.flatnonzero(~(np.isfinite(supply) & (supply > 0.0)))
+    if bad.size:
+        row = dwells.iloc[int(bad[0])]
+        raise DataRejected(
+            f"reduce: unit {row['unit']}, dwell {row['dwell']}: supply {supply[bad[0]]:g} V, a measured supply is needed, for "
+            f"the output follows it; check the meter of slot {row['slot']}, or take ratio_measured out of [uncertainty]"
+        )
+    ratio = follows.ratio(supply)
+    return dwells.assign(**{name: dwells[name].to_numpy(dtype=float) / ratio for name in (*MEANS, *SPREADS)})
 
 
 def _forces(dwells: pd.DataFrame, magnitude_g: float) -> dict[str, np.ndarray]:

@@ -262,7 +262,7 @@ class Bench:
     def _converted(self, outputs: Array, rng: np.random.Generator, rate_hz: float = 0.0) -> Array:
         """Noise, clipping and rounding of outputs (n, units, 3) in g; result in the output's unit."""
         preset = self.preset
-        sigma = 1e-6 * preset.noise_density_ug * math.sqrt((rate_hz or self.rate_hz) / 2.0)
+        sigma = 1e-6 * preset.sample_noise_ug(rate_hz or self.rate_hz)
         noisy = outputs + sigma * rng.standard_normal(outputs.shape)
         for k in self.cable_off:
             noisy[:, k] = sigma * rng.standard_normal((len(outputs), 3))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from stations.plant.preset import Preset
 
@@ -44,7 +44,7 @@ class Truth:
     slot_rotation: Array  # (3, 3), fixture to slot
     output_scale: float  # output units per g
     zero_level: float  # output units
-    supply_ratio: float  # true supply over nominal where the output follows it, else 1
+    supply_ratio: float  # output over that at the nominal supply: the share of the supply's offset that it follows
     supply_gain: float = 0.0  # relative change of the gain besides, per relative change of the supply
 
     @property
@@ -71,7 +71,7 @@ def draw_truth(
     cubic = 1e-2 * preset.linearity_pct_fs / preset.range_g**2
     return Truth(
         serial=serial,
-        bias_g=preset.bias_mean_g + preset.bias_sd_g * normal[0],
+        bias_g=np.asarray(preset.bias_mean_g) + np.asarray(preset.bias_sd_g) * normal[0],
         scale_ppm=preset.scale_sd_ppm * normal[1],
         misalignment=skew,
         bias_tempco=tempco * normal[2],
@@ -82,7 +82,7 @@ def draw_truth(
         slot_rotation=slot_rotation,
         output_scale=output_scale,
         zero_level=preset.zero_level,
-        supply_ratio=supply_ratio if preset.ratiometric else 1.0,
+        supply_ratio=1.0 + preset.ratiometric * (supply_ratio - 1.0),
         supply_gain=(RATIOMETRIC_ERROR if preset.ratiometric else REJECTION)
         * float(stream(seed, serial, "supply").standard_normal()),
     )
@@ -91,8 +91,15 @@ def draw_truth(
 class PlantDevices:
     """The units of a lot, computed together."""
 
-    def __init__(self, preset: Preset, truths: Sequence[Truth], turn_on: Sequence[np.random.Generator] = ()) -> None:
+    def __init__(
+        self,
+        preset: Preset,
+        truths: Sequence[Truth],
+        turn_on: Sequence[np.random.Generator] = (),
+        supply_drift: Callable[[Array], Array | float] = lambda _: 0.0,
+    ) -> None:
         self._preset = preset
+        self._supply_drift = supply_drift  # relative, of the slots at instants (n,)
         self._turn_on = list(turn_on)  # a stream a unit, for what each switching on changes
         self._lsb = float(np.float32(preset.lsb))  # as the reader's register tells it
         self._bias = self._first_bias = np.stack([t.bias_g for t in truths])
@@ -144,16 +151,18 @@ class PlantDevices:
         change = part[:, None] - 1.0
         besides = 1.0 + self._supply_gain * change
         if self._preset.ratiometric:
-            self._gain = self._ratio * part[:, None] * besides
+            self._gain = self._ratio * (1.0 + self._preset.ratiometric * change) * besides
         else:
             self._gain = self._ratio * besides
             self._shift = SUPPLY_SHIFT_G * change
 
-    def counts(self, output: Array) -> Counts:
-        """What the converter says of outputs (n, s, 3) in g: supply, clipping at range and codes, rounding."""
+    def counts(self, output: Array, time: Array | None = None) -> Counts:
+        """What the converter says of outputs (n, s, 3) in g at instants (n,): supply, clipping at range and codes, rounding."""
         preset = self._preset
         inside = np.clip(output + self._shift, -preset.range_g, preset.range_g)
-        raw = np.rint(self._gain * (preset.zero_level + preset.scale * inside) / self._lsb)
+        drift = 0.0 if time is None else np.asarray(self._supply_drift(time))[..., None]
+        gain = self._gain * (1.0 + preset.ratiometric * drift)
+        raw = np.rint(gain * (preset.zero_level + preset.scale * inside) / self._lsb)
         raw = raw + self._offset_counts
         return np.clip(raw, -preset.largest_count - 1, preset.largest_count).astype(np.int64)
 

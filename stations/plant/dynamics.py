@@ -21,10 +21,10 @@ def output_pole_hz(preset: Preset) -> float:
     A spring-mass system with 2500 Hz and ζ = 0.7 alone passes 2500 Hz; the 1500 Hz of the data sheet hold for the whole chain.
     Infinite where the spring-mass system alone has a smaller bandwidth.
     """
-    u = preset.bandwidth_hz / preset.natural_frequency_hz
+    u = preset.passband_hz / preset.natural_frequency_hz
     squared = (1.0 - u**2) ** 2 + (2.0 * preset.damping * u) ** 2  # 1/|H|² of the mass at the bandwidth
     left = 2.0 / squared - 1.0
-    return preset.bandwidth_hz / math.sqrt(left) if left > 0.0 else math.inf
+    return preset.passband_hz / math.sqrt(left) if left > 0.0 else math.inf
 
 
 def transfer(preset: Preset) -> tuple[Array, Array]:

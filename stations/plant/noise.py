@@ -43,13 +43,16 @@ class UnitNoise:
     """The noise of a lot, in g, with the state that continues from one sampling to the next."""
 
     def __init__(self, preset: Preset, streams: Sequence[np.random.Generator]) -> None:
-        self._density = preset.noise_density_ug * 1e-6
+        self._preset = preset
         self._walk_step = preset.rate_random_walk_ug * 1e-6
         self._tau = flicker_time_constants()
         self._sigma = math.sqrt(flicker_variance(preset.bias_instability_ug * 1e-6))
         self._streams = list(streams)
         self._flicker = self._sigma * self._draw(1, TERMS)[0]
         self._walk: Array = np.zeros((len(self._streams), 3))
+        self._filtered: Array = np.zeros(
+            (len(self._streams), 3)
+        )  # white noise behind the output filter at the last sample
 
     def jump(self, gap: float) -> None:
         """Advances the slow processes over ``gap`` seconds without sampling; exact, in one step."""
@@ -61,11 +64,11 @@ class UnitNoise:
     def sample(self, n: int, rate: float) -> Array:
         """The next ``n`` samples at ``rate`` Hz, (n, units, 3), g.
 
-        White noise of the one-sided density n_d has the deviation n_d·sqrt(fs/2) per sample.
+        White noise of the one-sided density n_d has the deviation n_d·sqrt(fs/2) per sample, or that of the output filter.
         """
         slow = np.flatnonzero(self._tau * rate >= FASTEST)
         z = self._draw(n, 2 + (len(slow) if self._sigma > 0.0 else 0))
-        total = self._density * math.sqrt(rate / 2.0) * z[..., 0]
+        total = self._white(z[..., 0], rate)
         if self._walk_step > 0.0:
             steps = self._walk_step / math.sqrt(rate) * z[..., 1]
             steps[0] += self._walk
@@ -81,6 +84,15 @@ class UnitNoise:
                 self._flicker[..., k] = path[-1]
                 total += path
         return total
+
+    def _white(self, z: Array, rate: float) -> Array:
+        """White noise from standard normal numbers (n, units, 3); behind an output filter its samples are correlated."""
+        sigma, keep = 1e-6 * self._preset.sample_noise_ug(rate), self._preset.sample_correlation(rate)
+        if keep == 0.0:
+            return sigma * z
+        path, _ = lfilter([sigma * math.sqrt(1.0 - keep**2)], [1.0, -keep], z, axis=0, zi=keep * self._filtered[None])
+        self._filtered = path[-1].copy()
+        return path
 
     def _draw(self, n: int, terms: int) -> Array:
         """Standard normal numbers, (n, units, 3, terms); those of each unit come from its own stream."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from importlib.resources import files
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -24,6 +25,10 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
 class Preset(Strict):
     """A kind of device. Standard deviations are those between units; densities are one-sided.
 
+    bias_mean_g, bias_sd_g : of the bias of all axes, or of x, y and z
+    noise_bandwidth_hz : of the output filter, one pole; 0 for none: then the converter's own filter ends at half the sample rate
+    ratiometric : share of the supply's relative change that the output follows; true is 1
+
     offset_step : counts of the output per step of its offset registers; 0 for a device without them
     """
 
@@ -39,6 +44,7 @@ class Preset(Strict):
     temperature_low_C: FiniteFloat
     temperature_high_C: FiniteFloat
     noise_density_ug: NotNegative
+    noise_bandwidth_hz: NotNegative = 0.0
     bias_instability_ug: NotNegative
     rate_random_walk_ug: NotNegative
     bandwidth_hz: Positive
@@ -46,17 +52,35 @@ class Preset(Strict):
     damping: Positive
     shock_limit_g: Positive
     packing: Literal["int20x3", "int24x3"]
-    bias_mean_g: FiniteFloat
-    bias_sd_g: NotNegative
+    bias_mean_g: FiniteFloat | tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    bias_sd_g: NotNegative | tuple[NotNegative, NotNegative, NotNegative]
     scale_sd_ppm: NotNegative
     misalignment_sd_mrad: NotNegative
     zero_level: FiniteFloat
-    ratiometric: bool
+    ratiometric: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)]
     supply_V: Positive
     thermometer_resolution_K: Positive
     thermometer_noise_K: NotNegative
     offset_step: Annotated[int, Field(ge=0)] = 0
     stability: Stability | None = None
+
+    @property
+    def passband_hz(self) -> float:
+        """−3 dB frequency of the output: that of the sheet, or of the output filter, whose noise bandwidth is π/2 of it."""
+        return min(self.bandwidth_hz, 2.0 / math.pi * self.noise_bandwidth_hz or math.inf)
+
+    def sample_noise_ug(self, rate_hz: float) -> float:
+        """Standard deviation of the white noise of one sample, µg: density times the root of the noise bandwidth."""
+        return self.noise_density_ug * math.sqrt(self.noise_bandwidth_hz or rate_hz / 2.0)
+
+    def sample_correlation(self, rate_hz: float) -> float:
+        """Correlation of the white noise of adjacent samples: a pole of noise bandwidth B has the time constant 1/(4B)."""
+        return math.exp(-4.0 * self.noise_bandwidth_hz / rate_hz) if self.noise_bandwidth_hz > 0.0 else 0.0
+
+    def sampled_density_ug(self, rate_hz: float) -> float:
+        """White noise at low frequencies after sampling, µg/√Hz: what the filter passes above half the rate is folded into it."""
+        r = self.sample_correlation(rate_hz)
+        return self.sample_noise_ug(rate_hz) * math.sqrt(2.0 / rate_hz * (1.0 + r) / (1.0 - r))
 
     @property
     def largest_count(self) -> int:

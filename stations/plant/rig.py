@@ -58,10 +58,10 @@ class Rig:
 
 def two_pole_behind(preset: Preset) -> float:
     """Corner of the two-pole low-pass, Hz, that puts the −3 dB point of the chain at the sheet's bandwidth."""
-    u = preset.bandwidth_hz / preset.natural_frequency_hz
+    u = preset.passband_hz / preset.natural_frequency_hz
     mass = (1.0 - u**2) ** 2 + (2.0 * preset.damping * u) ** 2
     left = 2.0 / mass - 1.0
-    return preset.bandwidth_hz / left**0.25 if left > 0.0 else 20.0 * preset.natural_frequency_hz
+    return preset.passband_hz / left**0.25 if left > 0.0 else 20.0 * preset.natural_frequency_hz
 
 
 def directions(axis: int, across_deg: float | None) -> tuple[Array, Array, Array]:

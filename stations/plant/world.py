@@ -30,6 +30,7 @@ from stations.plant.physics import Physics
 from stations.plant.preset import Preset, load_preset
 from stations.plant.reference_errors import StationErrors
 from stations.plant.sampler import Sampler
+from stations.plant.supplies import Supplies
 from stations.plant.table import Axis
 from stations.profile_files import load_profile
 
@@ -44,7 +45,6 @@ Array = NDArray[np.float64]
 AIR, THERMOMETER, SUPPLY, VIBRATION, HUMIDITY, OUTER, INNER = 1, 2, 3, 4, 5, 10, 20  # channels of keyed noise
 STANDARD_G = 9.80665  # m/s², CGPM 1901
 AIR_NOISE_K = 0.01
-SUPPLY_NOISE = 2e-5
 VIBRATION_NOISE = 0.02
 HUMIDITY_NOISE_PCT = 0.1
 OUTAGE_S = 1.0
@@ -77,8 +77,8 @@ class World:
             self.outer.scatter_deg = self.inner.scatter_deg = self.station_errors.pose_deg
         air, water = (stream(sim.seed, lot.seed, lot.repeat, name) for name in ("air", "moisture"))
         self.fixture = Fixture(sim, self.slots, air, effects, Moisture(water))
-        self._supply = 1.0 + sim.supply_spread * stream(sim.seed, "supply").standard_normal(64)[self.slots]
-        self._supply_factor = np.ones(len(self.slots))
+        drift = stream(sim.seed, lot.seed, lot.repeat, "supply drift")
+        self._supplies = Supplies(sim, self.slots, drift, followed=self.preset.ratiometric > 0.0)
         self._truths = self._draw_truths(sim, lot)
         noise = [stream(sim.seed, lot.seed, lot.repeat, serial, "noise") for serial in self.serials]
         turn_on = [stream(sim.seed, lot.seed, lot.repeat, serial, "turn-on") for serial in self.serials]
@@ -86,7 +86,7 @@ class World:
             (self.outer, self.inner),
             self.fixture,
             np.stack([t.slot_rotation for t in self._truths]),
-            PlantDevices(self.preset, self._truths, turn_on),
+            PlantDevices(self.preset, self._truths, turn_on, self._supplies.drift),
             Dynamics(self.preset),
             UnitNoise(self.preset, noise),
             effects,
@@ -120,7 +120,7 @@ class World:
                 unit.serial,
                 lot.seed,
                 slot_rotation=rotation(seats[unit.slot]),
-                supply_ratio=float(self._supply[i]),
+                supply_ratio=float(self._supplies.offset[i]),
                 output_scale=self.preset.scale,
             )
             for i, unit in enumerate(lot.units)
@@ -182,8 +182,8 @@ class World:
 
     def scale_supply(self, units: Sequence[int], factor: float) -> None:
         """Sets the supplies of some units to ``factor`` times their nominal voltage."""
-        self._supply_factor[list(units)] = factor
-        self.physics.devices.supply(self._supply_factor)
+        self._supplies.factor[list(units)] = factor
+        self.physics.devices.supply(self._supplies.factor)
 
     def truth(self, serial: str) -> Truth:
         """The true parameters of a unit; for tests and benchmarks, never for a client."""
@@ -210,8 +210,7 @@ class World:
 
     def supply_reading(self) -> list[float]:
         """Supply of the slots, V; 0 at empty slots."""
-        noise = SUPPLY_NOISE * self._noise(SUPPLY, len(self.slots))
-        volt = self.preset.supply_V * self._supply_factor * (self._supply + noise)
+        volt = self.preset.supply_V * self._supplies.reading(self.now, self._noise(SUPPLY, len(self.slots)))
         return self._by_slot(volt if self.powered else 0.0 * volt, 0.0)
 
     def vibration_reading(self) -> float:

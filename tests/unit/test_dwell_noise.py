@@ -23,9 +23,9 @@ def drawn_means(preset, starts, duration, rate=10.0):
     return 1e6 * np.stack(means).reshape(len(starts), -1)
 
 
-def noise_of(preset):
+def noise_of(preset, rate=10.0):
     return DwellNoise(
-        1e-6 * preset.noise_density_ug, 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug
+        1e-6 * preset.sampled_density_ug(rate), 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug
     )
 
 

@@ -40,7 +40,7 @@ def drawn(preset, state):
 def test_errors_of_a_lots_fits_are_those_that_the_plan_let_expect(name):
     preset, state = load_preset(name), course()
     noise = DwellNoise(
-        1e-6 * preset.noise_density_ug, 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug
+        1e-6 * preset.sampled_density_ug(RATE), 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug
     )
     output = drawn(preset, state)
     error = np.full(output.shape, noise.white(DWELL_S))

@@ -99,8 +99,8 @@ def test_analogue_device_sits_at_half_its_supply_and_follows_it():
 def test_bias_of_analogue_devices_is_drawn_once_per_device_as_the_note_says():
     plants = [plant_of(lot=lot_of(8, "analogue", seed=seed)) for seed in range(12)]
     volts = 0.3 * np.array([p.truth(s).bias_g for p in plants for s in p.serials])
-    assert volts.mean() == pytest.approx(0.03, abs=0.002)
-    assert volts.std() == pytest.approx(0.01, rel=0.15)
+    assert volts[:, 0].mean() == pytest.approx(0.03, abs=0.003)
+    assert volts[:, 0].std() == pytest.approx(0.01, rel=0.25)
 
 
 def test_move_keeps_its_speed_and_acceleration():
