@@ -25,7 +25,10 @@ OF_ANOTHER = {"crate"}
 """Locks of programs of other makers, whose environments do not hold the product."""
 
 PROBE = "import importlib.util as u, sys; print(*sys.version_info[:2], sep='.') if u.find_spec('pip') else sys.exit(1)"
-UNREACHED = r"(?:Retrying \(|Max retries exceeded|name resolution|[Cc]onnection ?(?:Error|refused|reset)|timed out)"
+UNREACHED = (
+    r"(?:Retrying \(|Max retries exceeded|name resolution|[Cc]onnection ?(?:Error|refused|reset)|timed out"
+    r"|from versions: none)"
+)
 COLLECTED = re.compile(r"^(?:Collecting|Processing) (\S+)", re.MULTILINE)
 FAILURES = (
     (
@@ -45,8 +48,8 @@ FAILURES = (
     ),
     (
         re.compile(rf"{UNREACHED}(?:.*No matching distribution found for (?P<name>\S+))?", re.DOTALL),
-        "your package index cannot be reached",
-        "check network and proxy, or give a folder of wheels with PIP_FIND_LINKS=… PIP_NO_INDEX=1",
+        "your package index cannot be reached, or has nothing of it",
+        "check network, proxy and 'pip config list', or give a folder of wheels with PIP_FIND_LINKS=… PIP_NO_INDEX=1",
     ),
     (
         re.compile(r"No matching distribution found for (?P<name>\S+)"),

@@ -26,6 +26,9 @@ UNREACHED = """WARNING: Retrying (Retry(total=0)) after connection broken by 'Ne
 ERROR: Could not find a version that satisfies the requirement six==1.17.0 (from versions: none)
 ERROR: No matching distribution found for six==1.17.0
 """
+OLDER = """ERROR: Could not find a version that satisfies the requirement six==99.0 (from versions: 1.16.0, 1.17.0)
+ERROR: No matching distribution found for six==99.0
+"""
 NOT_BUILT = """Processing ./broken-1.0.tar.gz (from -r b.txt (line 1))
   ERROR: Failed building wheel for broken
 Failed to build broken
@@ -42,8 +45,9 @@ OTHER = "Collecting scipy==1.17.1\nERROR: something new\n"
     ("text", "package", "found", "remedy"),
     [
         (TAMPERED, "six==1.17.0", "not that of requirements-run.lock", "pip cache purge"),
-        (UNREACHED, "six==1.17.0", "cannot be reached", "check network and proxy"),
-        (UNREACHED.partition("\n")[2], "six==1.17.0", "does not deliver this version for Python 3", "pip config list"),
+        (UNREACHED, "six==1.17.0", "cannot be reached", "check network, proxy"),
+        (UNREACHED.partition("\n")[2], "six==1.17.0", "cannot be reached, or has nothing", "PIP_FIND_LINKS="),
+        (OLDER, "six==99.0", "does not deliver this version for Python 3", "pip config list"),
         (NOT_BUILT, "broken", "there is no wheel for Python 3", "with PYTHON="),
         (NOT_BEGUN, "broken-1.0.tar.gz", "there is no wheel for Python 3", "with PYTHON="),
         (FULL, "scipy==1.17.1", "no space is left on the disk of .venv", "free 2 GB"),
@@ -126,6 +130,6 @@ def test_an_environment_is_made_completed_and_then_left_alone(tree: Path, capsys
     assert not (folder / "lib" / "torn").exists()
 
     (tree / "requirements-crate.lock").write_text(f"not-there==2.0 --hash=sha256:{'0' * 64}\n", encoding="utf-8")
-    with pytest.raises(NotSetUp, match=r"^not-there==2\.0: your package index does not deliver .*install\.log\)$"):
+    with pytest.raises(NotSetUp, match=r"^not-there==2\.0: your package index cannot be reached, .*install\.log\)$"):
         set_up("crate", folder)
     assert wrong_with(folder) == ""  # nothing was changed
