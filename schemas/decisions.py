@@ -74,7 +74,10 @@ class Decision:
             where = (
                 "inside the guard band" if self.margin >= 0.0 else f"{beyond} the limit by less than its uncertainty"
             )
-            return f"{self.figure} not accepted: {where}, {what}, {risk}: measure longer, or again"
+            remedy = "measure longer, or again"
+            if self.uncertainty > self.limit and not self.least:
+                remedy = "the uncertainty exceeds the limit, lower its largest contribution"
+            return f"{self.figure} not accepted: {where}, {what}, {risk}: {remedy}"
         return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
 
 

@@ -17,6 +17,7 @@ from pipelines.jobs.terms import planned_terms, without_noise
 from pipelines.planning.preset_noise import noise_of
 from pipelines.stages.reachable import reachable
 from pipelines.stages.reduce import FollowedSupply, at_nominal_supply
+from schemas.decisions import decide
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.station import load_station
 from schemas.units import AXES
@@ -140,6 +141,12 @@ def test_limits_that_no_unit_can_meet_are_told_before_an_order_is_sent(
         assert text in said.stderr
     assert not asked
     assert not (tmp_path / "archive" / "captures").exists()
+
+
+def test_a_unit_whose_uncertainty_exceeds_the_limit_is_not_told_to_be_measured_longer():
+    limits = Request(recipe=str(RECIPE), station=STATION).job().limits
+    assert "lower its largest contribution" in decide(limits, "bias_error_ug", 120.0, 650.0).sentence
+    assert "measure longer, or again" in decide(limits, "bias_error_ug", 700.0, 250.0).sentence
 
 
 @pytest.fixture(scope="module")
