@@ -104,10 +104,10 @@ def _shaped(made: Any, needed: tuple[int, ...], where: str, method: str) -> Arra
         values = whole = None
     own = 2 if method == "columns" else 3  # axes that are the effect's: dwells (and force axes) and coefficients
     if values is None or whole is None or values.shape[-own:] != needed[-own:]:
-        found = "no array of numbers" if values is None and not hasattr(made, "shape") else np.shape(made)
+        found = f"shape {np.shape(made)}" if isinstance(made, np.ndarray) else type(made).__name__
         what = "dwells, coefficients" if method == "columns" else "dwells, 3, parameters"
         raise BrokenEffect(
-            f"{where}: {method} returned shape {found}, {needed} is needed (…, {what}; as many as names gives); "
+            f"{where}: {method} returned {found}, shape {needed} is needed (…, {what}; as many as names gives); "
             "inertial.effects.base.stack makes it"
         )
     return values if values.shape == whole else np.broadcast_to(values, whole)

@@ -42,7 +42,7 @@ EXAMPLES_OF = {
     ),
     "optimise": (
         "tumbleline plan optimise my.toml",
-        "tumbleline plan optimise my.toml --criterion T --part third_order,odd_quadratic",
+        "tumbleline plan optimise my.toml --criterion T --part third_order,odd_quadratic --size 10000",
     ),
 }
 """Of the subcommands."""

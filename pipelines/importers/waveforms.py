@@ -16,7 +16,15 @@ from pipelines.importers import files
 from pipelines.importers.content import unit_in
 from pipelines.importers.documents import WaveformFigure, WaveformImport
 from pipelines.procedures import PROCEDURES
-from pipelines.procedures.base import REFERENCE, Device, FromWaveforms, NominalScale, ProcedureRecord, ProcedureStep, UnitRecord
+from pipelines.procedures.base import (
+    REFERENCE,
+    Device,
+    FromWaveforms,
+    NominalScale,
+    ProcedureRecord,
+    ProcedureStep,
+    UnitRecord,
+)
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
