@@ -5,6 +5,7 @@ It ends with a result or a verdict; the few that end otherwise here say why in o
 
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -26,6 +27,9 @@ SERVE = ("workbench", "monitor --serve", "station serve", "station watch", "--wa
 
 LONG = ("demo",)
 """Examples that take minutes."""
+
+PARTITIONED = {"rerun", "whatif", "release"}
+"""Commands that start processes of their own for every partition, or need one that does: in the slow part."""
 
 DIRECT = {"run", "investigate"}
 """Commands that are given with --direct: the orchestrator is tested elsewhere."""
@@ -75,13 +79,26 @@ def test_the_examples_are_found_and_every_exception_is_one_of_them() -> None:
         assert any(one in example for example in ALL), one
 
 
-def test_the_examples_of_every_help_end_with_a_result(world: tuple[Path, dict[str, str]], monkeypatch) -> None:
-    """In one test: later examples use what earlier ones made."""
-    folder, names = world
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        pytest.param([one for one in SHORT if one.split()[1] not in PARTITIONED], id="short"),
+        pytest.param(SHORT, id="all", marks=pytest.mark.slow),
+    ],
+)
+def test_the_examples_of_every_help_end_with_a_result(
+    chosen: list[str], world: tuple[Path, dict[str, str]], monkeypatch, tmp_path: Path
+) -> None:
+    """In one test: later examples use what earlier ones made, in a copy of the folder."""
+    made, names = world
+    folder = tmp_path / "folder"
+    shutil.copytree(made, folder)
+    names = {name: text.replace(str(made), str(folder)) for name, text in names.items()}
     _at_home(monkeypatch, folder)
     monkeypatch.chdir(folder)
     wrong: list[tuple[str, int, str]] = []
-    for example in SHORT:
+    for example in chosen:
         words = words_of(example, names)
         words += ["--direct"] if words[0] in DIRECT else []
         words += ["--archive", "elsewhere"] if words[0] in ELSEWHERE else []
