@@ -26,5 +26,9 @@ class MissingInput(InertialError):
         super().__init__(f"{effect}: the dwells have no {quantity}; record it, or leave {effect} out of the model")
 
 
+class BrokenEffect(InertialError):
+    """A module that should hold an effect cannot be used."""
+
+
 class NotIdentified(InertialError):
     """The plan cannot determine a coefficient that the model asks for."""

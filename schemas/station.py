@@ -86,10 +86,23 @@ class Pace(Strict):
 
 
 class LinkSettings(Strict):
-    """Patience of the links."""
+    """Patience of the links.
+
+    ``speed``: seconds of the station per second of this machine; 1 on hardware, for a simulated station that
+    ``tumbleline station serve --speed`` serves the same number.
+    """
 
     timeout_s: Seconds = 3.0
     read_attempts: Annotated[int, Field(ge=1, le=5)] = 2
+    speed: Annotated[float, Field(ge=0.001, le=1000.0)] = 1.0
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without the speed of hardware: captures of earlier versions keep their names."""
+        content = handler(self)
+        if content.get("speed") == 1.0:
+            del content["speed"]
+        return content
 
 
 class StationConfig(Strict):

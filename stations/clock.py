@@ -26,24 +26,27 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """The monotonic clock of the machine; its zero is its creation, or that of the earlier clock with this ``state``."""
+    """The monotonic clock of the machine; its zero is its creation, or that of the earlier clock with this ``state``.
 
-    def __init__(self, resume: bytes | None = None) -> None:
-        self._zero = time.monotonic()
+    ``speed`` is in seconds per second of the machine: 1 on hardware, that of the server for a simulated station served faster.
+    """
+
+    def __init__(self, resume: bytes | None = None, speed: float = 1.0) -> None:
+        self._zero, self._speed = time.monotonic(), speed
         if resume:
             earlier: dict[str, float] = json.loads(resume)
             # the date may have been set back meanwhile; the time of a run is monotonic
-            self._zero -= max(earlier["now_s"], time.time() - earlier["began_s"])
+            self._zero -= max(earlier["now_s"] / speed, time.time() - earlier["began_s"])
 
     def now(self) -> float:
         """Seconds since the creation of the clock, or of the first clock that it continues."""
-        return time.monotonic() - self._zero
+        return self._speed * (time.monotonic() - self._zero)
 
     def sleep(self, seconds: float) -> None:
         """Waits."""
-        time.sleep(max(0.0, seconds))
+        time.sleep(max(0.0, seconds) / self._speed)
 
     def state(self) -> bytes:
         """State from which a later clock continues: the time now and the date of its zero."""
         now = self.now()
-        return json.dumps({"now_s": now, "began_s": time.time() - now}).encode()
+        return json.dumps({"now_s": now, "began_s": time.time() - now / self._speed}).encode()

@@ -86,7 +86,7 @@ def open_devices(
     """The devices of a station of hardware; without ``protection`` to look at them, or to make them safe."""
     permit = None if protection is None else Permit(protection, config.link.timeout_s)
     require = nobody_else if protection is None else protection.require
-    links, clock = Links(config, permit=permit), WallClock(resume)
+    links, clock = Links(config, permit=permit), WallClock(resume, config.link.speed)
     try:
         yield replace(_assemble(config, slots, links, clock, roles), state=clock.state, exact=False, require=require)
     finally:

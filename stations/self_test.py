@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,7 @@ NOISIER = 3.0  # times the median noise of the slots; needs at least so many slo
 FEWEST_TO_COMPARE = 3
 KEPT = 0.99  # of the samples expected between start and stop, by the clock of the reader
 STANDS = 0.5  # of the requested seconds; a clock that shows less has stopped, or is not that of the reader
+RUNS_S = 10.0  # beyond them; a clock that shows more is not that of this station, or is served at another [link] speed
 SIGMAS = 3.0
 MOVING_RANGE = 1.128  # mean range of two over sigma, normal: NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2
 UP, DOWN = (0.0, 0.0), (180.0, 0.0)
@@ -127,7 +128,13 @@ class SelfTestBench:
         self.station.table.move(*UP)
         deviations: dict[int, NDArray[np.float64]] = {}
         samples_of = self._sampled()
-        self._value("clock", "reader", self.elapsed, "s", (STANDS * self.rules.sample_s, math.inf))
+        latest = self.rules.sample_s + RUNS_S * max(1.0, self.station.config.link.speed)
+        self._value("clock", "reader", self.elapsed, "s", (STANDS * self.rules.sample_s, latest))
+        if self.elapsed > latest:
+            served = (
+                "a station that 'tumbleline station serve --speed' serves needs the same speed in [link] of its file"
+            )
+            self.findings[-1] = replace(self.findings[-1], message=f"{self.findings[-1].message}; {served}")
         for slot, samples in samples_of.items():
             expected = math.floor(KEPT * self.elapsed * self.rules.rate_hz) - 1.0
             self._value("samples", f"slot {slot}", float(len(samples)), "", (max(expected, 0.0), math.inf))

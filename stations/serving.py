@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from stations.plant.plant import Plant
     from stations.plant.server import PlantServer
 
-TICK_S = 0.05
+TICK_S = 0.05  # of the station's time, by which what a client reads is late
+SHORTEST_TICK_S = 0.001
 TRIES = 50
 OCCUPIED = "occupied"
 NAMES = (("outer axis", "outer"), ("inner axis", "inner"), ("chamber", "chamber"), ("reader", "reader"))
@@ -99,7 +100,7 @@ def serve(
         server = _listening(plant, host, port, stack)
         ready(server.host, server.port)
         clock, done = WallClock(), 0.0
-        while not stop.wait(TICK_S):
+        while not stop.wait(max(SHORTEST_TICK_S, min(TICK_S, TICK_S / speed))):
             now = clock.now()
             plant.advance(round((now - done) * speed * 1e6))
             silence.look(now)

@@ -36,7 +36,9 @@ def modbus_station(port: int, host: str = "127.0.0.1", **changes: dict[str, obje
 
 
 @contextmanager
-def served(lot: Lot | None = None, silence_s: float = 0.0, **simulation: object) -> Generator[int, None, None]:
+def served(
+    lot: Lot | None = None, silence_s: float = 0.0, speed: float = 1.0, **simulation: object
+) -> Generator[int, None, None]:
     """The simulated station served while the block lasts; gives its port."""
     stop, listening, ports, failed = threading.Event(), threading.Event(), list[int](), list[Exception]()
 
@@ -45,7 +47,7 @@ def served(lot: Lot | None = None, silence_s: float = 0.0, **simulation: object)
         listening.set()
 
     def run() -> None:
-        how = {"host": "127.0.0.1", "port": 0, "speed": 1.0, "stop": stop, "ready": ready, "silence_s": silence_s}
+        how = {"host": "127.0.0.1", "port": 0, "speed": speed, "stop": stop, "ready": ready, "silence_s": silence_s}
         try:
             serve(station_of(**simulation), lot or lot_of(), **how)
         except Exception as e:  # noqa: BLE001 - raised again in the thread of the test

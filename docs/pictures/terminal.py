@@ -27,8 +27,8 @@ def picture(text: str, name: str, title: str) -> None:
 
 def main(result: str, progress: str) -> None:
     """Two pictures from two files: the result as the command printed it, and its progress."""
-    picture(Path(progress).read_text("utf-8"), "operator-run", "tumbleline run line-six.toml --units SN1,SN2,SN3")
-    picture(Path(result).read_text("utf-8"), "operator-result", "tumbleline run line-six.toml --units SN1,SN2,SN3")
+    picture(Path(progress).read_text("utf-8"), "operator-run", "tumbleline run line-twelve.toml --units SN1,SN2,SN3")
+    picture(Path(result).read_text("utf-8"), "operator-result", "tumbleline run line-twelve.toml --units SN1,SN2,SN3")
 
 
 if __name__ == "__main__":

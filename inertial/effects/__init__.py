@@ -16,9 +16,11 @@ from types import ModuleType
 
 from inertial.effects.base import AnyEffect, Effect, Nonlinear, SensorEffect, StationEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
-from inertial.errors import InertialError, UnknownEffect
+from inertial.effects.own_file import checked_classes, raised_in
+from inertial.errors import BrokenEffect, UnknownEffect
 
 __all__ = [
+    "BrokenEffect",
     "Effect",
     "Nonlinear",
     "SensorEffect",
@@ -32,10 +34,6 @@ __all__ = [
 ]
 
 _extra: dict[str, AnyEffect] = {}
-
-
-class BrokenEffect(InertialError):
-    """A module that should hold an effect cannot be used."""
 
 
 @cache
@@ -132,7 +130,8 @@ def add_file(path: str | Path) -> list[str]:
     Raises
     ------
     BrokenEffect
-        The file is missing, does not import, or holds no effect.
+        The file is missing, does not import, or holds no effect, or a class of it lacks an attribute or a method. What its
+        methods raise or return later is refused in the same way, see :mod:`inertial.effects.own_file`.
     """
     source = Path(path)
     spec = importlib.util.spec_from_file_location(f"tumbleline_effect_{source.stem}", source)
@@ -145,7 +144,8 @@ def add_file(path: str | Path) -> list[str]:
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever a user's file raises is reported with the file's name
-        raise BrokenEffect(f"effect file {source}: does not import ({error}); mend the file") from error
+        raise BrokenEffect(f"effect file {source}: {raised_in(source, error)}; mend the file") from error
+    checked_classes(module, source)
     known = dict(catalogue())
     added = _collect(module, known)
     if not added:

@@ -95,8 +95,10 @@ def key(
 ) -> None:
     """Make the key that signs manifests, outside the archive, and show its public key."""
     from pipelines.archive import signatures
+    from pipelines.cli.standard_output import refuse_standard_output
     from schemas.errors import WrongUse
 
+    refuse_standard_output(output, "archive key", "a private key is never printed")
     place = output or signatures.default_key_place()
     if public:
         place = output or signatures.key_place()

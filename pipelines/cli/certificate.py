@@ -57,8 +57,10 @@ def command(
     from pipelines.certificate_document.issue import issue
     from pipelines.certificate_document.laboratory import read_laboratory
     from pipelines.certificate_document.signing import read_key
+    from pipelines.cli.standard_output import refuse_standard_output
     from schemas.errors import DONE, PART_FAILED
 
+    refuse_standard_output(output, "certificate", "a folder for PDF and XML")
     who = read_laboratory(laboratory)
     key = None if sign_with is None else read_key(sign_with, password_file)
     done = issue(Archive(archive), names, who, output, key=key, address=address)

@@ -19,6 +19,8 @@ from pipelines.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from pipelines.archive import Run
     from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
     from pipelines.export.recording import CorrectableRecording
@@ -38,7 +40,13 @@ def command(
         str, typer.Option("--calibration", metavar="RUN:UNIT", help="The calibration: a run and one of its units.")
     ] = "latest",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Corrected samples, as .csv or .parquet.")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Corrected samples, as .csv or .parquet; -: as CSV on standard output.",
+        ),
     ] = None,
     columns: Annotated[
         str, typer.Option("--columns", metavar="x,y,z", help="Columns of the output; x,y,z or out_x,… by default.")
@@ -82,12 +90,14 @@ def command(
     contradict the stated noise.
     """
     from pipelines.archive import Archive
+    from pipelines.cli.standard_output import is_standard_output
     from pipelines.export.corrected import corrected, fit_of_unit
     from pipelines.export.recording import at_nominal_supply, read_recording
     from pipelines.jobs.model_files import use_formulas_of
     from pipelines.jobs.terms import archived_terms
     from schemas.errors import DONE, PART_FAILED
 
+    printed = is_standard_output(output, "correct", as_json=as_json)
     name, _, unit = calibration.partition(":")
     run = Archive(archive).run(name)
     use_formulas_of(run)
@@ -100,11 +110,11 @@ def command(
     done = corrected(recording, fit, _tracking(run, recording, force, gravity, turn_on, step, at_rest=at_rest))
     if output is not None:
         _write(recording, done, output)
-    document = _document(recording, fit, done, output)
+    document = _document(recording, fit, done, None if printed else output)
     if as_json:
         print_json(document)
     else:
-        _print(document)
+        _print(document, error_console() if printed else console())
     consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
     raise typer.Exit(DONE if consistent else PART_FAILED)
 
@@ -159,6 +169,7 @@ def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> No
     import io
 
     from pipelines.archive import files
+    from pipelines.cli.standard_output import NAME, print_text
     from pipelines.export.corrected import table_of
     from schemas.errors import WrongUse
 
@@ -167,11 +178,14 @@ def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> No
         sink = io.BytesIO()
         table.to_parquet(sink, index=False)
         data = sink.getvalue()
-    elif output.suffix == ".csv":
+    elif output.suffix == ".csv" or output == NAME:
         data = table.to_csv(index=False, lineterminator="\n", float_format="%.10g").encode()
     else:
         raise WrongUse(f"--output: found '{output.name}', a name that ends in .csv or .parquet is needed; correct it")
-    files.publish(output, data, "correct", files.ELSEWHERE)
+    if output == NAME:
+        print_text(data.decode())
+    else:
+        files.publish(output, data, "correct", files.ELSEWHERE)
 
 
 def _document(recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, output: Path | None) -> dict[str, Any]:
@@ -226,9 +240,7 @@ def _many(rejected: int, used: int) -> bool:
     return rejected > 1 + 0.01 * used
 
 
-def _print(document: dict[str, Any]) -> None:
-    out = console()
-
+def _print(document: dict[str, Any], out: Console) -> None:
     def line(text: str, style: str = "") -> None:
         out.print(text, style=style or None, markup=False, soft_wrap=True)
 

@@ -46,12 +46,15 @@ def command(
             "--output",
             "-o",
             metavar="FILE|DIR",
-            help="Output file, or a folder where each unit has a file of its own; default: standard output.",
+            help="Output file, or a folder where each unit has a file of its own; default, or -: standard output.",
         ),
     ] = None,
     nominal: Annotated[
         float | None,
-        typer.Option("--nominal", help="ardupilot, betaflight, px4: output per g by which the driver divides."),
+        typer.Option(
+            "--nominal",
+            help="ardupilot, betaflight, px4: output per g by which the driver divides; that of the device's preset.",
+        ),
     ] = None,
     device_id: Annotated[
         str,
@@ -110,10 +113,11 @@ def command(
 
 def _write(files: dict[str, bytes], output: Path | None) -> None:
     """Write the files: one to standard output, a file or a folder, several to a folder only."""
+    from pipelines.cli.standard_output import NAME, print_text
     from schemas.errors import WrongUse
 
     (name, content), *others = files.items()
-    if output is None:
+    if output is None or output == NAME:
         if others:
             raise WrongUse(
                 f"export: {len(files)} units, each needs a file of its own in this format; give a folder with --output, or "
@@ -121,7 +125,7 @@ def _write(files: dict[str, bytes], output: Path | None) -> None:
             )
         if name.endswith(BINARY):
             raise WrongUse(f"export: {name} is not text and cannot be printed; give a file with --output")
-        typer.echo(content.decode(), nl=False)
+        print_text(content.decode())
         return
     try:
         if others:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, console, print_json
+from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, console, error_console, print_json
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -44,7 +44,12 @@ def command(
     run: Annotated[str, typer.Option("--run", metavar="RUN", help="Run or file with the evidence.")] = "",
     output: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="Write the new version to this file; MODEL is not changed."),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="Write the new version to this file, or with - to standard output; MODEL is not changed.",
+        ),
     ] = None,
     effects: Annotated[
         str,
@@ -62,15 +67,20 @@ def command(
     history of the file, with the reason.
     """
     from pipelines.cli.inputs import add_effect_files
+    from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.jobs.model_files import extended, publish_model, reduced
 
+    printed = is_standard_output(output, "extend", as_json=as_json)
     _refuse_contradiction(model, effect, remove, why)
     add_effect_files(effect_file)
     step = model_step(remove or effect, why, by, run)
     text, begun = _start(model, effects, step)
     new, after = (reduced if remove else extended)(text, step, f"model {model.name}")
     target = output or model
-    publish_model(target, new)
+    if printed:
+        print_text(new)
+    else:
+        publish_model(target, new)
     document = {
         "file": str(target),
         "model": after.model.name,
@@ -86,7 +96,7 @@ def command(
     if as_json:
         print_json(document)
         return
-    out = console()
+    out = error_console() if printed else console()
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
         out.print(f"{target}: created with version 1: {first}", markup=False, soft_wrap=True)

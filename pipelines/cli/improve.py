@@ -105,7 +105,9 @@ def command(
 def _target(model: Path | None, output: Path | None) -> Path:
     """The model file to write; another existing file is refused."""
     from pipelines.cli.next_commands import free_name
+    from pipelines.cli.standard_output import refuse_standard_output
 
+    refuse_standard_output(output, "improve", "the model is written, then extended and judged from it")
     target = output or model or Path(free_name())
     if target != model and target.exists():
         raise WrongUse(

@@ -89,15 +89,15 @@ def command(
 
 
 def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits: Path | None) -> None:
-    import socket
     import sys
     from contextlib import nullcontext
 
     import uvicorn
 
+    from pipelines.cli.serving_pages import listening_socket, run_until_stopped
     from pipelines.monitoring.service import alerting, application
 
-    place = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    place = listening_socket(host, port, "monitor")
     console().print(f"http://{host}:{place.getsockname()[1]}/healthz", soft_wrap=True)
     sys.stdout.flush()  # a program that started it waits for the address
     config = uvicorn.Config(
@@ -105,4 +105,4 @@ def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits
         timeout_graceful_shutdown=2,
     )  # fmt: skip
     with place, alerting(monitor, poster, audits) if poster is not None else nullcontext():
-        uvicorn.Server(config).run(sockets=[place])
+        run_until_stopped(uvicorn.Server(config), place, "monitor")

@@ -19,7 +19,7 @@ from pipelines.cli.options import (
 )
 from pipelines.cli.plan_files import save, write_page, write_pictures
 from pipelines.cli.plan_options import DeviceOption, EffectsOption, NoiseOption, PageOption, WanderOption, with_model
-from pipelines.cli.plan_text import print_plan
+from pipelines.cli.plan_text import print_plan, print_procedures
 from schemas.errors import PART_FAILED
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ EXAMPLES_OF = {
     ),
     "optimise": (
         "tumbleline plan optimise my.toml",
-        "tumbleline plan optimise my.toml --criterion T --part third_order,odd_quadratic",
+        "tumbleline plan optimise my.toml --criterion T --part third_order,odd_quadratic --size 10000",
     ),
 }
 """Of the subcommands."""
@@ -102,7 +102,8 @@ def command(
 ) -> None:
     """Show station time, expected errors, and for every effect its visibility, detection floor and confounded effects.
 
-    For effects that are not visible: the reason, and what to add to the recipe.
+    For effects that are not visible: the reason, and what to add to the recipe. For test procedures: records, station time,
+    equipment, and the figures that they determine.
     """
     from pipelines.jobs.moved_poses import moves_of, with_moved_poses
     from pipelines.jobs.range_of_station import refused_by_run
@@ -110,21 +111,28 @@ def command(
     from pipelines.jobs.terms import planned_terms
     from pipelines.planning.plan import plan, plan_context
     from pipelines.planning.preset_noise import noise_of
+    from pipelines.planning.procedure_plan import plan_of_procedures, procedure_rows
     from schemas.station import load_station
 
     config = load_station(station)
     planned_recipe = with_moved_poses(
         with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
     )
-    context = plan_context(
-        planned_recipe, config, noise_of(planned_recipe, device or planned_recipe.device, noise, wander)
-    )
     for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
         error_console().print(
             f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow", markup=False, soft_wrap=True
         )
     limits = _limits(planned_recipe, folder_of(recipe))
+    if not planned_recipe.tumbles and page is None and pictures is None:
+        document = plan_of_procedures(planned_recipe, config, limits)
+        print_json(document) if as_json else print_procedures(document)
+        return
+    context = plan_context(
+        planned_recipe, config, noise_of(planned_recipe, device or planned_recipe.device, noise, wander)
+    )
     document = plan(context, planned_terms(planned_recipe, config, limits), limits)
+    if planned_recipe.procedures:
+        document["procedures"] = procedure_rows(planned_recipe, config, limits)
     if page is not None:
         write_page(page, document, context)
         document["page"] = str(page)
@@ -150,7 +158,10 @@ def optimise(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", metavar="FILE.toml", help="File of the new recipe; NAME-optimal.toml by default."
+            "--output",
+            "-o",
+            metavar="FILE.toml",
+            help="File of the new recipe; - prints it; NAME-optimal.toml by default.",
         ),
     ] = None,
     device: DeviceOption = "",
@@ -235,10 +246,12 @@ def optimise(
     """
     from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
     from pipelines.cli.optimise_options import OptimiseOptions
+    from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.jobs.recipes import folder_of
     from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station
 
+    printed = is_standard_output(output, "plan optimise", as_json=as_json)
     config = load_station(station)
     base = with_model(recipe, effects, model, archive, config.name)
     options = OptimiseOptions(
@@ -251,11 +264,15 @@ def optimise(
     document["file"] = str(target)
     home = folder_of(recipe)
     document["limits_missing"] = missing_limits(base, home)
-    save(target, written(optimum, target, home, document))
+    text = written(optimum, target, home, document)
+    if not printed:
+        save(target, text)
     if page is not None:
         write_page(page, document["plan"], optimum.planned)
         document["page"] = str(page)
-    if as_json:
+    if printed:  # the recipe alone: its first comments say what it reaches
+        print_text(text)
+    elif as_json:
         print_json(document)
     else:
         print_optimum(document)

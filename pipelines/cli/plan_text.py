@@ -20,12 +20,12 @@ def print_plan(document: dict[str, Any]) -> None:
         f"{document['recipe']} with {document['device']} on station {document['station']}: "
         f"{document['dwells']} dwells in {document['poses']} poses at {_soaks(len(document['temperatures_C']))}"
     )
-    parts = " + ".join(f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total")
-    out.print(f"{minutes['total']:.0f} min of station time: {parts}")
+    out.print(_time(minutes))
     out.print(
         f"error of a dwell (1σ): {short(error['together'])} µg; white {short(error['white'])}, wander {short(error['wander'])}"
         f"{_longer(document['dwell_s'])}"
     )
+    _print_procedure_rows(document)
     print_table(["coefficient, unit", "error x, 1σ", "y", "z"], _coefficient_lines(document["coefficients"]))
     if document["bias"] is not None:
         bias = document["bias"]
@@ -70,6 +70,48 @@ def print_plan(document: dict[str, Any]) -> None:
     )
     if "page" in document:
         out.print(f"Page: {document['page']}")
+
+
+def print_procedures(document: dict[str, Any]) -> None:
+    """Print the plan of a recipe without the multi-position test."""
+    out = console()
+    out.print(f"{document['recipe']} with {document['device']} on station {document['station']}")
+    out.print(_time(document["minutes"]))
+    _print_procedure_rows(document)
+
+
+def _print_procedure_rows(document: dict[str, Any]) -> None:
+    """Print the procedures of a plan with their figures; nothing for a recipe without a list."""
+    rows = document.get("procedures", [])
+    if not rows:
+        return
+    print_table(
+        ["procedure", "records", "min", "°C", "equipment", "result"],
+        [
+            [
+                row["procedure"],
+                str(row["records"]),
+                f"{row['minutes']:.1f}",
+                ", ".join(f"{t:g}" for t in row["temperatures_C"]),
+                ", ".join(row["equipment"]),
+                row["states"],
+            ]
+            for row in rows
+        ],
+    )
+    figures = [figure for row in rows for figure in row["figures"]]
+    print_table(
+        ["figure", "unit", "limit", "meaning"],
+        [[one["figure"], one["unit"], one["limit"] or "", one["meaning"]] for one in figures],
+    )
+
+
+def _time(minutes: dict[str, float]) -> str:
+    """Station time, by what it goes into."""
+    parts = " + ".join(
+        f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total" and minutes[name] > 0.0
+    )
+    return f"{minutes['total']:.0f} min of station time: {parts}"
 
 
 def _soaks(count: int) -> str:

@@ -34,7 +34,7 @@ ORDER = 375
 SUMMARY = "Compute the power spectral density of a record, and the Allan deviation from it."
 EXAMPLES = (
     "tumbleline psd rest.csv --rate 100",
-    "tumbleline psd latest --plot psd.png",
+    "tumbleline psd rest.csv --rate 100 --plot psd.png",
 )
 
 SHORTEST_SEGMENT = 64

@@ -34,7 +34,13 @@ def command(
     ] = "",
     form: Annotated[str, typer.Option("--format", help=f"{_NAMES}.")] = "csv",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; named after run and record.")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="File to write; - prints a text; named after run and record.",
+        ),
     ] = None,
     archive: ArchiveOption = None,
 ) -> None:
@@ -43,6 +49,7 @@ def command(
     A format that holds only one clock gets one file for each clock: ``…_units`` and ``…_reference``.
     """
     from pipelines.archive import Archive
+    from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.export.waveforms import WRITERS, write_waveforms
     from schemas.errors import WrongUse, did_you_mean
 
@@ -50,9 +57,31 @@ def command(
         raise WrongUse(f"waveforms: no format is called '{form}'; {did_you_mean(form, WRITERS)}")
     stored = Archive(archive).run(run)
     channels = channels_of(stored, record, unit)
+    if is_standard_output(output, "waveforms"):
+        print_text(_one_text(form, channels))
+        return
     place = output or Path(f"{stored.id[:12]}-record{record}{WRITERS[form].SUFFIX}")
     for path in write_waveforms(form, channels, place):
         console().print(f"{path}: {', '.join(one.name for one in channels)}", markup=False)
+
+
+def _one_text(form: str, channels: list[Channel]) -> str:
+    """The file of a format of text; refused for others, and where each clock has a file of its own."""
+    from tempfile import TemporaryDirectory
+
+    from pipelines.export.waveforms import WRITERS, write_waveforms
+    from schemas.errors import WrongUse
+
+    with TemporaryDirectory() as folder:
+        paths = write_waveforms(form, channels, Path(folder) / f"record{WRITERS[form].SUFFIX}")
+        try:
+            (text,) = (path.read_bytes().decode() for path in paths)
+        except ValueError:
+            raise WrongUse(
+                f"waveforms: format {form} gives {len(paths)} files or no text, one of text is needed for standard output; "
+                "name a file with --output"
+            ) from None
+    return text
 
 
 def channels_of(run: Run, number: int, unit: str) -> list[Channel]:

@@ -70,37 +70,35 @@ def command(
     load nothing from other servers and send nothing to them.
     """
     import os
-    import socket
 
     import uvicorn
 
     from pipelines.archive import Archive
+    from pipelines.cli.serving_pages import listening_socket, run_until_stopped
     from pipelines.workbench.application import create_app
     from pipelines.workbench.settings import WorkbenchSettings
     from schemas.station import load_station
 
     if (certificate is None) != (key is None):
         raise WrongUse("workbench: a certificate and its key are needed together; give both or neither")
-    place = (
-        socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
-        if port == 0
-        else None
-    )
-    listening = place.getsockname()[1] if place is not None else port
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
     for one in station or ():
         load_station(one)  # a broken file is refused now, not when the page is opened
-    settings = WorkbenchSettings(
-        archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
-        tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
-        pause_lots=pause_lots, **({"token": given} if given else {}),
-    )  # fmt: skip
-    app = create_app(settings)
-    console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)
-    sys.stdout.flush()  # a program that started it waits for the address
-    error_console().print("Open the address above; Ctrl-C ends the workbench.")
-    config = uvicorn.Config(
-        app, host=host, port=listening, log_level="warning", access_log=False, server_header=False, ws="none",
-        timeout_graceful_shutdown=PATIENCE_S, ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=behind_proxy,
-    )  # fmt: skip
-    uvicorn.Server(config).run(sockets=[place] if place is not None else None)
+    with listening_socket(host, port, "workbench") as place:
+        listening = place.getsockname()[1]
+        settings = WorkbenchSettings(
+            archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
+            tls=certificate is not None, proxied=behind_proxy, stations=tuple(station or ()), workers=workers,
+            pause_lots=pause_lots, **({"token": given} if given else {}),
+        )  # fmt: skip
+        servers: list[uvicorn.Server] = []
+        app = create_app(settings, ending=lambda: any(server.should_exit for server in servers))
+        console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)
+        sys.stdout.flush()  # a program that started it waits for the address
+        error_console().print("Open the address above; Ctrl-C ends the workbench.")
+        config = uvicorn.Config(
+            app, host=host, port=listening, log_level="warning", access_log=False, server_header=False, ws="none",
+            timeout_graceful_shutdown=PATIENCE_S, ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=behind_proxy,
+        )  # fmt: skip
+        servers.append(uvicorn.Server(config))
+        run_until_stopped(servers[0], place, "workbench")

@@ -16,6 +16,7 @@ from inertial.noise.gauss_markov import bias_model, flicker_of_steps
 from inertial.noise.likely_terms import LikelyTerms, likely_terms
 from pipelines.export.polynomials import unit_calibrations
 from pipelines.export.unit_noise import curve_of_unit, required_noise
+from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.units import AXES, MICRO
@@ -112,6 +113,7 @@ def fit_of_unit(run: Run, unit: str, *, failed: bool, revoked: bool) -> FitOfUni
         raise WrongUse(
             f"run {run.id}: it has no {' and no '.join(missing)}, a fitted run is needed; repeat its 'tumbleline run'"
         )
+    refuse_other_procedures(run, "coefficients")
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     if not unit and len(calibration.units) > 1:
         raise WrongUse(

@@ -11,8 +11,10 @@ from inertial.fits.linear import axis_rows
 from inertial.state import T_REFERENCE
 from pipelines.certificates.statement import stated
 from pipelines.export.unit_noise import noise_of_units
+from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.tables.calibration import read_calibration
-from schemas.errors import WrongUse
+from schemas.errors import RecipeInvalid, WrongUse
+from stations.plant.preset import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -42,6 +44,7 @@ class UnitCalibration:
     certificate : that the unit has for this run; None where it was not certified
     noise : terms of its static record; None without one
     full_scale : largest excursion of the output from 0 g, output unit; None where it is not recorded
+    nominal : output per g that the data sheet of this kind of device states, by its preset; None where no preset is known
     """
 
     unit: str
@@ -55,6 +58,7 @@ class UnitCalibration:
     certificate: Stated | None = None
     noise: UnitNoise | None = None
     full_scale: float | None = None
+    nominal: float | None = None
 
     @property
     def certified(self) -> str:
@@ -81,6 +85,7 @@ def unit_calibrations(
     """
     if "grades" not in run.tables():
         return _ungraded(run, serials)
+    refuse_other_procedures(run, "coefficients")
     grades = run.table("grades").set_index("unit")
     _refuse(grades, serials, failed=failed)
     allowed = ("pass", "fail") if failed else EXPORTABLE
@@ -95,13 +100,14 @@ def unit_calibrations(
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     dwells = run.table("dwells")
     out_unit = str(dwells["out_unit"].iloc[0])
-    noise, full_scale = noise_of_units(run), _full_scales(run)
+    noise, full_scale, nominal = noise_of_units(run), _full_scales(run), _nominal(run, out_unit)
     return [
         replace(
             _one(calibration, unit, grades.loc[unit].to_dict(), out_unit, _temperatures(dwells, unit)),
             certificate=certificates.get(unit),
             noise=noise.get(unit),
             full_scale=full_scale.get(unit),
+            nominal=nominal,
         )
         for unit in chosen
     ]
@@ -148,6 +154,17 @@ def _full_scales(run: Run) -> dict[str, float]:
         return {}
     good = readings[readings["status"] == "ok"].groupby("unit")["full_scale"].first().dropna()
     return {str(unit): float(value) for unit, value in good.items()}
+
+
+def _nominal(run: Run, out_unit: str) -> float | None:
+    """Output per g of the preset that a captured run's recipe names, with what its simulated station changes of it."""
+    device = str((run.about.get("recipe") or {}).get("device", ""))
+    simulation = (run.about.get("station") or {}).get("simulation") or {}
+    try:
+        preset = load_preset(device, simulation.get("preset_overrides"))
+    except RecipeInvalid:  # a device of hardware needs no preset
+        return None
+    return preset.scale if preset.output_unit == out_unit else None
 
 
 def _temperatures(dwells: pd.DataFrame, unit: str) -> tuple[float, float]:

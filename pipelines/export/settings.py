@@ -11,6 +11,8 @@ from schemas.foreign import shown
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pipelines.export.polynomials import UnitCalibration
+
 ARITHMETICS = ("double", "float", "q24")
 HIGHEST_ID = 2**31 - 1
 MOST_SENSORS = 4
@@ -20,7 +22,7 @@ MOST_SENSORS = 4
 class ExportSettings:
     """Settings of an export.
 
-    nominal : output per g that the receiver's driver assumes, in the unit of the output
+    nominal : output per g that the receiver's driver assumes, in the unit of the output; that of the unit's preset where None
     device_ids : identification of the sensor in the autopilot, by unit
     sensor : number of the accelerometer in the autopilot, from 0
     arithmetic : of exported C code, one of :data:`ARITHMETICS`
@@ -48,14 +50,16 @@ class ExportSettings:
         if self.counts_per_g < 1:
             raise WrongUse(f"--counts-per-g: found {self.counts_per_g}, 1 or more is needed; correct it")
 
-    def nominal_for(self, what: str) -> float:
-        """The driver's output per g; refused where it was not given."""
-        if self.nominal is None or not self.nominal > 0.0:
+    def nominal_for(self, unit: UnitCalibration, what: str) -> float:
+        """The driver's output per g: the one given, else that of the unit's preset; refused where neither states it."""
+        nominal = unit.nominal if self.nominal is None else self.nominal
+        if nominal is None or not nominal > 0.0:
+            found = "none is given and no preset states it" if nominal is None else f"{nominal:g}"
             raise WrongUse(
-                f"export: nominal scale {self.nominal}, a positive output per g is needed for {what} (their driver "
+                f"export: nominal scale of unit {unit.unit}: {found}, a positive output per g is needed for {what} (their driver "
                 "divides by it); give it with --nominal"
             )
-        return self.nominal
+        return nominal
 
 
 def device_ids(text: str, units: Sequence[str]) -> dict[str, int]:

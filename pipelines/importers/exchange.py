@@ -10,6 +10,7 @@ import pandas as pd
 
 from pipelines.archive import Archive
 from pipelines.importers import files, values
+from pipelines.procedures import MULTI_POSITION
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, close_matches, did_you_mean
@@ -67,13 +68,32 @@ def read_history(source: str | Path, *, archive: str | Path | None = None) -> pd
 
 
 def dwells_of_run(run: Run) -> pd.DataFrame:
-    """The dwells of a run, as :func:`read_dwells` reads them by its name."""
+    """The dwells of a run, as :func:`read_dwells` reads them by its name.
+
+    Raises
+    ------
+    WrongUse
+        The run has other procedures than the multi-position test, whose records are no dwells.
+    """
+    refuse_other_procedures(run, "dwells")
     return checked(run.table("dwells"), where=f"run {run.id}")
 
 
 def history_of_run(run: Run) -> pd.DataFrame:
     """The temperatures of a run against time, as :func:`read_history` reads them by its name."""
     return _checked_history(run.table("history"), f"run {run.id}", foreign=False)
+
+
+def refuse_other_procedures(run: Run, wanted: str) -> None:
+    """Refuse a run of other procedures than the multi-position test, of which alone ``wanted`` come; says what it has instead."""
+    kinds = [part["kind"] for part in (run.about.get("recipe") or {}).get("procedures", ())]
+    if not kinds or MULTI_POSITION in kinds:
+        return
+    raise WrongUse(
+        f"run {run.id} has no {wanted}: it measured {', '.join(dict.fromkeys(kinds))}, and they come from the multi-position "
+        f"test; list it in a recipe's procedures and measure. What this run found, and whether the models of its procedures "
+        f"are adequate: 'tumbleline show {run.id} procedure_findings'; its figures: 'tumbleline show {run.id} procedure_figures'"
+    )
 
 
 def checked(frame: pd.DataFrame, *, where: str, foreign: bool = False) -> pd.DataFrame:

@@ -16,7 +16,15 @@ from pipelines.importers import files
 from pipelines.importers.content import unit_in
 from pipelines.importers.documents import WaveformFigure, WaveformImport
 from pipelines.procedures import PROCEDURES
-from pipelines.procedures.base import REFERENCE, Device, FromWaveforms, ProcedureRecord, ProcedureStep, UnitRecord
+from pipelines.procedures.base import (
+    REFERENCE,
+    Device,
+    FromWaveforms,
+    NominalScale,
+    ProcedureRecord,
+    ProcedureStep,
+    UnitRecord,
+)
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
@@ -141,9 +149,15 @@ def _part(procedure: str, path: Path | None) -> tuple[FromWaveforms, Any, dict[s
         )
     part = can[procedure].part
     try:
-        return can[procedure], part.model_validate(content), content, float(full_scale)
+        own = part.model_validate(content)
     except ValidationError as problem:
         raise explain(problem, str(path or "--part"), part) from None
+    if isinstance(own, NominalScale) and own.scale is None:  # a recording made elsewhere has no multi-position test
+        raise WrongUse(
+            f"import: procedure {procedure} has no scale, output per g is needed for figures in g; add scale = … to "
+            f"{path or 'a file and give it with --part'}"
+        )
+    return can[procedure], own, content, float(full_scale)
 
 
 def _recording(

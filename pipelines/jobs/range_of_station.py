@@ -39,9 +39,14 @@ def refused_by_run(recipe: Recipe, station: StationConfig, folder: Path) -> list
     folder : where a limits file that the recipe names is looked for
     """
     from pipelines.jobs.recipes import load_limits
+    from pipelines.procedures import refuse_unusable
 
     messages: list[str] = []
-    for check in (lambda: load_limits(recipe, folder), lambda: refuse_beyond_station(recipe, station)):
+    for check in (
+        lambda: load_limits(recipe, folder),
+        lambda: refuse_beyond_station(recipe, station),
+        lambda: refuse_unusable(recipe, station),
+    ):
         try:
             check()
         except TumblelineError as problem:

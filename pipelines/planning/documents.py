@@ -109,10 +109,32 @@ class ReachableUncertainty(TypedDict):
     remarks: list[str]
 
 
+class PlannedFigure(TypedDict):
+    """A figure that a procedure determines."""
+
+    figure: str
+    unit: str
+    meaning: str
+    limit: Annotated[str | None, "in `unit`; null: none"]
+
+
+class PlannedProcedure(TypedDict):
+    """One entry of the recipe's list of procedures."""
+
+    procedure: str
+    states: Annotated[str, "its results in one line"]
+    records: int
+    minutes: Annotated[float, "station time, min"]
+    temperatures_C: list[float]
+    equipment: Annotated[list[str], "that the station must have"]
+    figures: list[PlannedFigure]
+
+
 class PlanDocument(TypedDict):
     """``plan --json``: what a recipe can determine, with its station time and expected uncertainties."""
 
-    effects: list[PlannedEffect]
+    effects: Annotated[list[PlannedEffect], "empty for a list of procedures without the multi-position test"]
+    procedures: NotRequired[list[PlannedProcedure]]
     recipe: NotRequired[str]
     device: NotRequired[str]
     station: NotRequired[str]

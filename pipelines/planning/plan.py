@@ -22,6 +22,7 @@ from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import schedule, spent
 from pipelines.tables.calibration import unit_texts
+from schemas.errors import RecipeInvalid
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
@@ -62,7 +63,19 @@ class PlanContext:
 
 
 def plan_context(recipe: Recipe, station: StationConfig, noise: DwellNoise, *, slowest: float = 0.0) -> PlanContext:
-    """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`."""
+    """A recipe on a station with devices of this noise; ``slowest`` as in :func:`inertial.noise.dwells.dwell_covariance`.
+
+    Raises
+    ------
+    RecipeInvalid
+        The recipe has no multi-position test, of whose dwells a plan is made.
+    """
+    if not recipe.tumbles:
+        raise RecipeInvalid(
+            f"recipe {recipe.name}: its procedures have no multi_position, of whose dwells visibility, pictures and a quicker "
+            "recipe are made; list it, or see station time and figures of the procedures with 'tumbleline plan'",
+            key="procedures",
+        )
     whole = schedule(steps(recipe), station, recipe)
     state = state_of(whole, station, recipe, history=True)
     covariance = dwell_covariance(state.time, recipe.dwell_s, noise, slowest=slowest)

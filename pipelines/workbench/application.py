@@ -23,7 +23,7 @@ from schemas.errors import TumblelineError
 from schemas.installed import not_installed
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator
+    from collections.abc import AsyncGenerator, Callable
 
     from starlette.types import ASGIApp
 
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 ROUTES = "pipelines.workbench.routes"
 
 
-def create_app(settings: WorkbenchSettings) -> ASGIApp:
-    """The application, with access control."""
+def create_app(settings: WorkbenchSettings, ending: Callable[[], bool] = lambda: False) -> ASGIApp:
+    """The application, with access control; streams of events end once the server is ``ending``."""
     settings.refuse_unsafe()
     bench = Workbench(settings, Jobs(settings.folder / "jobs.json", settings.workers))
 
@@ -46,7 +46,7 @@ def create_app(settings: WorkbenchSettings) -> ASGIApp:
             await asyncio.to_thread(lots.pause_all, settings)
 
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, lifespan=life)
-    app.state.workbench = bench
+    app.state.workbench, app.state.ending = bench, ending
     pages: list[tuple[int, str, str]] = []
     for info in iter_modules(import_module(ROUTES).__path__):
         module = import_module(f"{ROUTES}.{info.name}")

@@ -39,7 +39,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         The nominal output is missing.
     """
     unit = units[0]
-    nominal = settings.nominal_for("autopilot parameters")
+    nominal = settings.nominal_for(unit, "autopilot parameters")
     bias, (low, high) = bias_m_s2(unit, nominal), unit.temperatures
     has_thermal = bool(np.any(bias[1:])) and high - low >= _LEAST_RANGE_K
     at = float(np.clip(25.0, low, high)) if has_thermal else 25.0

@@ -43,7 +43,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         The nominal output is missing.
     """
     unit, counts = units[0], settings.counts_per_g
-    nominal = settings.nominal_for("Betaflight")
+    nominal = settings.nominal_for(unit, "Betaflight")
     offsets = np.rint(unit.bias[0] / nominal * counts)
 
     def applied(output: Array, temperature: float) -> Array:

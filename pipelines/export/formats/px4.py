@@ -37,7 +37,7 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
         The nominal output or the device's id is missing: PX4 ignores a calibration whose id is not the sensor's.
     """
     unit = units[0]
-    nominal = settings.nominal_for("autopilot parameters")
+    nominal = settings.nominal_for(unit, "autopilot parameters")
     if unit.unit not in settings.device_ids:
         raise WrongUse(
             f"export: no device id of unit {unit.unit}, PX4 applies a calibration only where CAL_ACC{settings.sensor}_ID is the "

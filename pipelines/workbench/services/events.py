@@ -23,7 +23,7 @@ STAMP_EVERY = 4
 
 
 async def stream(request: Request, boot: str, jobs: Jobs, stamps: Callable[[], dict[str, str]]) -> AsyncIterator[str]:
-    """The events, until the browser disconnects.
+    """The events, until the browser disconnects or the server ends.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ async def stream(request: Request, boot: str, jobs: Jobs, stamps: Callable[[], d
         "boot", {"boot": boot, "jobs": [job.document() for job in jobs.all() if job.state in {"waiting", "running"}]}
     )
     look = 0
-    while not await request.is_disconnected():
+    while not (request.app.state.ending() or await request.is_disconnected()):
         await asyncio.sleep(EVERY_S)
         look += 1
         version = jobs.version

@@ -1,0 +1,113 @@
+"""Effects of a user's Python file: what is wrong with one is said with file, class and line, and a wrong shape is refused."""
+
+import inspect
+import traceback
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.effects.base import Effect, SensorEffect, StationEffect
+from inertial.errors import BrokenEffect, InertialError
+
+NEEDED = ("id", "symbol", "equation", "source", "typical_ug", "breaker")
+METHODS = ("parameters", "constants", "names", "names_at", "columns", "start_columns", "force_change", "start_change")
+
+Array = NDArray[np.float64]
+
+
+def checked_classes(module: ModuleType, source: Path) -> None:
+    """Refuse effect classes of a file that are not complete, and let their methods name file, class and line of an error.
+
+    Raises
+    ------
+    BrokenEffect
+        An attribute or a method is missing.
+    """
+    kinds = [item for item in vars(module).values() if isinstance(item, type) and item.__module__ == module.__name__]
+    for item in dict.fromkeys(kinds):
+        base_of_others = not hasattr(item, "id") and any(issubclass(k, item) for k in kinds if k is not item)
+        if not issubclass(item, Effect) or base_of_others:
+            continue
+        where = f"effect file {source}, class {item.__name__} (line {_first_line(item)})"
+        if not issubclass(item, SensorEffect | StationEffect):
+            raise BrokenEffect(f"{where}: a subclass of Effect; derive it from SensorEffect or StationEffect")
+        missing = [name for name in NEEDED if not hasattr(item, name)]
+        if missing:
+            raise BrokenEffect(f"{where}: no {' and no '.join(missing)}, an effect needs it; add it to the class")
+        abstract = sorted(getattr(item, "__abstractmethods__", ()))
+        if abstract:
+            raise BrokenEffect(f"{where}: no method {' and no method '.join(abstract)}, it is needed; define it")
+        for name in METHODS:
+            if name in vars(item):
+                setattr(item, name, _guarded(vars(item)[name], where, source))
+
+
+def raised_in(source: Path, error: Exception) -> str:
+    """An exception of a user's file, with the line of the file where it was raised."""
+    if isinstance(error, SyntaxError):
+        return f"line {error.lineno}: SyntaxError: {error.msg}"
+    own = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).resolve() == source.resolve()]
+    place = f"line {own[-1].lineno}" if own else "outside of the file"
+    inside = f" in {own[-1].name}" if own and own[-1].name != "<module>" else ""
+    return f"{place}{inside}: {type(error).__name__}: {error}"
+
+
+def _first_line(kind: type) -> int | str:
+    try:
+        return inspect.getsourcelines(kind)[1]
+    except (OSError, TypeError):
+        return "?"
+
+
+def _guarded(method: Callable[..., Any], where: str, source: Path) -> Callable[..., Any]:
+    """The method of a class, whose exceptions other than refusals of this package become :class:`BrokenEffect`."""
+
+    @wraps(method)
+    def guarded(self: Any, *given: Any, **named: Any) -> Any:
+        try:
+            made = method(self, *given, **named)
+        except InertialError:
+            raise
+        except Exception as error:  # whatever a user's file raises is reported with its class and line
+            raise BrokenEffect(f"{where}: {raised_in(source, error)}; mend the file") from error
+        if method.__name__ == "columns":
+            state, axis = _state_and_axis(given, named)
+            return _shaped(made, (*state.force.shape[:-1], len(self.names_at(axis, **_rest(named)))), where, "columns")
+        if method.__name__ == "force_change":
+            state = given[0] if given else named["state"]
+            return _shaped(made, (*state.force.shape, len(self.names())), where, "force_change")
+        return made
+
+    return guarded
+
+
+def _state_and_axis(given: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, int]:
+    state = given[0] if given else named["state"]
+    return state, given[1] if len(given) > 1 else named["axis"]
+
+
+def _rest(named: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in named.items() if name not in {"state", "axis"}}
+
+
+def _shaped(made: Any, needed: tuple[int, ...], where: str, method: str) -> Array:
+    """What a method returned, for every unit; refused unless it has the dwells and coefficients of ``needed`` in this order."""
+    try:
+        values = np.asarray(made, dtype=float)
+        whole = np.broadcast_shapes(values.shape, needed)
+    except (TypeError, ValueError):
+        values = whole = None
+    own = 2 if method == "columns" else 3  # axes that are the effect's: dwells (and force axes) and coefficients
+    if values is None or whole is None or values.shape[-own:] != needed[-own:]:
+        found = f"shape {np.shape(made)}" if isinstance(made, np.ndarray) else type(made).__name__
+        what = "dwells, coefficients" if method == "columns" else "dwells, 3, parameters"
+        raise BrokenEffect(
+            f"{where}: {method} returned {found}, shape {needed} is needed (…, {what}; as many as names gives); "
+            "inertial.effects.base.stack makes it"
+        )
+    return values if values.shape == whole else np.broadcast_to(values, whole)

@@ -1,0 +1,214 @@
+"""What a person tries first and what is wrong then: one sentence with what was found and what to do, and no file called '-'."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from contextlib import chdir
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import finished_run
+from in_process import command
+from served_station import modbus_station, served, station_file
+from small_station import lot_of
+
+from pipelines.cli.serving_pages import listening_socket
+from schemas.errors import WrongUse
+from stations.clock import WallClock
+from stations.opening import open_station
+
+ROOT = Path(__file__).resolve().parents[2]
+WHOLE = '''
+import numpy as np
+from inertial.effects.base import SensorEffect, stack
+
+class Glue(SensorEffect):
+    """A glue that gives."""
+
+    id = "glue"
+    symbol = "g"
+    equation = "g·f²"
+    source = "own measurements"
+    typical_ug = (1.0, 1000.0)
+    breaker = "other poses"
+
+    def names(self, axis):
+        return ("g",)
+
+    def columns(self, state, axis, **nonlinear):
+        return stack(state, [state.force[..., axis] ** 2])
+'''
+BROKEN = {
+    "class body": ('    symbol = "g"', "    symbol = 1 / 0", r"line 9 in Glue: ZeroDivisionError"),
+    "attribute": ("    typical_ug = (1.0, 1000.0)\n", "", "class Glue (line 5): no typical_ug"),
+    "id": ('    id = "glue"\n', "", "class Glue (line 5): no id"),
+    "method": ("def names", "def nams", "class Glue (line 5): no method names"),
+    "columns": ("state.force[..., axis] ** 2", "state.forces", "class Glue (line 5): line 19 in columns: AttributeError"),
+    "shape": (
+        "stack(state, [state.force[..., axis] ** 2])", "np.zeros((3, 1))", "columns returned shape (3, 1), shape (3, 22, 1)",
+    ),
+    "coefficients": (
+        "stack(state, [state.force[..., axis] ** 2])", "state.force", "columns returned shape",
+    ),
+    "nothing": ("stack(state, [state.force[..., axis] ** 2])", "None", "columns returned NoneType"),
+    "syntax": ("def names(self, axis):", "def names(self, axis", "line 15: SyntaxError"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def run(tmp_path: Path, no_pictures_here: None) -> Path:
+    """The archive of a small run."""
+    return finished_run(tmp_path).archive.root
+
+
+def effect_file(folder: Path, text: str) -> Path:
+    path = folder / "own.py"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_an_effect_file_without_an_error_is_judged(run: Path, tmp_path: Path) -> None:
+    words = ["compare", "latest", "--archive", run, "--effects", "bias,scale,misalignment,glue", "--effect-file"]
+    done = command([*map(str, words), str(effect_file(tmp_path, WHOLE))])
+    assert done.returncode in {0, 1}, done.stderr
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_an_error_in_a_users_effect_names_file_class_and_line(what: str, run: Path, tmp_path: Path) -> None:
+    old, new, message = BROKEN[what]
+    assert old in WHOLE
+    path = effect_file(tmp_path, WHOLE.replace(old, new))
+    words = ["compare", "latest", "--archive", run, "--effects", "bias,scale,misalignment,glue", "--effect-file", path]
+    done = command([*map(str, words)])
+    assert done.returncode == 2, done.stderr
+    assert str(path) in done.stderr
+    assert message in done.stderr
+    if what in {"shape", "coefficients"}:
+        assert "1) is needed (…, dwells, coefficients" in done.stderr
+
+
+def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None:
+    time_s = np.arange(2000) / 20e3
+    pulse = np.where((time_s > 0.02) & (time_s < 0.031), 30.0 * np.sin(np.pi * (time_s - 0.02) / 0.011), 0.0)
+    head = "time [s],z [V],reference [g]"
+    table = np.column_stack([time_s, 0.007 * pulse, pulse])
+    np.savetxt(tmp_path / "shock.csv", table, delimiter=",", header=head, comments="")
+    (tmp_path / "part.toml").write_text("duration_ms = 11.0\n", encoding="utf-8")
+    for part in ([], ["--part", str(tmp_path / "part.toml")]):
+        words = ["import", str(tmp_path / "shock.csv"), "--procedure", "shock", "--unit", "S1", *part]
+        done = command([*words, "--map", "z=z [V],reference=reference [g]", "--archive", str(tmp_path / "archive")])
+        assert done.returncode == 2, done.stderr
+        assert "procedure shock has no scale, output per g is needed" in done.stderr
+        assert "--part" in done.stderr or "part.toml" in done.stderr
+
+
+def test_a_dash_is_standard_output(run: Path, tmp_path: Path) -> None:
+    archive = ["--archive", str(run)]
+    with chdir(tmp_path):
+        one = command(["export", "latest", "--units", "A1", "--failed", *archive])
+        assert (
+            command(["export", "latest", "--units", "A1", "--failed", "--output", "-", *archive]).stdout == one.stdout
+        )
+        assert json.loads(one.stdout)
+        text = command(["waveforms", "latest", "--record", "0", "--output", "-", *archive]).stdout
+        assert text.startswith("time [s],")
+        model = command(["extend", "model.toml", "third_order", "--out", "-"])
+        assert '"third_order"' in model.stdout
+        assert "version 2 has third_order" in model.stderr
+        for words in (
+            ["improve", "latest", "--out", "-", *archive],
+            ["archive", "key", "--output", "-"],
+            ["waveforms", "latest", "--format", "mat", "--output", "-", *archive],
+            ["extend", "model.toml", "third_order", "--out", "-", "--json"],
+            ["plan", "optimise", "--output", "-", "--json"],
+        ):
+            done = command(words)
+            assert done.returncode == 2, (words, done.stdout, done.stderr)
+            assert done.stdout == ""
+        assert not (tmp_path / "-").exists()
+        assert not (tmp_path / "model.toml").exists()
+
+
+def test_exported_parameters_have_the_nominal_scale_of_the_preset_or_say_what_is_missing(run: Path) -> None:
+    words = ["export", "latest", "--format", "ardupilot", "--units", "A1", "--failed", "--archive", str(run)]
+    by_preset = command(words)
+    assert by_preset.returncode == 0, by_preset.stderr
+    assert by_preset.stdout == command([*words, "--nominal", "256000"]).stdout
+    refused = command([*words, "--nominal", "-1"])
+    assert refused.returncode == 2
+    assert "nominal scale of unit A1: -1, a positive output per g is needed" in refused.stderr
+
+
+def test_a_recipe_of_procedures_has_no_dwells_to_optimise() -> None:
+    recipe = ROOT / "deploy" / "recipes" / "procedures" / "tilt.toml"
+    for words in (["plan", "optimise", str(recipe)], ["plan", str(recipe), "--page", "page.html"]):
+        done = command(words)
+        assert done.returncode == 2
+        assert "its procedures have no multi_position" in done.stderr
+
+
+def test_a_clock_of_a_station_that_is_served_faster_runs_faster_and_goes_on() -> None:
+    clock = WallClock(speed=60.0)
+    begun = time.monotonic()
+    clock.sleep(6.0)
+    assert 0.1 <= time.monotonic() - begun < 3.0
+    assert clock.now() >= 6.0
+    assert WallClock(clock.state(), speed=60.0).now() >= 6.0
+
+
+def test_a_station_that_is_served_faster_is_checked_by_a_client_that_knows_the_speed(tmp_path: Path) -> None:
+    with served(speed=30.0) as port:
+        knowing = modbus_station(port, link={"speed": 30.0})
+        done = command(["station", "check", "--station", str(station_file(tmp_path, knowing))])
+        assert done.returncode == 0, (done.stdout, done.stderr)
+        unknowing = station_file(tmp_path, modbus_station(port), "unknowing.toml")
+        done = command(["station", "check", "--station", str(unknowing)])
+        assert done.returncode == 3
+        assert "needs the same speed in [link]" in " ".join(done.stderr.split())
+        with open_station(knowing, lot_of()) as station:
+            before, powered = station.clock.now(), station.reader.since_power()
+            station.clock.sleep(30.0)
+            assert station.reader.since_power() - powered == pytest.approx(station.clock.now() - before, abs=15.0)
+
+
+def test_a_port_in_use_is_refused_before_an_address_is_printed() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(WrongUse, match=rf"port {port} of 127.0.0.1 cannot be used \(Address already in use\)"):
+            listening_socket("127.0.0.1", port, "workbench")
+        for words in (["workbench"], ["monitor", "--serve"]):
+            done = command([*words, "--port", str(port)])
+            assert (done.returncode, done.stdout) == (2, "")
+            assert done.stderr.count("\n") == 1, done.stderr
+
+
+def test_ctrl_c_with_an_open_page_ends_the_workbench_in_one_line(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "pipelines.cli", "workbench", str(tmp_path / "archive"), "--port", "0"]
+    kept = {**os.environ, "TUMBLELINE_WORKBENCH_TOKEN": "t" * 32, "PYTHONPATH": str(ROOT)}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, cwd=tmp_path, env=kept, **pipes) as process:
+        address = process.stdout.readline().split("/?")[0]
+        with _opened(f"{address}/events") as events:
+            assert events.readline() == b"event: boot\n"
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=30.0)
+    assert (process.returncode, out) == (0, ""), err
+    assert err == "Open the address above; Ctrl-C ends the workbench.\nworkbench: ended\n"
+
+
+def _opened(address: str):
+    """The answer of a server that may still be starting."""
+    for _ in range(200):
+        try:
+            return urllib.request.build_opener(urllib.request.ProxyHandler({})).open(address, timeout=20.0)
+        except urllib.error.URLError as problem:
+            if not isinstance(problem.reason, ConnectionRefusedError):
+                raise
+            time.sleep(0.1)
+    raise AssertionError(f"{address} does not answer")

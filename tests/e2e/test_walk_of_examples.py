@@ -1,0 +1,153 @@
+"""Every example of every ``--help`` is given as it is printed, in a folder that has the files which it names.
+
+It ends with a result or a verdict; the few that end otherwise here say why in one sentence, which is stated in ``OTHERWISE``.
+"""
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import chdir
+from pathlib import Path
+
+import pytest
+from help_examples import examples, made_in, words_of
+from in_process import command
+from typed_commands import printed_commands
+
+from pipelines.cli import INTERRUPTED
+from schemas.errors import DONE, PART_FAILED, UNUSABLE
+
+ROOT = Path(__file__).resolve().parents[2]
+SERVE = ("workbench", "monitor --serve", "station serve", "station watch", "--watch")
+"""Examples that go on until Ctrl-C: they are started and ended in a process of their own."""
+
+LONG = ("demo",)
+"""Examples that take minutes."""
+
+PARTITIONED = {"rerun", "whatif", "release"}
+"""Commands that start processes of their own for every partition, or need one that does: in the slow part."""
+
+DIRECT = {"run", "investigate"}
+"""Commands that are given with --direct: the orchestrator is tested elsewhere."""
+
+ELSEWHERE = {"run", "investigate", "import"}
+"""Commands whose runs are kept in another archive, so that the latest run is the one that the other examples mean."""
+
+OTHERWISE = {
+    "tumbleline operator line-six --go": "no run waits",  # with one that waits: tests/e2e/test_operator.py
+}
+"""Examples that end with status 2 here, and words of their message."""
+
+
+def kept(example: str) -> bool:
+    return any(one in example for one in SERVE)
+
+
+ALL = list(examples())
+SHORT = [one for one in ALL if not kept(one) and not any(word in one for word in LONG)]
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> tuple[Path, dict[str, str]]:
+    """The folder of the examples, and what stands there for names of the reader's own."""
+    del no_pictures
+    folder = tmp_path_factory.mktemp("examples")
+    with pytest.MonkeyPatch.context() as patch, chdir(folder):
+        _at_home(patch, folder)
+        names = made_in(folder)
+        for example in (
+            "tumbleline certify latest",
+            "tumbleline certify latest",
+        ):  # a unit's first and second certificate
+            assert command(words_of(example, names)).returncode == DONE
+    return folder, names
+
+
+def _at_home(patch: pytest.MonkeyPatch, folder: Path) -> None:
+    for variable, name in (("XDG_STATE_HOME", "state"), ("XDG_CONFIG_HOME", "config"), ("PREFECT_HOME", "prefect")):
+        patch.setenv(variable, str(folder / name))
+
+
+def test_the_examples_are_found_and_every_exception_is_one_of_them() -> None:
+    assert len(ALL) > 90
+    assert set(OTHERWISE) <= set(SHORT)
+    for one in (*SERVE, *LONG):
+        assert any(one in example for example in ALL), one
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        pytest.param([one for one in SHORT if one.split()[1] not in PARTITIONED], id="short"),
+        pytest.param(SHORT, id="all", marks=pytest.mark.slow),
+    ],
+)
+def test_the_examples_of_every_help_end_with_a_result(
+    chosen: list[str], world: tuple[Path, dict[str, str]], monkeypatch, tmp_path: Path
+) -> None:
+    """In one test: later examples use what earlier ones made, in a copy of the folder."""
+    made, names = world
+    folder = tmp_path / "folder"
+    shutil.copytree(made, folder)
+    names = {name: text.replace(str(made), str(folder)) for name, text in names.items()}
+    _at_home(monkeypatch, folder)
+    monkeypatch.chdir(folder)
+    wrong: list[tuple[str, int, str]] = []
+    for example in chosen:
+        words = words_of(example, names)
+        words += ["--direct"] if words[0] in DIRECT else []
+        words += ["--archive", "elsewhere"] if words[0] in ELSEWHERE else []
+        done = command(words)
+        if example in OTHERWISE:
+            right = done.returncode == UNUSABLE and OTHERWISE[example] in done.stderr
+        else:
+            right = done.returncode in {DONE, PART_FAILED}
+        if not right or "defect" in done.stderr or "Traceback" in done.stderr:
+            wrong.append((example, done.returncode, done.stderr[-400:]))
+            continue
+        if words[0] in {"extend", "certify"}:
+            continue
+        for line in printed_commands(done.stdout.partition("Next:")[2]):
+            later = command([*line, *(["--direct"] if line[0] in DIRECT else [])])
+            if later.returncode not in {DONE, PART_FAILED} or "defect" in later.stderr:
+                wrong.append((f"{example}, then {shlex.join(line)}", later.returncode, later.stderr[-400:]))
+    assert wrong == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", [one for one in ALL if kept(one)])
+def test_an_example_that_serves_ends_by_ctrl_c(example: str, world: tuple[Path, dict[str, str]], monkeypatch) -> None:
+    folder, names = world
+    _at_home(monkeypatch, folder)
+    monkeypatch.chdir(folder)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
+    words = [sys.executable, "-m", "pipelines.cli", *words_of(example, names)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, env=environment, **pipes) as process:
+        too_long = threading.Timer(60.0, process.kill)
+        too_long.start()
+        first = process.stdout.readline()
+        threading.Event().wait(1.0)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate()
+        too_long.cancel()
+    assert first.strip() or out.strip(), err
+    assert process.returncode in {DONE, INTERRUPTED}, err
+    assert "Traceback" not in err
+    assert "defect" not in err
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("example", [one for one in ALL if any(word in one for word in LONG)])
+def test_a_long_example_ends_with_a_result(example: str, tmp_path: Path, monkeypatch) -> None:
+    _at_home(monkeypatch, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    done = command(words_of(example, {"/mnt": "."}))
+    assert done.returncode in {DONE, PART_FAILED}, done.stderr
+    assert "defect" not in done.stderr

@@ -1,0 +1,121 @@
+"""What ships, works at the first try: every recipe and station file of ``deploy`` by the commands that a page names for it.
+
+The commands that are printed, as such or within a message, are pasted. The fast part measures the procedures and the quickest
+recipe; the slow part measures every recipe, and every station file with the quickest one.
+"""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from in_process import command
+from typed_commands import printed_commands
+
+from schemas.errors import PART_FAILED, UNUSABLE
+from schemas.station import load_station
+from schemas.toml_files import parse_toml
+
+ROOT = Path(__file__).resolve().parents[2]
+DEPLOY = ROOT / "deploy"
+QUICKEST = DEPLOY / "recipes" / "line-six.toml"
+RECIPES = sorted(path for path in (DEPLOY / "recipes").glob("*.toml") if not path.name.endswith(".limits.toml"))
+PROCEDURES = sorted(
+    path for path in (DEPLOY / "recipes" / "procedures").glob("*.toml") if not path.name.endswith(".limits.toml")
+)
+STATIONS = sorted((DEPLOY / "stations").glob("*.toml"))
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
+
+def named(path: Path) -> str:
+    return path.stem
+
+
+def went(*words: object, allowed: tuple[int, ...] = (0,)) -> tuple[str, str]:
+    """Standard output and standard error of a command, which ended with one of these statuses and is no defect."""
+    done = command([*map(str, words)], columns=2000)
+    assert done.returncode in allowed, (words, done.returncode, done.stderr)
+    assert "defect" not in done.stderr, done.stderr
+    return done.stdout, done.stderr
+
+
+def pasted(text: str, archive: Path, *, also_quoted: bool = False) -> int:
+    """Give every command that a text prints; their number."""
+    lines = printed_commands(text)
+    if also_quoted:
+        lines += [[*shlex.split(line), "--archive", str(archive)] for line in re.findall(r"'tumbleline ([^']*)'", text)]
+    for words in lines:
+        out, _ = went(*words, allowed=(0, PART_FAILED))
+        assert out.strip(), words
+    return len(lines)
+
+
+def test_there_is_something_to_walk() -> None:
+    assert (len(RECIPES), len(PROCEDURES), len(STATIONS)) >= (5, 12, 8)
+
+
+@pytest.mark.parametrize("recipe", PROCEDURES, ids=named)
+def test_a_procedure_is_planned_measured_reported_and_says_what_it_lacks(recipe: Path, tmp_path: Path) -> None:
+    archive = ("--archive", tmp_path / "archive")
+    content = parse_toml(recipe.read_text(encoding="utf-8"), recipe.name)
+    kind, limits = content["procedures"][0]["kind"], recipe.with_name(content["limits"])
+    out, err = went("plan", recipe)
+    assert "min of station time" in out
+    assert "refuses this recipe" not in err
+    limited = re.findall(r"^(\w+) = \{", limits.read_text(encoding="utf-8"), re.MULTILINE)
+    assert limited
+    for figure in (kind, *limited):
+        assert figure in " ".join(out.split())
+    out, _ = went("run", recipe, "--direct", *archive)
+    assert "2 of 2 passed" in out
+    assert Path(went("report", "latest", *archive)[0].strip()).is_file()
+    for words in (("export",), ("diagnose",), ("compare",), ("correct", QUICKEST, "--calibration", "latest")):
+        _, err = went(*words, *(() if words[0] == "correct" else ("latest",)), *archive, allowed=(UNUSABLE,))
+        assert f"it measured {kind}" in err
+        assert pasted(err, tmp_path / "archive", also_quoted=words[0] == "diagnose") == (
+            2 if words[0] == "diagnose" else 0
+        )
+
+
+def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: Path) -> None:
+    out, _ = went("run", QUICKEST, "--direct", "--archive", tmp_path)
+    assert "4 of 4 passed" in out
+    assert pasted(out, tmp_path) == 2
+    for form in ("ardupilot", "betaflight"):  # by the nominal scale of the preset
+        text, err = went("export", "latest", "--format", form, "--units", "LN-01", "--archive", tmp_path)
+        assert "256000 LSB" in text
+        assert "certificate LN-01/1" in text
+        del err
+
+
+@pytest.mark.parametrize(
+    "recipe", [*(pytest.param(one, marks=pytest.mark.slow, id=named(one)) for one in RECIPES), *PROCEDURES], ids=named
+)
+@pytest.mark.parametrize("station", STATIONS, ids=named)
+def test_a_recipe_can_be_planned_on_a_station_or_is_refused_by_name(recipe: Path, station: Path) -> None:
+    """What a station cannot do is said before it moves: by the plan, with a reason."""
+    _, err = went("plan", recipe, "--station", station, allowed=(0, PART_FAILED, UNUSABLE))
+    for line in err.splitlines():
+        assert line.startswith(("warning: 'tumbleline run' refuses this recipe: ", "tumbleline: ")), line
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("recipe", RECIPES, ids=named)
+def test_a_recipe_runs_on_the_built_in_station(recipe: Path, tmp_path: Path) -> None:
+    went("plan", recipe)
+    out, _ = went("run", recipe, "--direct", "--archive", tmp_path, allowed=(0, PART_FAILED))
+    assert re.search(r"\d of \d passed, \d failed, 0 refused", out)
+    assert pasted(out, tmp_path) >= 1
+    went("export", "latest", "--format", "csv", "--failed", "--archive", tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("recipe", [QUICKEST, DEPLOY / "recipes" / "analogue.toml"], ids=named)
+@pytest.mark.parametrize("station", [path for path in STATIONS if load_station(path).kind == "simulated"], ids=named)
+def test_a_recipe_runs_on_every_simulated_station(recipe: Path, station: Path, tmp_path: Path) -> None:
+    out, _ = went("run", recipe, "--station", station, "--direct", "--archive", tmp_path, allowed=(0, PART_FAILED))
+    assert re.search(r"\d of \d passed, \d failed, 0 refused", out)
+    assert pasted(out, tmp_path) >= 1
