@@ -7,10 +7,11 @@ import lzma
 from typing import TYPE_CHECKING
 
 from pipelines.importers.content import Content, chosen
-from pipelines.importers.library import as_file, library
+from pipelines.importers.temporary_file import as_file
 from pipelines.importers.unpacking import MOST_BYTES, refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
+from schemas.library import library
 
 if TYPE_CHECKING:
     import pandas as pd
