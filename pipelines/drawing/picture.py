@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pipelines.drawing.vector import WIDTH, svg_text
+from pipelines.drawing.vector import WIDTH, alone, svg_text
 from schemas.errors import WrongUse
 from schemas.library import library
 
@@ -37,7 +37,7 @@ def picture(chart: Chart, ending: str) -> bytes:
     WrongUse
         The library that makes PNG and PDF is not installed.
     """
-    svg = svg_text(chart).replace("<svg ", '<svg font-family="sans-serif" ', 1)
+    svg = alone(svg_text(chart))
     if ending == ".svg":
         return svg.encode()
     typst = library(

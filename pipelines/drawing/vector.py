@@ -94,6 +94,11 @@ def part(title: str, height: float, content: str) -> str:
     return f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" {box}>{content}</svg>'
 
 
+def alone(picture: str) -> str:
+    """The SVG text of a picture as that of a file, which takes no font from a page."""
+    return picture.replace("<svg ", '<svg font-family="sans-serif" ', 1)
+
+
 def _scaled(plot: Plot, wide: float, tall: float) -> tuple[_Scaled, _Scaled]:
     return (
         _axis(plot.x, [t.x for t in plot.traces], int(wide // 75)),
