@@ -10,6 +10,8 @@ import re
 import sys
 from functools import cache
 from importlib import metadata
+from importlib.util import cache_from_source
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from packaging.requirements import Requirement
@@ -91,15 +93,17 @@ def _weight(part: str, packages: set[str]) -> Weight:
 
 @cache
 def megabytes(name: str) -> float:
-    """Size of the installed files of a package, 10⁶ bytes."""
+    """Size of the installed files of a package and of its compiled modules, those of its own tests left out, 10⁶ bytes."""
     held = _held(name)
-    files = (held.files or ()) if held is not None else ()
-    paths = [
-        path
-        for file in files
-        if not (file.suffix == ".pyc" and TESTS & set(file.parts)) and (path := held.locate_file(file)).is_file()
-    ]
-    return sum(path.stat().st_size for path in paths) / 1e6
+    total = 0
+    for file in (held.files or ()) if held is not None else ():
+        path = Path(str(file.locate()))
+        if path.suffix == ".pyc" or not path.is_file():
+            continue  # a compiled module is listed only if it was compiled by the installer
+        total += path.stat().st_size
+        compiled = Path(cache_from_source(str(path))) if path.suffix == ".py" and not TESTS & set(path.parts) else path
+        total += compiled.stat().st_size if compiled != path and compiled.is_file() else 0
+    return total / 1e6
 
 
 def _licence(name: str) -> str:
