@@ -95,17 +95,20 @@ def _component(pin: Pin) -> dict[str, Any]:
 
 
 def _licence(name: str, version: str) -> dict[str, Any]:
-    """The licence as its metadata state it: an SPDX expression, else a name; empty where there is none."""
+    """The licence of a library, where it is installed in that version."""
     installed = _installed(name, version)
-    if installed is None:
-        return {}
+    return {} if installed is None else licence_of(installed)
+
+
+def licence_of(installed: Any) -> dict[str, Any]:
+    """The licence that the metadata of a package state: an SPDX expression, else a name; empty where there is none."""
     if installed.get("License-Expression"):
         return {"expression": installed["License-Expression"]}
     stated = (installed.get("License") or "").strip()
     classes = [c.rpartition(" :: ")[2] for c in installed.get_all("Classifier") or () if c.startswith("License ::")]
-    text = (
-        stated if stated and "\n" not in stated and len(stated) <= 80 else ", ".join(classes)
-    )  # some hold the whole text
+    first = stated.partition("\n")[0].strip()
+    short = stated == first and len(stated) <= 80
+    text = stated if stated and short else ", ".join(classes) or first[:80]  # some hold the whole text
     return {"license": {"name": text}} if text else {}
 
 

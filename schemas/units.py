@@ -1,6 +1,8 @@
 """Names and factors that tables, documents and messages share."""
 
-AXES = ("x", "y", "z")
+from typing import Literal
+
+AXES: tuple[Literal["x"], Literal["y"], Literal["z"]] = ("x", "y", "z")
 """Sensor axes, in the order of every array and table."""
 
 MICRO = 1e6

@@ -76,25 +76,6 @@ def no_error_of_a_server(request: pytest.FixtureRequest) -> Iterator[None]:
         assert not errors_in(log), f"{log} has an error:\n{errors_in(log)}"
 
 
-@pytest.fixture(scope="module")
-def no_pictures() -> Iterator[None]:
-    """Reports without drawn plots, for modules that make runs and look at no picture: plots are most of a run's time."""
-    with pytest.MonkeyPatch.context() as patch:
-        leave_out_pictures(patch)
-        yield
-
-
-@pytest.fixture
-def no_pictures_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same for one test of a module whose others look at pictures."""
-    leave_out_pictures(monkeypatch)
-
-
-def leave_out_pictures(patch: pytest.MonkeyPatch) -> None:
-    """Let every report be made without its plots until the patch is undone."""
-    patch.setattr("matplotlib.figure.Figure.savefig", lambda _, sink, **__: sink.write("<svg/>"))
-
-
 @pytest.fixture
 def no_next_measurement(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Diagnoses without proposed measurements, for tests of what is said of the measured ones: proposals are most of the time.

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipelines.audit import charts as drawn
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
 from pipelines.audit.finding import WHO
 from pipelines.audit.parameters import unit_text
-from pipelines.audit.pictures import chart_plot, drift_plot, due_plot, series_plot, yield_plot
+from pipelines.drawing import svg_text
 from pipelines.report.numbers import THIN, chance, significant
 from pipelines.report.templates import template
 
@@ -39,12 +40,12 @@ def render(audit: Audit, listed: list[AuditFinding], archive: str) -> str:
         overdue=int(np.count_nonzero(audit.due.day < audit.scope.until)),
         valid=int(audit.due.valid.sum()),
         rules=audit.rules,
-        series_svg=series_plot(series) if series else "",
-        charts_svg=chart_plot(charts) if charts else "",
+        series_svg="".join(svg_text(drawn.series_chart(one)) for one in series),
+        charts_svg="".join(svg_text(drawn.control_chart(one)) for one in charts),
         chart_count=len(audit.charts),
-        yield_svg=yield_plot(months) if len(months) > 1 else "",
-        due_svg=due_plot(audit) if audit.due.row.size else "",
-        drift_svg=drift_plot(audit, drifts) if drifts else "",
+        yield_svg=svg_text(drawn.yield_chart(months)) if len(months) > 1 else "",
+        due_svg=svg_text(drawn.due_chart(audit)) if audit.due.row.size else "",
+        drift_svg="".join(svg_text(drawn.drift_chart(audit, one)) for one in drifts),
         shares=[share for share in audit.yields if share.of in {"device", "station"}],
         kinds=audit.kinds,
         furthest=furthest(audit, MOST_ROWS),

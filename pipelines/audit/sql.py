@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-import duckdb
 import pyarrow as pa
 
 from pipelines.audit import datasets
 from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.run_rows import SCHEMAS
+from pipelines.audit.tables_in_memory import QueryResult, rows_of_index
 from schemas.errors import WrongUse, did_you_mean
+from schemas.library import library
 
 if TYPE_CHECKING:
+    import duckdb
+
     from pipelines.archive import Archive
     from pipelines.certificates.validity import Calibration
 
@@ -41,14 +43,6 @@ VIEWS = (*SCHEMAS, *FILES, "calibrations")
 WORD = re.compile(r"[A-Za-z_]\w*")
 
 
-@dataclass(frozen=True)
-class QueryResult:
-    """Column names and rows of an answer."""
-
-    columns: tuple[str, ...]
-    rows: list[tuple[Any, ...]]
-
-
 def ask(
     archive: Archive, sql: str, *, workers: int = 1, compact: bool = True, index: AuditIndex | None = None
 ) -> QueryResult:
@@ -64,8 +58,8 @@ def ask(
     index : one that the caller holds; None: the index is brought up to date first
     """
     statement = one_reading_statement(sql)
-    views = views_in(sql)
-    with duckdb.connect(":memory:", config=SHUT_IN) as connection:
+    views = {word.lower() for word in WORD.findall(sql)} & set(VIEWS)
+    with _engine().connect(":memory:", config=SHUT_IN) as connection:
         if index is None and views & SCHEMAS.keys():
             index = up_to_date(archive, workers=workers)
         for name in sorted(views):
@@ -74,41 +68,15 @@ def ask(
         return _answered(connection, statement)
 
 
-def views_in(sql: str) -> set[str]:
-    """The views whose names stand in a query."""
-    return {word.lower() for word in WORD.findall(sql)} & set(VIEWS)
-
-
-class TablesInMemory:
-    """Some tables of an index as tables of the query engine: a query over them opens no file. For many threads.
-
-    Parameters
-    ----------
-    index : read once, here
-    names : of the tables
-    """
-
-    def __init__(self, index: AuditIndex, names: Collection[str]) -> None:
-        self.names = frozenset(names)
-        self._connection = duckdb.connect(":memory:", config=SHUT_IN)
-        for name in sorted(self.names):
-            self._connection.register("read", _of_index(index, name))
-            self._connection.execute(f'CREATE TABLE "{name}" AS SELECT * FROM read')  # noqa: S608 - a name of SCHEMAS
-            self._connection.unregister("read")
-        self._connection.execute("SET enable_progress_bar = false; SET lock_configuration = true")
-
-    def ask(self, sql: str) -> QueryResult:
-        """The answer to an SQL query over these tables, as that of :func:`ask`."""
-        statement = one_reading_statement(sql)
-        with self._connection.cursor() as cursor:
-            return _answered(cursor, statement)
+def _engine() -> Any:
+    return library("duckdb", "sql", "query: SQL over the archive")
 
 
 def _answered(connection: duckdb.DuckDBPyConnection, statement: str) -> QueryResult:
     try:
         cursor = connection.execute(statement)
         return QueryResult(tuple(str(column[0]) for column in cursor.description or ()), cursor.fetchall())
-    except duckdb.Error as problem:
+    except _engine().Error as problem:
         raise WrongUse(_explained(problem)) from None
 
 
@@ -137,8 +105,8 @@ def one_reading_statement(sql: str) -> str:
 
 def _one_statement(sql: str, before: str = "") -> duckdb.Statement:
     try:
-        statements = duckdb.extract_statements(sql)
-    except duckdb.Error as problem:
+        statements = _engine().extract_statements(sql)
+    except _engine().Error as problem:
         raise WrongUse(_explained(problem)) from None
     if len(statements) != 1:
         _refuse(before + (_kinds(sql) or "no statement"))
@@ -146,7 +114,7 @@ def _one_statement(sql: str, before: str = "") -> duckdb.Statement:
 
 
 def _kinds(sql: str) -> str:
-    return ", ".join(statement.type.name for statement in duckdb.extract_statements(sql)).lower()
+    return ", ".join(statement.type.name for statement in _engine().extract_statements(sql)).lower()
 
 
 def _refuse(statement: str) -> NoReturn:
@@ -169,16 +137,9 @@ def _views(archive: Archive, index: AuditIndex | None, *, compact: bool) -> Mapp
     out: dict[str, Callable[[], Any]] = {name: partial(_of_runs, archive, name) for name in FILES}
     for name in SCHEMAS:
         plain = not compact and name in {"coefficients", "figures"}
-        out[name] = partial(_of_runs, archive, name) if plain else partial(_of_index, index, name)
+        out[name] = partial(_of_runs, archive, name) if plain else partial(rows_of_index, index, name)
     out["calibrations"] = partial(_of_ledger, archive)
     return out
-
-
-def _of_index(index: AuditIndex | None, name: str) -> Any:
-    kept = [column for column in SCHEMAS[name].names if column != "stamp"]
-    if index is None or not index.parts or not isinstance(index.parts[0], Path):
-        return index.table(name, kept) if index is not None else SCHEMAS[name].empty_table().select(kept)
-    return datasets.of_index(index.files(name), pa.schema([SCHEMAS[name].field(column) for column in kept]))
 
 
 def _of_runs(archive: Archive, name: str) -> Any:

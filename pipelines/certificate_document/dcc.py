@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.certificate_document.numbers import si_unit
 from pipelines.certificate_document.schema_files import EXTRA, WHERE, validate
-from pipelines.importers.library import library
+from schemas.library import library
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

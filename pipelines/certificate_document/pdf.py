@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.certificate_document.pages import page_content
 from pipelines.certificate_document.schema_files import EXTRA, WHERE
-from pipelines.importers.library import library
+from schemas.library import library
 
 if TYPE_CHECKING:
     from pipelines.certificate_document.content import CertificateContent

@@ -6,8 +6,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from pipelines.importers.library import library
 from schemas.errors import TumblelineError
+from schemas.library import library
 
 EXTRA, WHERE = "pdf", "certificate"
 SI_ADDRESS = "https://ptb.de/si/v2.0.0/SI_Format.xsd"

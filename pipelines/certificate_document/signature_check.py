@@ -10,8 +10,8 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509 import Certificate, load_der_x509_certificate
 
 from pipelines.certificate_document.signers import EXTRA, WHERE, Signer
-from pipelines.importers.library import library
 from schemas.errors import DataRejected
+from schemas.library import library
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

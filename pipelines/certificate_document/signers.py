@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509 import Certificate, load_pem_x509_certificates
 
-from pipelines.importers.library import library
 from schemas.errors import WrongUse
+from schemas.library import library
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

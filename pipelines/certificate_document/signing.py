@@ -17,8 +17,8 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509 import Certificate, load_pem_x509_certificates
 
 from pipelines.certificate_document.schema_files import WHERE
-from pipelines.importers.library import library
 from schemas.errors import WrongUse
+from schemas.library import library
 
 if TYPE_CHECKING:
     from pathlib import Path

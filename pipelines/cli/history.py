@@ -68,9 +68,12 @@ def command(
             for version in versions(model_file)
         ]
     if picture is not None:
-        from pipelines.report.evolution import draw_evolution
+        from pipelines.archive import files
+        from pipelines.drawing.picture import picture as drawn
+        from pipelines.report.evolution import evolution_chart
 
-        draw_evolution(rows, picture, model_file.model.name)
+        chart = evolution_chart(rows, model_file.model.name)
+        files.publish(picture, drawn(chart, picture.suffix.lower()), "picture", files.ELSEWHERE)
         error_console().print(f"picture: {picture}", markup=False, soft_wrap=True)
     if as_json:
         print_json({"model": model_file.model.name, "file": str(model), "versions": rows})
@@ -79,16 +82,14 @@ def command(
 
 
 def _refuse_picture(picture: Path | None, dwells: str) -> None:
+    from pipelines.drawing.picture import refuse_ending
     from schemas.errors import WrongUse
 
     if picture is None:
         return
     if not dwells:
         raise WrongUse("history: --picture shows errors, they need --dwells; name the dwells too")
-    if picture.suffix.lower() not in {".png", ".svg", ".pdf"}:
-        raise WrongUse(
-            f"history: --picture {picture}: '{picture.suffix}' cannot be drawn; name a .png, .svg or .pdf file"
-        )
+    refuse_ending(picture, "--picture")
 
 
 def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:

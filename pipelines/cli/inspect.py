@@ -80,10 +80,17 @@ def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> N
         return
     from pipelines.report import recording
 
-    if picture is not None and not recording.save_picture(inspection, picture):
-        raise WrongUse(
-            "inspect: no samples of acceleration over time were recognised, nothing can be drawn; leave out --picture"
-        )
+    if picture is not None:
+        from pipelines.drawing.picture import picture as drawn
+        from pipelines.drawing.picture import refuse_ending
+
+        refuse_ending(picture, "--picture")
+        chart = recording.chart_of(inspection)
+        if chart is None:
+            raise WrongUse(
+                "inspect: no samples of acceleration over time were recognised, nothing can be drawn; leave out --picture"
+            )
+        picture.write_bytes(drawn(chart, picture.suffix.lower()))
     if page is not None:
         page.write_text(recording.page(inspection), encoding="utf-8")
 

@@ -31,10 +31,11 @@ def write_page(page: Path, document: dict[str, Any], context: PlanContext) -> No
 
 def write_pictures(folder: Path, document: dict[str, Any], context: PlanContext) -> None:
     """Write each picture to a file."""
+    from pipelines.drawing.vector import alone
     from pipelines.report.plan import pictures
 
     with contextlib.suppress(OSError):  # what is wrong with the folder is said where a picture cannot be written to it
         folder.mkdir(parents=True, exist_ok=True)
     for name, text in pictures(document, context).items():
         if text:
-            save(folder / f"{document['recipe']}-{name}.svg", text)
+            save(folder / f"{document['recipe']}-{name}.svg", alone(text))

@@ -15,10 +15,12 @@ def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | Non
     if plot is None and page is None:
         return
     from pipelines.archive import files
-    from pipelines.report.noise_page import draw, noise_page
+    from pipelines.drawing.picture import picture, refuse_ending
+    from pipelines.report.noise_page import noise_chart, noise_page
 
     if plot is not None:
-        files.publish(plot, draw(document, plot.suffix), "plot", files.ELSEWHERE)
+        refuse_ending(plot, "--plot")
+        files.publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot", files.ELSEWHERE)
         error_console().print(f"plot: {plot}", markup=False, soft_wrap=True)
     if page is not None:
         files.publish(page, noise_page(document).encode(), "page", files.ELSEWHERE)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pipelines.flows.local import own_server, reach_named
 from pipelines.flows.settings import LOCAL
 from schemas.errors import WrongUse
+from schemas.library import require
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
@@ -32,11 +33,12 @@ def on_dask(address: str, workers: int = 1, home: Path | None = None) -> Distrib
     Raises
     ------
     WrongUse
-        The address is not the address of a scheduler.
+        The address is not the address of a scheduler, or the libraries of Dask are not installed.
     """
     if not address:
         return None
     _refuse_address(address)
+    require("prefect_dask", "dask", "--dask: work on Dask workers")
 
     def distribute(function: Callable[[Any], Any], partitions: Sequence[Any], name: str) -> list[Any]:
         with _orchestrator(home):

@@ -23,6 +23,7 @@ from pipelines.flows.quick_imports import quick_imports
 from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_database, use_key
 from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
+from stations.safety.folder import state_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +34,9 @@ LOOK_S = 1.0
 CLIENTS = "clients"
 START_LOCK = "start.lock"
 ADDRESS = "server.json"
+PAGES = (
+    "PREFECT_UI_STATIC_DIRECTORY"  # by default Prefect copies its pages into its own package, which may be read-only
+)
 PRIVATE = 0o077  # removed from the modes of all files of the server: its database has unencrypted parameters and logs
 
 
@@ -59,6 +63,8 @@ def serve(
     if home is None:
         for name, value in kept().items():
             os.environ.setdefault(name, value)
+    if PAGES not in os.environ:
+        os.environ[PAGES] = str(_pages_folder())
     folder = os.environ.get("PREFECT_HOME")
     if folder:
         private_folder(Path(folder))
@@ -83,6 +89,13 @@ def serve(
     if home is not None:
         threading.Thread(target=_leave_when_alone, args=(home, server), daemon=True).start()
     server.run()
+
+
+def _pages_folder() -> Path:
+    """Where Prefect copies the files of its pages: once for a user and a version of Prefect, outside the installed packages."""
+    folder = state_folder() / "orchestrator-pages"
+    folder.mkdir(exist_ok=True)  # Prefect locks a file in it before it makes it
+    return folder
 
 
 def private_folder(path: Path) -> None:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
+    from pipelines.drawing.chart import Chart
     from schemas.poses import Pose
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
@@ -219,8 +219,6 @@ class Evaluated(Procedure):
     rows : of plots in its picture
     """
 
-    rows: ClassVar[int] = 1
-
     @abstractmethod
     def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
         """Points of the procedure: see the table ``procedure_points``."""
@@ -230,8 +228,8 @@ class Evaluated(Procedure):
         """Figures and findings of every unit, from the points alone."""
 
     @abstractmethod
-    def draw(self, drawing: Drawing, part: Any, points: pd.DataFrame) -> None:
-        """Draw the points of one unit into an empty drawing."""
+    def chart(self, part: Any, points: pd.DataFrame) -> Chart | None:
+        """The points of one unit with what was fitted to them; None where they are too few."""
 
 
 class InG(Procedure):

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from inertial.dynamics.stability import block_means, stability
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
 
@@ -132,19 +132,22 @@ class BiasStability(InG, Evaluated):
                 findings.append(Finding(str(unit), "definitions of bias stability", text))
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: BiasStabilityPart, points: pd.DataFrame) -> None:
-        """Means of 1 s and of 100 s of every axis over time, each about its mean."""
+    def chart(self, part: BiasStabilityPart, points: pd.DataFrame) -> Chart:
+        """Means of 10 s and of 100 s of every axis over time, each about its mean."""
         del part
-        place = drawing.subplots()
-        for axis, colour in zip(AXES, ("#0072b2", "#d55e00", "#009e73"), strict=True):
+        short: list[Trace] = []
+        long: list[Trace] = []
+        for axis in AXES:
             own = points[points["axis"] == axis]
-            time, value = own["setting"].to_numpy() / 60.0, own["value"].to_numpy()
+            time, value = own["setting"].to_numpy(dtype=float) / 60.0, own["value"].to_numpy(dtype=float)
             value = value - value.mean()
-            place.plot(block_means(time, 10), block_means(value, 10), "-", lw=0.5, c=colour, alpha=0.35)
-            hundred = block_means(value, 100)
-            place.plot(block_means(time, 100), hundred, "-", lw=1.6, c=colour, label=f"axis {axis}, 100 s means")
-        place.set(xlabel="time / min", ylabel="output about its mean / µg")
-        place.legend(frameon=False, loc="upper right", ncols=3)
+            for traces, count, width in ((short, 10, 0.4), (long, 100, 1.8)):
+                x, y = block_means(time, count), block_means(value, count)
+                traces.append(
+                    Trace(f"axis {axis}" if count > 10 else "", x, y, "line", axis, width=width, legend=count > 10)
+                )
+        axes = PlotAxis("time / min"), PlotAxis("output about its mean / µg")
+        return Chart(self.title, (Plot("thick: means of 100 s", *axes, (*short, *long)),))
 
 
 PROCEDURE = BiasStability()

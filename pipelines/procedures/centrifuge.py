@@ -13,6 +13,7 @@ from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynom
 from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagnose_spins
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
@@ -30,7 +31,7 @@ from pipelines.procedures.base import (
     refuse_unknown_effects,
     scale_of,
 )
-from pipelines.procedures.centrifuge_radii import drawn_radii, figures_of_radii, fitted_radii, texts_of_radii
+from pipelines.procedures.centrifuge_radii import figures_of_radii, fitted_radii, of_radii, texts_of_radii
 from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_radius, texts_of_radius
 from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
@@ -216,22 +216,24 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
             findings += [Finding(name, subject, text) for subject, text in texts]
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: CentrifugePart, points: pd.DataFrame) -> None:
+    def chart(self, part: CentrifugePart, points: pd.DataFrame) -> Chart:
         """Departure from the straight line over the acceleration, with the polynomial; each radius has a line of its own."""
-        place = drawing.subplots()
-        if part.radii_m:
-            drawn_radii(place, points, 1e-6 * part.radius_um)
-            return
+        traces = of_radii(points, 1e-6 * part.radius_um) if part.radii_m else self._of_one_radius(part, points)
+        axes = PlotAxis("acceleration / g"), PlotAxis("departure from the straight line / mg")
+        return Chart(self.title, (Plot("", *axes, tuple(traces)),))
+
+    @staticmethod
+    def _of_one_radius(part: CentrifugePart, points: pd.DataFrame) -> list[Trace]:
         force, value = points["setting"].to_numpy(dtype=float), points["value"].to_numpy(dtype=float)
         line = np.polyfit(force, value, 1)
-        shown, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * points["uncertainty"]
-        place.errorbar(force, shown, expanded, fmt="o", ms=3.5, lw=0.9, c="#0072b2", label="measured, U (k = 2)")
+        shown, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * points["uncertainty"].to_numpy(dtype=float)
         fit = fitted(part, points)
         x = np.linspace(force.min(), force.max(), 300)
         curve = columns(x, fit.names) @ fit.value - np.polyval(line, x)
-        place.plot(x, 1e3 * curve, lw=1.1, c="#d55e00", label="polynomial")
-        place.set(xlabel="acceleration / g", ylabel="departure from the straight line / mg")
-        place.legend(frameon=False)
+        return [
+            Trace("measured, U (k = 2)", force, shown, error=expanded),
+            Trace("polynomial", x, 1e3 * curve, "line", "before"),
+        ]
 
 
 def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:

@@ -8,6 +8,7 @@ import numpy as np
 
 from inertial.dynamics.centrifuge import STANDARD_GRAVITY, columns, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
+from pipelines.drawing.chart import SEVERAL, Trace
 from pipelines.procedures.base import FigureValue
 from pipelines.procedures.wording import verdict_of, with_uncertainty
 from schemas.units import MICRO
@@ -21,7 +22,6 @@ OF_RADII = ("centrifuge_mass_offset_um", "centrifuge_radius_consistency_ppm")
 """Figures that one radius cannot determine."""
 ONE_RADIUS = "one radius: the offset is not parted from a scale that differs by sign; list two radii in radii_m"
 ONE_MOUNTING = "one mounting: errors of the radii are not parted from the offset; measure with the units reversed"
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 
 
 def fitted_radii(rows: pd.DataFrame, radius_error_m: float) -> RadiiFit:
@@ -80,18 +80,18 @@ def _stated(one: tuple[float, float], factor: float) -> str:
     return with_uncertainty(factor * one[0], 2.0 * factor * one[1])
 
 
-def drawn_radii(place: Any, points: pd.DataFrame, radius_error_m: float) -> None:
+def of_radii(points: pd.DataFrame, radius_error_m: float) -> list[Trace]:
     """Departure from a straight line for each radius: with offset and stretch it differs from radius to radius."""
     fit = fitted_radii(points, radius_error_m)
-    for colour, (radius, rows) in zip(COLOURS, points.groupby("radius_m", sort=False), strict=False):
+    traces: list[Trace] = []
+    for role, (radius, rows) in zip(SEVERAL, points.groupby("radius_m", sort=False), strict=False):
         force, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
         line, r = np.polyfit(force, value, 1), float(str(radius))
-        apart, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * rows["uncertainty"]
-        place.errorbar(force, apart, expanded, fmt="o", ms=3.5, lw=0.9, c=colour, label=f"{r:g} m, U (k = 2)")
+        apart, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * rows["uncertainty"].to_numpy(dtype=float)
+        traces.append(Trace(f"{r:g} m, U (k = 2)", force, apart, role=role, error=expanded))
         x = np.linspace(force.min(), force.max(), 301)
-        place.plot(x, 1e3 * _apart(fit, x, r, force), lw=1.1, c=colour)
-    place.set(xlabel="acceleration / g", ylabel="departure from the straight line / mg")
-    place.legend(frameon=False)
+        traces.append(Trace(f"{r:g} m, fitted", x, 1e3 * _apart(fit, x, r, force), "line", role, legend=False))
+    return traces
 
 
 def _apart(fit: RadiiFit, x: Any, radius: float, force: Any) -> Any:

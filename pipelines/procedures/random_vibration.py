@@ -10,6 +10,7 @@ from scipy.signal import welch
 
 from inertial.dynamics.random_vibration import interpolated, overall_level, rectification
 from inertial.dynamics.spectra import HANN_HALF, density_confidence, hann_mean
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
 
@@ -172,47 +172,34 @@ class RandomVibration(InG, OnEquipment, Evaluated):
         findings += _tolerance(part, points)
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: RandomVibrationPart, points: pd.DataFrame) -> None:
+    def chart(self, part: RandomVibrationPart, points: pd.DataFrame) -> Chart:
         """Density of the reference with the tolerance band, and the shift of the mean over g rms²."""
-        left, right = drawing.subplots(1, 2)
         density = points[points["series"] == "density"]
-        f = density["setting"].to_numpy(dtype=float)
+        f, value = density["setting"].to_numpy(dtype=float), density["value"].to_numpy(dtype=float)
         target = _target(part, points, f)
         inside = target > 0.0
-        left.fill_between(
-            f[inside],
-            target[inside] * 10.0 ** (-LINE_DB / 10.0),
-            target[inside] * 10.0 ** (LINE_DB / 10.0),
-            color="#cccccc",
-            label="± 3 dB",
-            lw=0.0,
+        low, high = (target[inside] * 10.0 ** (sign * LINE_DB / 10.0) for sign in (-1.0, 1.0))
+        frequency = PlotAxis("frequency / Hz", log=True, low=0.7 * float(f[inside][0]), high=1.3 * float(f[inside][-1]))
+        least, most = 0.03 * float(target[inside].min()), 8.0 * float(target.max())
+        left = Plot(
+            "",
+            frequency,
+            PlotAxis("density / (g²/Hz)", log=True, low=least, high=most),
+            (
+                Trace("± 3 dB", f[inside], low, "band", "ink", high=high),
+                Trace("reference", f, value, "line", width=0.9),
+            ),
         )
-        left.set_ylim(0.03 * float(target[inside].min()), 8.0 * float(target.max()))
-        left.set_xlim(0.7 * float(f[inside][0]), 1.3 * float(f[inside][-1]))
-        left.plot(f, density["value"], lw=0.9, c="#0072b2", label="reference")
-        left.set(xscale="log", yscale="log", xlabel="frequency / Hz", ylabel="density / (g²/Hz)")
-        for axis in (left.xaxis, left.yaxis):
-            axis.set_major_formatter("{x:g}")
-        left.minorticks_off()
-        left.legend(frameon=False, loc="lower left")
         shift = points[points["series"] == "shift"]
-        x = shift["setting"].to_numpy(dtype=float) ** 2
-        right.errorbar(
-            x,
-            shift["value"],
-            2.0 * shift["uncertainty"],
-            fmt="o",
-            ms=4,
-            lw=0.9,
-            c="#0072b2",
-            label="measured, U (k = 2)",
-        )
-        if bool(shift["value"].notna().all()):
-            level, value, error = (shift[one].to_numpy(dtype=float) for one in ("setting", "value", "uncertainty"))
-            slope = rectification(level, value, error)[0]
-            right.plot([0.0, x.max()], [0.0, slope * x.max()], c="#d55e00", lw=1.1, label="line through the origin")
-        right.set(xlabel="level² / g²", ylabel="shift of the mean / µg")
-        right.legend(frameon=False)
+        rms, value, error = (shift[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+        traces = [Trace("measured, U (k = 2)", rms**2, value, error=2.0 * error)]
+        if np.isfinite(value).all():
+            ends = np.array([0.0, float((rms**2).max())])
+            traces.append(
+                Trace("line through the origin", ends, rectification(rms, value, error)[0] * ends, "line", "before")
+            )
+        right = Plot("", PlotAxis("level² / g²"), PlotAxis("shift of the mean / µg"), tuple(traces))
+        return Chart(self.title, (left, right), 2)
 
 
 def _shift(output: np.ndarray, rate_hz: float, seconds: float) -> tuple[float, float]:

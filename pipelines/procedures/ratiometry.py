@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from inertial.dynamics.ratiometry import Follows, departures, largest_departure, zero_and_sensitivity
 from inertial.dynamics.stability import difference_error, short_noise
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
+    from pipelines.drawing.chart import Role
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
 
@@ -44,7 +45,6 @@ FACES = {"z": ((0.0, 0.0), (180.0, 0.0)), "y": ((90.0, 0.0), (-90.0, 0.0)), "x":
 """Angles (outer, inner) of the table with each axis along and against gravity; the order is found from the outputs."""
 FARTHEST = 0.5  # of the nominal supply
 SENSITIVITY, ZERO, SLOPE = "supply_sensitivity_percent", "supply_zero_percent_fs", "supply_zero_ug_V"
-COLOURS = ("#0072b2", "#d55e00", "#009e73")
 
 
 class RatiometryPart(Part):
@@ -181,30 +181,30 @@ class Ratiometry(SetsEquipment, Evaluated):
             findings += [Finding(name, f"axis {axis}", _text(part, one)) for axis, one in by_axis.items()]
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: RatiometryPart, points: pd.DataFrame) -> None:
+    def chart(self, part: RatiometryPart, points: pd.DataFrame) -> Chart:
         """Departures of sensitivity and zero over the supply voltage."""
-        left, right = drawing.subplots(1, 2)
+        shown: tuple[list[Trace], list[Trace]] = ([], [])
         for k, axis in enumerate(part.axes):
             one = over_supply(part, points[points["axis"] == axis])
-            style: dict[str, Any] = {
-                "fmt": "o-",
-                "ms": 3.5,
-                "lw": 0.9,
-                "c": COLOURS[AXES.index(axis)],
-                "label": f"axis {axis}",
-            }
             order = np.argsort(one.supply)
-            at = one.supply[order] + 0.015 * (k - 1) * float(
-                np.ptp(one.supply)
-            )  # side by side, so that no bar hides another
-            left.errorbar(at, 100.0 * one.sensitivity[order], 200.0 * one.sensitivity_error[order], **style)
-            right.errorbar(at, 1e3 * one.zero_g[order], 2e3 * one.zero_error_g[order], **style)
-        left.set(xlabel="supply / V", ylabel="departure of the sensitivity / %")
-        right.set(xlabel="supply / V", ylabel="departure of the zero / mg")
-        for place in (left, right):
-            place.axhline(0.0, lw=0.7, c="#888888", ls="--")
-        right.legend(frameon=False, title="bars: U (k = 2)", loc="upper left")
-        right.margins(y=0.15)
+            aside = 0.015 * (k - 1) * float(np.ptp(one.supply))  # so that no bar hides another
+            at, name, role = one.supply[order] + aside, f"axis {axis}, U (k = 2)", cast("Role", axis)
+            for traces, factor, value, error in (
+                (shown[0], 100.0, one.sensitivity, one.sensitivity_error),
+                (shown[1], 1e3, one.zero_g, one.zero_error_g),
+            ):
+                traces.append(Trace(name, at, factor * value[order], role=role, error=2.0 * factor * error[order]))
+                traces.append(Trace("", at, factor * value[order], "line", role, legend=False))
+        labels = "departure of the sensitivity / %", "departure of the zero / mg"
+        supplies = np.array(part.supplies_V)
+        return Chart(
+            self.title,
+            tuple(
+                Plot("", PlotAxis("supply / V"), PlotAxis(label), (level(supplies, 0.0), *traces))
+                for label, traces in zip(labels, shown, strict=True)
+            ),
+            2,
+        )
 
 
 def over_supply(part: RatiometryPart, rows: pd.DataFrame) -> Follows:

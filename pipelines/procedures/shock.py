@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,6 +12,7 @@ from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures import shock_waves
 from pipelines.procedures.base import (
     REFERENCE,
@@ -41,8 +42,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
+    from pipelines.drawing.chart import Role
     from schemas.recipe import Recipe
 
 BEFORE_S = 0.04
@@ -199,20 +200,17 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
                 ]
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: ShockPart, points: pd.DataFrame) -> None:
+    def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""
-        left, right = drawing.subplots(1, 2)
-        for name, colour, width in (("reference", "#f0a070", 3.2), ("unit", "#0072b2", 1.1)):
-            wave = points[points["series"] == f"wave_{name}"]
-            left.plot(1e3 * wave["setting"], wave["value"], lw=width, c=colour, label=name)
-            spectrum = points[points["series"] == f"spectrum_{name}"]
-            right.plot(spectrum["setting"], spectrum["value"], lw=width, c=colour, label=name)
-        left.set(xlabel="time / ms", ylabel=f"acceleration on {part.axis} / g")
-        right.set(xscale="log", xlabel="natural frequency / Hz", ylabel="maximax response, Q = 10 / g")
-        right.xaxis.set_major_formatter("{x:g}")
-        right.minorticks_off()
-        left.legend(frameon=False)
-        right.legend(frameon=False)
+        shown: dict[str, list[Trace]] = {"wave": [], "spectrum": []}
+        for series, factor in (("wave", 1e3), ("spectrum", 1.0)):
+            for name, role, width in (("reference", "before", 3.2), ("unit", "after", 1.1)):
+                own = points[points["series"] == f"{series}_{name}"]
+                x, y = factor * own["setting"].to_numpy(dtype=float), own["value"].to_numpy(dtype=float)
+                shown[series].append(Trace(name, x, y, "line", cast("Role", role), width=width))
+        left = Plot("", PlotAxis("time / ms"), PlotAxis(f"acceleration on {part.axis} / g"), tuple(shown["wave"]))
+        axes = PlotAxis("natural frequency / Hz", log=True), PlotAxis("maximax response, Q = 10 / g")
+        return Chart(self.title, (left, Plot("", *axes, tuple(shown["spectrum"]))), 2)
 
 
 def settings_of(part: ShockPart) -> shock_waves.WaveSettings:

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
 
@@ -41,7 +41,6 @@ SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_
 BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge
 FINAL_SHARE = 0.3  # of the step's duration, at its end: the final value
 BINS = 2  # points of the averaged response for each sample interval
-COLOURS = ("#0072b2", "#d55e00", "#009e73")
 WIDTHS = (3.0, 1.9, 0.8)  # axes that agree still show one above the other
 
 
@@ -143,27 +142,38 @@ class StepResponse(OnEquipment, FromWaveforms):
             figures[str(unit)] = [worst(values) for values in by_figure.values()]
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: StepPart, points: pd.DataFrame) -> None:
+    def chart(self, part: StepPart, points: pd.DataFrame) -> Chart:
         """The response of every axis, and its last part about the final value with the band and the settling times."""
-        left, right = drawing.subplots(1, 2)
-        for axis, colour, width in zip(AXES, COLOURS, WIDTHS, strict=True):
+        whole: list[Trace] = []
+        last: list[Trace] = []
+        settled = float("nan")
+        most = 5.0 * part.band_percent
+        for axis, width in zip(AXES, WIDTHS, strict=True):
             own = points[points["axis"] == axis].sort_values("setting")
             time, value = 1e3 * own["setting"].to_numpy(dtype=float), 100.0 * own["value"].to_numpy(dtype=float)
-            left.plot(time, value, lw=width, c=colour, label=f"axis {axis}")
-            right.plot(time, value - 100.0, lw=width, c=colour)
+            whole.append(Trace(f"axis {axis}", time, value, "line", axis, width=width))
+            last.append(Trace(f"axis {axis}", time, value - 100.0, "line", axis, width=width))
             try:
                 settled = 1e3 * axis_figures(part, own).settling_s
             except NotIdentified:
                 continue
-            right.axvline(settled, lw=0.9, ls=":", c=colour)
-            left.set_xlim(-1.0 * settled, 5.0 * settled)
-            right.set_xlim(0.0, 4.0 * settled)
-        right.axhspan(-part.band_percent, part.band_percent, color="#dddddd", zorder=0)
-        right.set_ylim(-5.0 * part.band_percent, 5.0 * part.band_percent)
-        left.set(xlabel="time from the edge of the drive / ms", ylabel="response / % of the step")
-        right.set(xlabel="time from the edge of the drive / ms", ylabel="response minus final value / %")
-        right.set_title(f"band ± {part.band_percent:g} %, dotted: settling time", fontsize=8)
-        left.legend(frameon=False, loc="lower right")
+            last.append(
+                Trace("", np.full(2, settled), np.array([-most, most]), "line", axis, dashed=True, legend=False)
+            )
+        end = max(float(trace.x.max()) for trace in whole)
+        edges = ((-1.0 * settled, 5.0 * settled), (0.0, 4.0 * settled)) if np.isfinite(settled) else ((None, None),) * 2
+        label = "time from the edge of the drive / ms"
+        band = between(np.array([0.0, end]), -part.band_percent, part.band_percent, f"band ± {part.band_percent:g} %")
+        left = Plot(
+            "", PlotAxis(label, low=edges[0][0], high=edges[0][1]), PlotAxis("response / % of the step"), (*whole,)
+        )
+        right = Plot(
+            "dashed: settling time",
+            PlotAxis(label, low=edges[1][0], high=edges[1][1]),
+            PlotAxis("response minus final value / %", low=-most, high=most),
+            (band, *last),
+        )
+        return Chart(self.title, (left, right), 2)
 
 
 def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:

@@ -9,6 +9,7 @@ import numpy as np
 from inertial.dynamics.sine_fit import fit_tone_and_frequency
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.errors import NotIdentified
+from pipelines.drawing.chart import Chart
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
@@ -26,8 +27,8 @@ from pipelines.procedures.base import (
 from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.sweep_plan import FEWEST_POINTS, SweepPart
 from pipelines.procedures.sweep_points import clocks_of, condition_findings, response_point, transfer_points
+from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
-from pipelines.procedures.transfer_plots import draw_bode
 from schemas.errors import RecipeInvalid
 from schemas.poses import Pose
 from schemas.units import AXES
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
@@ -161,11 +161,12 @@ class Sweep(OnEquipment, FromWaveforms):
                 findings.append(Finding(name, "sampling", text))
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: SweepPart, points: pd.DataFrame) -> None:
+    def chart(self, part: SweepPart, points: pd.DataFrame) -> Chart | None:
         """Magnitude with uncertainty, phase, coherence, and the residual of the model."""
         kept = points[np.isfinite(points["value"])]
-        if len(kept) >= FEWEST_POINTS:
-            draw_bode(drawing, transfer_points(kept), judged(part, kept), kept["coherence"].to_numpy(dtype=float))
+        if len(kept) < FEWEST_POINTS:
+            return None
+        return bode_chart(transfer_points(kept), judged(part, kept), kept["coherence"].to_numpy(dtype=float))
 
 
 _last_judged: dict[str, TransferDiagnosis] = {}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, model_validator
 from scipy.stats import norm
 
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
+    from pipelines.drawing.chart import Role
     from schemas.recipe import Recipe
 
 FEWEST_ANGLES = 6
@@ -147,35 +148,23 @@ class Tilt(Evaluated):
         ]
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: TiltPart, points: pd.DataFrame) -> None:
+    def chart(self, part: TiltPart, points: pd.DataFrame) -> Chart:
         """Residual from bias and scale over the angle."""
-        place = drawing.subplots()
-        for axis, colour in zip(_plane(part), ("#0072b2", "#d55e00"), strict=True):
-            one = _fit(part, points[points["axis"] == axis], orders=1)
-            order = np.argsort(one.angle)
-            residual = MICRO * one.residuals / one.scale[0]
-            error = 2.0 * MICRO * _fit(part, points[points["axis"] == axis]).spread / one.scale[0]
-            place.errorbar(
-                np.degrees(one.angle)[order],
-                residual[order],
-                error[order],
-                fmt="o",
-                ms=3,
-                lw=0.8,
-                c=colour,
-                label=f"axis {axis}, ± 2 σ",
+        turn = np.linspace(-np.pi, np.pi, 361)
+        traces = [level(np.array([-180.0, 180.0]), 0.0)]
+        for axis in _plane(part):
+            rows = points[points["axis"] == axis]
+            one, whole = _fit(part, rows, orders=1), _fit(part, rows)
+            residual, error = MICRO * one.residuals / one.scale[0], 2.0 * MICRO * whole.spread / one.scale[0]
+            name, role = f"axis {axis}, ± 2 σ", cast("Role", axis)
+            traces.append(
+                Trace(name, np.degrees(one.angle), residual, role=role, error=np.broadcast_to(error, residual.shape))
             )
             if part.orders == 3:
-                turn = np.linspace(-np.pi, np.pi, 361)
-                curve = _fit(part, points[points["axis"] == axis]).curve(turn)
-                place.plot(
-                    np.degrees(turn), MICRO * curve / one.scale[0], lw=1.1, c=colour, label=f"K2 and K3 of axis {axis}"
-                )
-        place.axhline(0.0, c="#999999", lw=0.8)
-        place.set(xlabel="angle / °", ylabel="residual from bias and scale / µg")
-        place.set_xticks(np.arange(-180, 181, 45))
-        place.margins(y=0.25)  # room for the legend above the points
-        place.legend(frameon=False, loc="upper right", ncols=4)
+                curve = MICRO * whole.curve(turn) / one.scale[0]
+                traces.append(Trace(f"K2 and K3 of axis {axis}", np.degrees(turn), curve, "line", role))
+        axes = PlotAxis("angle / °", step=45.0), PlotAxis("residual from bias and scale / µg")
+        return Chart(self.title, (Plot("", *axes, tuple(traces)),))
 
 
 def _plane(part: TiltPart) -> tuple[str, str]:

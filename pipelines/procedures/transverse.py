@@ -11,6 +11,7 @@ from inertial.dynamics.goodness import adequate
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import (
     REFERENCE,
     Device,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
 
@@ -152,25 +152,22 @@ class TransverseTest(InG, OnEquipment, Evaluated):
             findings += [Finding(name, subject, text) for subject, text in _texts(part, fit)]
         return Outcome(figures, findings)
 
-    def draw(self, drawing: Drawing, part: TransversePart, points: pd.DataFrame) -> None:
+    def chart(self, part: TransversePart, points: pd.DataFrame) -> Chart:
         """Output over the angle with its uncertainty, the fitted sine, and the direction of the maximum."""
-        place = drawing.subplots()
         kept = points[np.isfinite(points["value"])]
-        place.errorbar(
-            kept["setting"], kept["value"], 2.0 * kept["uncertainty"], fmt="o", ms=3.5, lw=0.9, c="#0072b2",
-            label="measured, U (k = 2)"
-        )  # fmt: skip
+        setting, value, error = (kept[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+        traces = [Trace("measured, U (k = 2)", setting, value, error=2.0 * error)]
         if len(kept) >= FEWEST_ANGLES:
             fit = fitted(points)
             angle = np.linspace(0.0, 360.0, 361)
             wave = 100.0 * (fit.value * np.cos(np.radians(angle - fit.direction_deg)) + fit.offset)
-            place.plot(angle, wave, lw=1.1, c="#d55e00", label="fitted sine")
-            place.axhline(100.0 * fit.offset, lw=0.7, ls="--", c="#888888", label="motion along the axis")
+            traces.append(Trace("fitted sine", angle, wave, "line", "before"))
+            traces.append(level(angle, 100.0 * fit.offset, name="motion along the axis"))
         first = AXES[(AXES.index(part.axis) + 1) % 3]
-        place.set(xlabel=f"direction of motion from {first} / °", ylabel=f"output of {part.axis} / % of the motion")
-        place.set_xticks(range(0, 361, 45))
-        place.margins(y=0.25)
-        place.legend(frameon=False, ncols=3, loc="upper center")
+        along = PlotAxis(f"direction of motion from {first} / °", step=45.0)
+        return Chart(
+            self.title, (Plot("", along, PlotAxis(f"output of {part.axis} / % of the motion"), tuple(traces)),)
+        )
 
 
 def fitted(rows: pd.DataFrame) -> Transverse:

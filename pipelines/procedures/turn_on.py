@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from inertial.dynamics.stability import error_of_mean, repeatability
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -31,9 +32,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
+
+MOST_CYCLES = 20  # of which each has a tick
 
 
 class TurnOnPart(NominalScale):
@@ -111,29 +113,25 @@ class TurnOn(InG, Evaluated):
             figures[str(unit)] = [worst(value), worst(upper)]
         return Outcome(figures)
 
-    def draw(self, drawing: Drawing, part: TurnOnPart, points: pd.DataFrame) -> None:
+    def chart(self, part: TurnOnPart, points: pd.DataFrame) -> Chart:
         """Mean of every cycle about the mean of all, with the standard deviation of each axis."""
         del part
-        place = drawing.subplots()
-        for k, (axis, colour) in enumerate(zip(AXES, ("#0072b2", "#d55e00", "#009e73"), strict=True)):
+        traces: list[Trace] = []
+        for k, axis in enumerate(AXES):
             own = points[points["axis"] == axis]
-            value = own["value"].to_numpy() - own["value"].mean()
-            place.errorbar(
-                own["setting"] + 0.12 * (k - 1),
-                value,
-                own["uncertainty"],
-                fmt="o",
-                ms=3.5,
-                lw=0.9,
-                c=colour,
-                label=f"axis {axis}",
-            )
+            cycle, value = own["setting"].to_numpy(dtype=float), own["value"].to_numpy(dtype=float)
+            value = value - value.mean()
+            error = own["uncertainty"].to_numpy(dtype=float)
+            traces.append(Trace(f"axis {axis}", cycle + 0.12 * (k - 1), value, role=axis, error=error))
             spread = float(np.std(value, ddof=1))
-            for sign in (-1.0, 1.0):
-                place.axhline(sign * spread, c=colour, lw=0.7, ls="--")
-        place.set(xlabel="power cycle", ylabel="bias about its mean / µg")
-        place.margins(y=0.3)  # room for the legend above the points
-        place.legend(frameon=False, loc="upper right", ncols=3, title="dashed: standard deviation")
+            traces += [level(cycle, sign * spread, axis) for sign in (-1.0, 1.0)]
+        plot = Plot(
+            "dashed: standard deviation",
+            PlotAxis("power cycle", step=1.0 if len(points) <= MOST_CYCLES * len(AXES) else None),
+            PlotAxis("bias about its mean / µg"),
+            (*traces,),
+        )
+        return Chart(self.title, (plot,))
 
 
 PROCEDURE = TurnOn()

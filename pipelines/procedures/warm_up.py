@@ -11,6 +11,7 @@ from scipy.stats import norm
 from inertial.dynamics.stability import block_means, settled_error, short_noise
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from matplotlib.figure import Figure as Drawing
 
     from schemas.recipe import Recipe
 
@@ -109,17 +109,19 @@ class WarmUp(InG, Evaluated):
             ]
         return Outcome(figures)
 
-    def draw(self, drawing: Drawing, part: WarmUpPart, points: pd.DataFrame) -> None:
+    def chart(self, part: WarmUpPart, points: pd.DataFrame) -> Chart:
         """Output about its final value over the time since power-on, with the band."""
-        place = drawing.subplots()
-        for axis, colour in zip(AXES, ("#0072b2", "#d55e00", "#009e73"), strict=True):
+        time = points["setting"].to_numpy(dtype=float)
+        traces = [between(time, -part.band_ug, part.band_ug, f"band ± {part.band_ug:g} µg")]
+        for axis in AXES:
             own = points[points["axis"] == axis]
-            value = own["value"].to_numpy()
+            value = own["value"].to_numpy(dtype=float)
             final = value[int(0.8 * value.size) :].mean()
-            place.plot(own["setting"], value - final, lw=0.8, c=colour, label=f"axis {axis}")
-        place.axhspan(-part.band_ug, part.band_ug, color="#dddddd", zorder=0)
-        place.set(xlabel="time since power-on / s", ylabel="output minus final value / µg")
-        place.legend(frameon=False, loc="upper right", ncols=3)
+            traces.append(
+                Trace(f"axis {axis}", own["setting"].to_numpy(dtype=float), value - final, "line", axis, width=0.8)
+            )
+        axes = PlotAxis("time since power-on / s"), PlotAxis("output minus final value / µg")
+        return Chart(self.title, (Plot("", *axes, tuple(traces)),))
 
 
 def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:

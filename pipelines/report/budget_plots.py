@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from pipelines.report.charts.vector import LETTER, WIDTH, part, text_at
+from pipelines.drawing.vector import LETTER, WIDTH, part, text_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

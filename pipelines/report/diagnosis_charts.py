@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from scipy import stats
 
-from pipelines.report.charts.chart import Chart, Plot, PlotAxis, Trace, symmetric
-from pipelines.report.charts.mollweide import project, sphere
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, symmetric
+from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.residuals import band, direction
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.state import State
-    from pipelines.report.charts.chart import Role, Symbol
+    from pipelines.drawing.chart import Role, Symbol
     from pipelines.report.residuals import DriverValues, LotResiduals
 
     Array = NDArray[np.float64]

@@ -14,11 +14,11 @@ from hashlib import sha256
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from pipelines.report.charts.plotly_figure import plotly_figure
-from pipelines.report.charts.vector import svg_text
+from pipelines.drawing.plotly_figure import plotly_figure
+from pipelines.drawing.vector import svg_text
 
 if TYPE_CHECKING:
-    from pipelines.report.charts.chart import Chart
+    from pipelines.drawing.chart import Chart
 
 MOST_BYTES = 5_000_000
 """Size of a report up to which figures can be zoomed; those behind it stay pictures."""
@@ -64,14 +64,14 @@ def scripts_hash() -> str:
 
 @cache
 def _script() -> str:
-    folder = files("pipelines.report.charts")
+    folder = files("pipelines.drawing")
     parts = ((folder / name).read_text(encoding="utf-8") for name in ("paint.js", "report.js"))
     return "(() => {\n" + "".join(parts).replace("export function", "function") + "})();"
 
 
 @cache
 def _packed() -> bytes:
-    return (files("pipelines.report.charts") / "vendor" / f"{BUNDLE}.gz").read_bytes()
+    return (files("pipelines.drawing") / "vendor" / f"{BUNDLE}.gz").read_bytes()
 
 
 @cache

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from pipelines.drawing import svg_text
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant
-from pipelines.report.plan_plots import alias_plot, sight_plot, sphere_plot, temperature_plot
+from pipelines.report.plan_charts import alias_chart, sight_chart, sphere_chart, temperature_chart
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
@@ -35,11 +36,12 @@ def render_plan(document: dict[str, Any], context: PlanContext) -> str:
 
 def pictures(document: dict[str, Any], context: PlanContext) -> dict[str, str]:
     """The pictures of a plan by name, as SVG: poses, temperatures, remaining fractions, confounded effects."""
+    aliases = alias_chart(context)
     return {
-        "sphere": sphere_plot(context),
-        "temperature": temperature_plot(context),
-        "sights": sight_plot(document["effects"]),
-        "aliases": alias_plot(context),
+        "sphere": svg_text(sphere_chart(context)),
+        "temperature": svg_text(temperature_chart(context)),
+        "sights": svg_text(sight_chart(document["effects"])),
+        "aliases": "" if aliases is None else svg_text(aliases),
         "budget": _budget(document.get("uncertainty")),
     }
 

@@ -4,91 +4,67 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
-from pipelines.report.plots import COLOURS, STYLE, WIDTH_IN, svg
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing.chart import between
 from pipelines.report.templates import template
+from schemas.units import AXES
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
-    from pipelines.importers.documents import InspectDocument
+    from pipelines.drawing.chart import Role
     from pipelines.importers.inspection import Inspection
 
+    Array = NDArray[np.float64]
+
 _PIXELS = 1500
-_STILL, _FAULT, _SEVERAL = "#dfe9f5", "#f6c9c9", "#f5e3b3"
-_AXES = "xyz"
+ROOM = 0.05  # of the range, above and below
+STILL: tuple[str, Role] = ("static interval", "accent")
+SEVERAL: tuple[str, Role] = ("several positions in one interval", "y")
+STUCK: tuple[str, Role] = ("the axis is constant", "limit")
 
 
-def figure_of(inspection: Inspection) -> Figure | None:
+def chart_of(inspection: Inspection) -> Chart | None:
     """Output against time by axis, static intervals shaded; None where no axes were recognised."""
     if inspection.output is None or not len(inspection.output):
         return None
     document = inspection.document
-    time = (
-        np.arange(len(inspection.output), dtype=np.float64)
-        if inspection.time is None
-        else inspection.time - inspection.time[0]
-    )
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH_IN, 6.2))
-        rows = figure.subplots(3, 1, sharex=True)
-        figure.subplots_adjust(left=0.085, right=0.99, bottom=0.085, top=0.925, hspace=0.12)
-        unit = document["output_unit"] or "unit not known"
-        for k, place in enumerate(rows):
-            for one in document["intervals"]:
-                colour = _SEVERAL if one["positions"] > 1 else _STILL
-                place.axvspan(one["start_s"], one["end_s"], color=colour, linewidth=0.0)
-            for one in document["faults"]:
-                if one["axis"] == _AXES[k] and one["fault"] == "stuck_output":
-                    end = time[min(one["first_row"] - 1 + one["samples"], len(time) - 1)]
-                    place.axvspan(time[one["first_row"] - 1], end, color=_FAULT, linewidth=0.0)
-            x, low, high = _envelope(time, inspection.output[:, k])
-            place.fill_between(x, low, high, color=COLOURS[_AXES[k]], linewidth=0.6, edgecolor=COLOURS[_AXES[k]])
-            place.set_ylabel(f"{_AXES[k]} / {unit}")
-            place.yaxis.set_major_locator(MaxNLocator(5))
-        rows[-1].set_xlabel("time / s" if inspection.time is not None else "sample")
-        rows[0].set_title(_title(document), loc="left", fontsize=10.5)
-        return figure
+    count = np.arange(len(inspection.output), dtype=np.float64)
+    time = count if inspection.time is None else inspection.time - inspection.time[0]
+    along = "time / s" if inspection.time is not None else "sample"
+    unit = document["output_unit"] or "unit not known"
+    plots: list[Plot] = []
+    for k, axis in enumerate(AXES):
+        x, y = _envelope(time, inspection.output[:, k])
+        low, high = float(np.nanmin(y)), float(np.nanmax(y))
+        room = ROOM * (high - low) or 1.0
+        low, high = low - room, high + room
+        shades = [
+            (time[one["first_row"] - 1], time[min(one["first_row"] - 1 + one["samples"], len(time) - 1)], STUCK)
+            for one in document["faults"]
+            if one["axis"] == axis and one["fault"] == "stuck_output"
+        ] + [
+            (one["start_s"], one["end_s"], SEVERAL if one["positions"] > 1 else STILL) for one in document["intervals"]
+        ]
+        shaded = [between(np.array([start, end]), low, high, *look) for start, end, look in shades]
+        traces = (*shaded, Trace("", x, y, "line", axis, width=0.8, legend=False))
+        plots.append(Plot("", PlotAxis(along), PlotAxis(f"{axis} / {unit}", low=low, high=high), traces))
+    return Chart("Output of the axes over time", tuple(plots), height=210)
 
 
-def _title(document: InspectDocument) -> str:
-    still = f"{len(document['intervals'])} static intervals shaded"
-    parts = [still if document["intervals"] else "no static interval"]
-    if any(one["positions"] > 1 for one in document["intervals"]):
-        parts.append("yellow: several positions in one")
-    if any(one["fault"] == "stuck_output" for one in document["faults"]):
-        parts.append("red: the axis is constant")
-    return "; ".join(parts)
-
-
-def _envelope(
-    time: NDArray[np.float64], x: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest of as many pieces as there are pixels: the envelope of a line through all samples."""
+def _envelope(time: Array, x: Array) -> tuple[Array, Array]:
+    """A line through the lowest and the highest sample of as many pieces as there are pixels: the envelope of all samples."""
     count = len(x)
     if count <= 2 * _PIXELS:
-        return time, x, x
+        return time, x
     edges = np.linspace(0, count, _PIXELS + 1).astype(np.int64)[:-1]
-    return time[edges], np.minimum.reduceat(x, edges), np.maximum.reduceat(x, edges)
-
-
-def save_picture(inspection: Inspection, path: Path) -> bool:
-    """Write the picture in the format of the file's ending (.svg, .png, .pdf); False if there is nothing to draw."""
-    figure = figure_of(inspection)
-    if figure is None:
-        return False
-    with mpl.rc_context(STYLE):
-        figure.savefig(path, dpi=110)
-    return True
+    ends = np.stack([np.minimum.reduceat(x, edges), np.maximum.reduceat(x, edges)], axis=1)
+    return np.repeat(time[edges], 2), ends.ravel()
 
 
 def page(inspection: Inspection) -> str:
     """The content of a recording as one HTML text that needs no other file."""
-    figure = figure_of(inspection)
-    return template("recording.html").render(one=inspection.document, picture="" if figure is None else svg(figure))
+    chart = chart_of(inspection)
+    return template("recording.html").render(one=inspection.document, picture="" if chart is None else svg_text(chart))

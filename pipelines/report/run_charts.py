@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from pipelines.report.charts.chart import Chart, ColourScale, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
 from schemas.units import AXES
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from pipelines.report.charts.chart import Role
+    from pipelines.drawing.chart import Role
 
     Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from pipelines.archive import Archive
-from pipelines.report.charts import csv_text, plotly_figure
-from pipelines.report.charts.static_figure import png_bytes
+from pipelines.drawing import csv_text, plotly_figure
+from pipelines.drawing.picture import picture
 from pipelines.report.numbers import significant
 from pipelines.report.reasons import plain_reason
 from pipelines.report.unit_panels.budget import without_nothing
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from pipelines.report.charts import Chart
+    from pipelines.drawing import Chart
     from pipelines.workbench.settings import WorkbenchSettings
     from pipelines.workbench.state import PageState
 
@@ -119,7 +119,7 @@ def figure(chart: Chart | None, ending: str, name: str) -> Response:
     if ending == "csv":
         return Response(csv_text(chart), media_type=PARAMETER["csv"], headers=saved_as(f"{name}.csv"))
     if ending == "png":
-        return Response(png_bytes(chart), media_type=PARAMETER["png"], headers=saved_as(f"{name}.png"))
+        return Response(picture(chart, ".png"), media_type=PARAMETER["png"], headers=saved_as(f"{name}.png"))
     raise WrongUse(f"figure {name}: '{ending[:10]}', one of json, csv, png is needed")
 
 
@@ -165,7 +165,7 @@ def _table(archive: str, run: str, name: str, when: int) -> pd.DataFrame:
 def static_version() -> str:
     """Part of the addresses of scripts and styles that changes with their content, so that browsers can cache them."""
     digest = hashlib.sha256()
-    shared = files("pipelines.report.charts") / "paint.js"
+    shared = files("pipelines.drawing") / "paint.js"
     for place in (*sorted((files("pipelines.workbench") / "static").iterdir(), key=lambda one: one.name), shared):
         if place.is_file():
             digest.update(place.name.encode() + place.read_bytes())

@@ -52,8 +52,8 @@ def conditions(page: SearchPage) -> str:
     """The conditions of the fields of the page."""
     parts: list[str] = []
     if page.search:
-        pattern = like(page.search)
-        parts.append(f"(unit ILIKE {pattern} OR run ILIKE {pattern})")
+        pattern = like(page.search.lower())
+        parts.append(f"(lower(unit) LIKE {pattern} OR lower(run) LIKE {pattern})")
     chosen = {column: getattr(page, column) for column in ("outcome", "station", "device")}
     parts += [f"{column} = {quoted(value)}" for column, value in chosen.items() if value]
     if page.since:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import os
 import termios
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
-import serial
-from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
-
+from schemas.library import library
 from stations.links.frames import (
     EXCEPTION,
     Malformed,
@@ -24,7 +22,9 @@ from stations.links.wires import CHUNK, Broken, Silence, reason_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
+    from serial import Serial
+
+PARITIES = {"none": "N", "even": "E", "odd": "O"}
 EXCEPTION_FRAME = 5  # device, function, code, check
 QUIET_CHARACTERS = 3.5  # Modbus over serial line 1.02, 2.5.1.1
 QUIET_S = 0.00175  # above 19200 baud
@@ -68,7 +68,7 @@ class SerialWire:
             self._late_until = time.monotonic() + self.timeout_s
             self._unsure.setdefault(device_id, 0)
             raise
-        except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line does not support
+        except (OSError, termios.error) as problem:  # settings that the line does not support
             self.close()
             raise Broken(reason_of(problem)) from None
 
@@ -80,7 +80,8 @@ class SerialWire:
 
     def _opened(self) -> Serial:
         if self._port is None:
-            self._port = Serial(
+            serial = library("serial", "serial", f"link: the serial line {self.where}")
+            self._port = serial.Serial(
                 self.where,
                 self._baud,
                 parity=self._parity,
@@ -89,7 +90,7 @@ class SerialWire:
                 write_timeout=self.timeout_s,
                 exclusive=True,
             )
-        return self._port
+        return cast("Serial", self._port)
 
     def _discard_late_input(self, port: Serial) -> None:
         """Discards late input, and waits for the silent interval that ends a frame."""

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy.io import savemat, wavfile
 
-from pipelines.importers import files, library
+from pipelines.importers import files
 from pipelines.importers.readers import READERS, reader_of
 from schemas.errors import DataRejected, WrongUse
 
@@ -73,7 +73,7 @@ def tdms(path: Path) -> None:
 
 
 def rdata(path: Path) -> None:
-    pytest.importorskip("pyreadr").write_rdata(str(path), frame(), df_name="imu")
+    pytest.importorskip("rdata").write_rda(path, {"imu": frame()}, compression=None)
 
 
 def wav(path: Path) -> None:
@@ -160,7 +160,7 @@ def test_a_missing_library_is_named_with_its_installation(name: str, monkeypatch
     def missing(module: str):
         raise ImportError(module)
 
-    monkeypatch.setattr(library, "import_module", missing)
+    monkeypatch.setattr("schemas.library.import_module", missing)
     with pytest.raises(WrongUse, match=rf"install it with: pip install 'tumbleline\[{READERS[name].EXTRA}\]'"):
         READERS[name].read("a.bin", b"RDX3\n" + bytes(100), "")
 

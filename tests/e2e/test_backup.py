@@ -22,8 +22,6 @@ from pipelines.flows.database import copy_database, restore_database
 from pipelines.integrity.archive import verify
 from schemas.errors import ArchiveUnusable, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 
 def measure(folder: Path, seed: int, stop: str = "") -> Runner:
     """A run of another lot in the archive of a folder, up to a stage or complete."""

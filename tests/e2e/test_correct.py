@@ -26,8 +26,6 @@ from pipelines.export.documents import CorrectDocument
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = (ROOT / "docs" / "how-to" / "correct-a-recording.md").read_text(encoding="utf-8")
 EXAMPLES = [block.partition("\n") for block in re.findall(r"```console\n\$ (.*?)```", GUIDE, flags=re.DOTALL)]

@@ -312,7 +312,6 @@ def measured() -> DemoLot:
     return measure(scene("cubic_transfer", 7), 7)
 
 
-@pytest.mark.usefixtures("no_pictures_here")  # those of a diagnosis are looked at above
 def test_the_demonstration_finds_what_it_hid(command, measured, monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr("pipelines.demo.measure.measure", lambda *which: asked.append(which[:2]) or measured)
@@ -360,7 +359,6 @@ def test_a_run_of_the_archive_brings_its_own_history(command, tmp_path):
     assert (status, "no run is called 'no-such-run'" in err) == (2, True)
 
 
-@pytest.mark.usefixtures("no_pictures_here")
 def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(command, tmp_path):
     from capture_double import small_run
 
@@ -386,7 +384,6 @@ def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(command, tmp_pat
     assert "curl" in out
 
 
-@pytest.mark.usefixtures("no_pictures_here")
 def test_a_player_may_add_something_else(command, measured, monkeypatch, tmp_path):
     import io
 

@@ -16,7 +16,6 @@ from test_next_lines import MODEL
 from pipelines.archive.signatures import VARIABLE
 from pipelines.cli import COMMANDS, main
 
-pytestmark = pytest.mark.usefixtures("no_pictures")  # what a command prints is looked at, not what it draws
 WIDE = 80
 OUTPUTS = {
     "list": ["list"],

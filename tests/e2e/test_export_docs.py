@@ -11,8 +11,6 @@ from typer.testing import CliRunner
 from pipelines.archive.signatures import VARIABLE
 from pipelines.cli import app
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = (ROOT / "docs" / "how-to" / "export.md").read_text(encoding="utf-8")
 EXAMPLES = [

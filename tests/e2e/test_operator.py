@@ -22,8 +22,6 @@ from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.fault import FaultOrder
 from schemas.station import with_faults
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -11,8 +11,6 @@ from typer.testing import CliRunner
 from pipelines.archive.signatures import VARIABLE
 from pipelines.cli import app
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SHEET = (DOCS / "tutorial" / "from-a-spreadsheet.md").read_text(encoding="utf-8")
 AUDITOR = (DOCS / "how-to" / "audit-a-laboratory.md").read_text(encoding="utf-8")

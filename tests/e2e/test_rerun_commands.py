@@ -18,8 +18,6 @@ from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from schemas import tables as contracts
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
 
 

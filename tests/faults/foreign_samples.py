@@ -219,10 +219,10 @@ def _uff(frame):
 
 
 def _rdata(frame):
-    import pyreadr
+    import rdata
 
     with tempfile.TemporaryDirectory() as folder:
-        pyreadr.write_rdata(str(Path(folder) / "a.rda"), frame, df_name="imu")
+        rdata.write_rda(Path(folder) / "a.rda", {"imu": frame.astype("float64")}, compression=None)
         return ".rda", (Path(folder) / "a.rda").read_bytes()
 
 

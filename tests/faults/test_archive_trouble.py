@@ -22,8 +22,6 @@ from pipelines.integrity import verify
 from pipelines.jobs.job import Request
 from schemas.errors import WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 ROOT = Path(__file__).resolve().parents[2]
 MORE = "bias,scale,misalignment,bias_temperature,scale_temperature,second_order"
 

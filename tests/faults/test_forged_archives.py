@@ -29,8 +29,6 @@ from pipelines.cli import app
 from pipelines.integrity import seals, verify
 from schemas.errors import ArchiveUnusable
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 FIRST, SECOND = ("A1", "A2"), ("B1", "B2")
 
 

@@ -15,8 +15,6 @@ from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from stations.plant.clock import PlantClock
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 120.0
 RESULTS = ("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification")

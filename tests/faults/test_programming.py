@@ -40,8 +40,6 @@ from stations.devices.memory import UnitMemory
 from stations.plant.plant import Plant
 from stations.safety.suspenders import EmergencyStop
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -21,8 +21,6 @@ from pipelines.integrity import Report, seals, verify
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.event import Event
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 
 def make(folder: Path) -> Path:
     """An archive with a finished run, certified, one unit of it revoked."""

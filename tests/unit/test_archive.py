@@ -12,8 +12,6 @@ from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from schemas.errors import ArchiveUnusable, OperatorNeeded, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 FRAME = pd.DataFrame({"unit": ["A", "B"], "value": [1.0, 2.0]})
 
 

@@ -30,8 +30,6 @@ from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
 from schemas.event import Event
 from schemas.limits import VALIDITY_MONTHS, parse_limits
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 Typed = Callable[..., Result]
 LIMITS = 'name = "half"\nvalidity_months = 6\n[figures]\nresidual_rms_ug = {max = 5000.0, unit = "µg"}\n'
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipelines.report.charts import (
+from pipelines.drawing import (
     Chart,
     ColourScale,
     Plot,
@@ -19,9 +19,9 @@ from pipelines.report.charts import (
     plotly_figure,
     svg_text,
 )
-from pipelines.report.charts.chart import density
-from pipelines.report.charts.mollweide import project, sphere
-from pipelines.report.charts.static_figure import png_bytes
+from pipelines.drawing.chart import density
+from pipelines.drawing.mollweide import project, sphere
+from pipelines.drawing.picture import picture
 
 
 def chart() -> Chart:
@@ -55,7 +55,7 @@ def test_a_file_without_a_browser_says_the_same() -> None:
     text = svg_text(chart())
     for label in ("time / s", "residual / µg", "mean / µg", "one", "measured"):
         assert label in text
-    assert png_bytes(chart())[:4] == b"\x89PNG"
+    assert picture(chart(), ".png")[:4] == b"\x89PNG"
 
 
 def test_nothing_of_a_figure_leaves_the_page() -> None:
@@ -137,7 +137,7 @@ def test_a_letter_of_the_sphere_stands_beside_the_lines_that_cross_there_in_ever
     places = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" text-anchor="(\w+)"[^>]*>(.[xyz])</text>', svg_text(whole))
     ends = {letter: end for _, _, end, letter in places}
     assert ends == {"+x": "start", "+y": "start", "−y": "end", "+z": "middle", "−z": "middle"}
-    assert png_bytes(whole)
+    assert picture(whole, ".png")
 
 
 def test_a_short_logarithmic_axis_has_whole_numbers_and_no_digits_between_powers() -> None:

@@ -17,8 +17,6 @@ from pipelines.rerun.diff import _standard, diff
 from pipelines.rerun.rerun import again
 from schemas.errors import DataRejected
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
 
 

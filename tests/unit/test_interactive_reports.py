@@ -12,11 +12,11 @@ import pytest
 from capture_double import small_run
 
 from pipelines.archive import Run
+from pipelines.drawing import Chart, ColourScale, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing.mollweide import sphere
+from pipelines.drawing.ticks import date_ticks, linear_ticks, log_ticks
 from pipelines.report import interactive as module
 from pipelines.report import render
-from pipelines.report.charts import Chart, ColourScale, Plot, PlotAxis, Trace, svg_text
-from pipelines.report.charts.mollweide import sphere
-from pipelines.report.charts.ticks import date_ticks, linear_ticks, log_ticks
 from pipelines.report.interactive import BUNDLE, BUNDLE_SHA256, figure_of, interactive
 
 DATA = re.compile(r'<script type="application/json">(.*?)</script>', re.DOTALL)
@@ -40,7 +40,7 @@ def chart(name: str = "measured", count: int = 3) -> Chart:
 
 
 def test_the_bundle_is_the_one_of_its_makers() -> None:
-    folder = files("pipelines.report.charts") / "vendor"
+    folder = files("pipelines.drawing") / "vendor"
     text = gzip.decompress((folder / f"{BUNDLE}.gz").read_bytes())
     assert b"plotly.js (cartesian - minified) v4.1.1" in text[:200]
     assert hashlib.sha256(text).hexdigest() == BUNDLE_SHA256

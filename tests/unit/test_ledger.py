@@ -19,8 +19,6 @@ from pipelines.certificates.validity import calibrations_of, overlapped
 from pipelines.cli import app
 from schemas.errors import ArchiveUnusable, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:

@@ -25,8 +25,6 @@ from pipelines.lineage.prov import iri, prov_of
 from pipelines.lineage.ro_crate import write_crate
 from schemas.errors import ArchiveUnusable, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 ROOT = Path(__file__).resolve().parents[2]
 VALIDATOR = Path(os.environ.get("TUMBLELINE_CRATE_VALIDATOR", ROOT / ".venv" / "crate-validator" / "bin" / "python"))
 PROV = Namespace("http://www.w3.org/ns/prov#")

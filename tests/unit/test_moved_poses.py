@@ -7,9 +7,9 @@ import pytest
 from capture_double import recipe_file
 
 from inertial.frames import force_from_angles
+from pipelines.drawing.mollweide import direction_at, project
 from pipelines.jobs.moved_poses import moves_of, with_moved_poses
 from pipelines.jobs.recipes import load_recipe
-from pipelines.report.charts.mollweide import direction_at, project
 from pipelines.workbench.services import recipes
 from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PlanPage

@@ -19,8 +19,6 @@ from pipelines.lineage import lineage
 from schemas import upgrades, version
 from schemas.errors import ArchiveUnusable, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 KEPT = sorted((Path(__file__).resolve().parents[1] / "archives").glob("v*.tar.xz"))
 FRAME = pd.DataFrame({"unit": ["A", "B"], "value": [1.0, 2.0]})
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipelines.archive import Run
+from pipelines.drawing import svg_text
 from pipelines.report import make_report, render
-from pipelines.report.charts import svg_text
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.run_charts import lot_chart
 

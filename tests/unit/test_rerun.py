@@ -22,8 +22,6 @@ from pipelines.rerun.rerun import again
 from pipelines.rerun.selection import selected
 from schemas.errors import DataRejected, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
 
 

@@ -17,8 +17,6 @@ from pipelines.cli import app
 from pipelines.integrity import verify
 from pipelines.report import make_report
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 Typed = Callable[..., Result]
 
 

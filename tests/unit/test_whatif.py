@@ -23,8 +23,6 @@ from pipelines.rerun.whatif import fresh_tasks, summary
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 FULL = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
 POOR = 'effects = ["bias", "scale", "misalignment", "bias_temperature"]'
 LIMITS = """

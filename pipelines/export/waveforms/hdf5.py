@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pipelines.importers.library import library
+from schemas.library import library
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.export.waveforms.channel import ACCELERATIONS
-from pipelines.importers.library import library
+from schemas.library import library
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

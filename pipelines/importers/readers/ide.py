@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, chosen
-from pipelines.importers.library import as_file, library
+from pipelines.importers.temporary_file import as_file
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
+from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "ide", "enDAQ IDE", "ide", 70
 MAGIC = b"\x1a\x45\xdf\xa3"  # EBML

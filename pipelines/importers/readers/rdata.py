@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import bz2
 import lzma
-from typing import TYPE_CHECKING
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
 
 from pipelines.importers.content import Content, chosen
-from pipelines.importers.library import as_file, library
 from pipelines.importers.unpacking import MOST_BYTES, refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
-
-if TYPE_CHECKING:
-    import pandas as pd
+from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "rdata", "R data (.rda, .RData, .rds)", "r", 80
 _SAVED = (b"RDX2\n", b"RDX3\n", b"RDA2\n", b"RDA3\n")
@@ -39,18 +39,47 @@ def _unpacked_head(data: bytes) -> bytes:
 
 def read(name: str, data: bytes, group: str) -> Content:
     """The data frame of a file; several are groups to choose from."""
-    pyreadr = library("pyreadr", EXTRA, f"{name}: a file of R")
+    rdata = library("rdata", EXTRA, f"{name}: a file of R")
     plain = _plain(name, data)
     suffix = ".rds" if plain.startswith(_SINGLE) else ".rda"
-    with as_file(plain, suffix) as path, foreign(f"{name}: a file of R that cannot be read", REMEDY):
-        frames: dict[str, pd.DataFrame] = {
-            str(key or "frame"): value for key, value in pyreadr.read_r(path).items() if value is not None
-        }
-    frames = {key: frame for key, frame in frames.items() if len(frame.columns)}
+    classes = {**rdata.conversion.DEFAULT_CLASS_MAP, "POSIXct": _times, "integer64": _long_integers}
+    with foreign(f"{name}: a file of R that cannot be read", REMEDY):
+        parsed = rdata.parser.parse_data(plain, extension=suffix)
+        found = rdata.conversion.convert(parsed, classes, default_encoding="utf-8")
+    objects = found if isinstance(found, dict) else {"frame": found}
+    frames = {
+        str(key): one for key, one in objects.items() if isinstance(one, pd.DataFrame) and len(cast("Any", one.columns))
+    }
     if not frames:
         raise DataRejected(f"{name}: no data frame in this file of R, one is needed; {REMEDY}")
     frame = frames[chosen([(key, len(one)) for key, one in frames.items()], group, name)]
-    return Content(frame.reset_index(drop=True).set_axis([str(c) for c in frame.columns], axis=1))
+    return Content(pd.DataFrame({str(column): _plain_column(frame[column]) for column in frame.columns}))
+
+
+def _times(values: Any, attributes: Any) -> Any:
+    """R's POSIXct: seconds since 1970, UTC."""
+    del attributes
+    return pd.to_datetime(np.asarray(values, dtype=float), unit="s")
+
+
+def _long_integers(values: Any, attributes: Any) -> Any:
+    """The integers of the package bit64: 64 bits, saved as if they were floating-point numbers; NA is the lowest of them."""
+    del attributes
+    whole = np.asarray(values, dtype=float).view(np.int64)
+    gone = whole == np.iinfo(np.int64).min
+    return np.where(gone, np.nan, whole.astype(float)) if gone.any() else whole
+
+
+def _plain_column(values: pd.Series) -> pd.Series:
+    """A column with numpy's types: numbers with gaps as floating-point numbers, factors as their texts."""
+    values = values.reset_index(drop=True)
+    if isinstance(values.dtype, pd.CategoricalDtype | pd.StringDtype):
+        return values.astype("str")
+    if not pd.api.types.is_extension_array_dtype(values) or not pd.api.types.is_numeric_dtype(values):
+        return values
+    if values.isna().any():
+        return values.astype("float64")
+    return values.astype("bool" if str(values.dtype) == "boolean" else "int32")
 
 
 def _plain(name: str, data: bytes) -> bytes:

@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, chosen
-from pipelines.importers.library import library
 from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
+from schemas.library import library
 
 if TYPE_CHECKING:
     from collections.abc import Generator

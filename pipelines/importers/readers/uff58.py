@@ -12,9 +12,10 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, chosen
-from pipelines.importers.library import as_file, library
+from pipelines.importers.temporary_file import as_file
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
+from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "uff58", "Universal File Format, dataset 58", "uff", 50
 REMEDY = "export the record again, or as CSV"

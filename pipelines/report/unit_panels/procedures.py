@@ -8,6 +8,7 @@ import numpy as np
 
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import Evaluated
+from pipelines.report.interactive import figure_of
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 ORDER = 45
 TITLE = "Test procedures"
-HEIGHT_IN = 3.4
 TEMPLATE = """\
 {% for one in procedures %}
 <h4>{{ one.title }}</h4>
@@ -64,16 +64,9 @@ def _procedure(unit: UnitContext, number: int, content: dict[str, Any]) -> dict[
 
 
 def picture(procedure: Evaluated, content: dict[str, Any], points: pd.DataFrame) -> str:
-    """The procedure's picture of one unit as SVG."""
-    import matplotlib as mpl  # slow to import, and most runs have no procedures
-    from matplotlib.figure import Figure
-
-    from pipelines.report.plots import STYLE, WIDTH_IN, svg
-
-    with mpl.rc_context(STYLE):
-        drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN * procedure.rows), layout="constrained")
-        procedure.draw(drawing, procedure.part.model_validate(content), points)
-        return svg(drawing)
+    """The procedure's chart of one unit; empty where its points are too few."""
+    chart = procedure.chart(procedure.part.model_validate(content), points)
+    return "" if chart is None else figure_of(chart)
 
 
 def _line(unit: UnitContext, row: dict[str, Any], meanings: dict[str, str]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
 from pipelines.diagnosis.inputs import use_written_formulas
+from pipelines.report.evolution import evolution_chart
 from pipelines.report.numbers import chance
 from pipelines.workbench.pages import (
     RequestBody,
@@ -29,7 +30,7 @@ from pipelines.workbench.views import missing_charts, unit_charts
 from schemas.errors import TumblelineError, WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.report.charts import Chart
+    from pipelines.drawing import Chart
     from pipelines.workbench.pages import Workbench
     from pipelines.workbench.results import Diagnosed
 
@@ -128,7 +129,7 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
     if name == "ladder":
         _, content = requests.ladder(bench.settings, state)
         rows = bench.jobs.result("ladder", content)
-        return None if rows is None else missing_charts.ladder_chart(rows)
+        return None if rows is None else evolution_chart(rows)
     draw = {
         "sphere": missing_charts.sphere_chart,
         "drivers": missing_charts.driver_chart,

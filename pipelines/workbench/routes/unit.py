@@ -23,7 +23,7 @@ from schemas.errors import WrongUse
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pipelines.report.charts import Chart
+    from pipelines.drawing import Chart
     from pipelines.workbench.pages import Workbench
 
 router = APIRouter()
@@ -110,7 +110,7 @@ def _own(bench: Workbench, state: UnitPage, name: str) -> list[dict[str, Any]]:
 
 def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     """The unit's coefficients in all its runs, with the day of each."""
-    answer = bench.index.ask(history_question(serial))
+    answer = bench.index.of_unit(serial, history_question(serial))
     rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
 

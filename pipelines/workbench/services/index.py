@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive
 from pipelines.audit.index import AuditIndex, up_to_date
-from pipelines.audit.sql import TablesInMemory, ask, views_in
+from pipelines.audit.tables_in_memory import TablesInMemory, in_memory, unit_in_memory
 
 if TYPE_CHECKING:
     from pipelines.archive.store import Place
-    from pipelines.audit.sql import QueryResult
+    from pipelines.audit.tables_in_memory import QueryResult
 
 SEARCHED = frozenset({"runs", "units"})
 """Tables that every search reads: kept in memory, some 20 MB for 100 000 calibrations."""
@@ -46,17 +46,18 @@ class RecentIndex:
         self._parts: tuple[Place, ...] = ()
 
     def ask(self, sql: str) -> QueryResult:
-        """The answer to a query over the archive."""
-        index = self.index()
-        if views_in(sql) <= SEARCHED:
-            return self._in_memory(index).ask(sql)
-        return ask(self._archive, sql, index=index)
+        """The answer to a query over :data:`SEARCHED`."""
+        return self._in_memory(self.index()).ask(sql)
+
+    def of_unit(self, unit: str, sql: str) -> QueryResult:
+        """The answer to a query over the coefficients of one unit and its runs."""
+        return unit_in_memory(self.index(), unit).ask(sql)
 
     def _in_memory(self, index: AuditIndex) -> TablesInMemory:
         """The searched tables of an index; the name of a part changes with its content."""
         with self._reading:
             if self._tables is None or self._parts != index.parts:
-                self._tables, self._parts = TablesInMemory(index, SEARCHED), index.parts
+                self._tables, self._parts = in_memory(index, SEARCHED), index.parts
             return self._tables
 
     def index(self) -> AuditIndex:

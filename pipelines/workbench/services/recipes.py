@@ -10,10 +10,10 @@ import numpy as np
 from inertial import effects
 from inertial.frames import angles_from_force
 from pipelines.archive import files
+from pipelines.drawing.mollweide import direction_at
 from pipelines.jobs.moved_poses import moves_of
 from pipelines.jobs.recipe_text import limits_from, recipe_text
 from pipelines.jobs.recipes import folder_of, sample_names
-from pipelines.report.charts.mollweide import direction_at
 from pipelines.workbench.services import requests
 from pipelines.workbench.views.planned import recipe_of
 from schemas.errors import WrongUse

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.workbench.views.audit_charts import control_chart, drift_chart, due_chart, series_chart, yield_chart
+from pipelines.audit.charts import control_chart, drift_chart, due_chart, series_chart, yield_chart
 from pipelines.workbench.views.evidence import address_of, evidence
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from pipelines.report.charts import Chart
+    from pipelines.drawing import Chart
 
 MOST_CHARTS = 6
 NAMES = ("since", "until", "device", "station")

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipelines.audit import charts as audit_charts
 from pipelines.audit.drifts import OWN
 from pipelines.audit.parameters import NAMES, unit_text
-from pipelines.report.charts import Chart, Plot, PlotAxis, Trace
-from pipelines.workbench.views import audit_charts
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from pipelines.audit.audit import Audit
     from pipelines.audit.finding import AuditFinding
-    from pipelines.report.charts.chart import Role
+    from pipelines.drawing.chart import Role
 
 MOST = 80  # findings with a chart of their own
 COLOURS: tuple[Role, Role] = ("x", "y")

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from pipelines.report.charts import Chart, Plot, PlotAxis, Trace
-from pipelines.report.charts.chart import density, symmetric
-from pipelines.report.charts.mollweide import project, sphere
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import density, symmetric
+from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.residuals import band
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.report.charts.chart import Role
+    from pipelines.drawing.chart import Role
     from pipelines.report.residual_table import ResidualTable
     from pipelines.workbench.results import Diagnosed
     from pipelines.workbench.state import MissingPage
@@ -31,12 +31,6 @@ TURNS: dict[int, tuple[str, Any]] = {
 }
 ROLES: dict[str, Role] = {"x": "x", "y": "y", "z": "z", "norm": "norm"}
 FEW = 12  # number of units up to which all points are shown
-LADDER = (
-    ("fitted_ug", "fitted", "before", "circle"),
-    ("heldout_ug", "cross-validated", "ink", "square"),
-    ("fresh_ug", "fresh run", "after", "diamond"),
-    ("floor_ug", "noise floor", "muted", "triangle-down"),
-)
 
 
 def chosen_unit(table: ResidualTable, page: MissingPage) -> int:
@@ -168,35 +162,6 @@ def _groups(
         return [(TURNS[turn][0], colours[turn], TURNS[turn][1], turning == turn) for turn in (1, -1, 0)]
 
     return by_direction if page.colour == "direction" else by_axis
-
-
-def ladder_chart(rows: list[dict[str, Any]]) -> Chart:
-    """Errors of every version of the model: fitted, cross-validated, on a fresh run, and the noise floor."""
-    names = tuple("start" if not row["added"] else f"+ {row['added'][0]}" for row in rows)
-    place = np.arange(len(rows), dtype=float)
-    traces: list[Trace] = []
-    for key, label, role, symbol in LADDER:
-        values = np.array([np.nan if row[key] is None else float(row[key]) for row in rows])
-        there = np.isfinite(values)
-        if there.any():
-            style = cast("Role", role)
-            texts = tuple(f"{label}, {names[k]}: {values[k]:.4g} µg" for k in np.flatnonzero(there))
-            traces.append(
-                Trace(
-                    f"{label} line", place[there], values[there], "line", style, dashed=key == "floor_ug", legend=False
-                )
-            )
-            traces.append(
-                Trace(label, place[there], values[there], role=style, symbol=cast("Any", symbol), size=9, texts=texts)
-            )
-    top = max((float(np.max(trace.y)) for trace in traces), default=1.0)
-    plot = Plot(
-        "",
-        PlotAxis("version of the model", names=names, low=-0.4, high=len(rows) - 0.6),
-        PlotAxis("error, rms / µg", low=0.0, high=1.1 * top),
-        tuple(traces),
-    )
-    return Chart("Error by version of the model", (plot,), height=320)
 
 
 def slot_chart(diagnosed: Diagnosed, page: MissingPage) -> Chart | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.report.charts import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace
 
 if TYPE_CHECKING:
     import pandas as pd

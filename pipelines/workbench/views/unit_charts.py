@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from pipelines.report.charts import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace
 from pipelines.report.residuals import band
 from pipelines.report.run_charts import allan_plot
 from schemas.units import AXES
@@ -14,7 +14,7 @@ from schemas.units import AXES
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pipelines.report.charts.chart import Role
+    from pipelines.drawing.chart import Role
     from pipelines.workbench.state import UnitPage
 
 LABELS = {

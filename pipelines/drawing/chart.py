@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-Role = Literal["x", "y", "z", "norm", "accent", "before", "after", "muted", "limit", "good", "ink"]
+Role = Literal["x", "y", "z", "fourth", "norm", "accent", "before", "after", "muted", "limit", "good", "ink"]
 Style = Literal["points", "line", "band", "bars", "density", "labels"]
 Anchor = Literal["center", "top left", "top right", "top center", "bottom center"]
 Symbol = Literal["circle", "triangle-up", "triangle-down", "square", "diamond"]
@@ -24,6 +24,7 @@ ROLES: dict[Role, str] = {
     "x": "#0072b2",
     "y": "#d55e00",
     "z": "#009e73",
+    "fourth": "#cc79a7",
     "norm": "#0072b2",
     "accent": "#0072b2",
     "before": "#d55e00",
@@ -35,6 +36,9 @@ ROLES: dict[Role, str] = {
 }
 """Colours on a white page for any colour vision (Okabe and Ito); a page replaces them by those of its theme."""
 
+SEVERAL: tuple[Role, ...] = ("x", "y", "z", "fourth", "ink", "muted")
+"""Roles of series that are no axes, in order."""
+
 DIVERGING = ((0.0, "#2166ac"), (0.25, "#67a9cf"), (0.5, "#efefef"), (0.75, "#ef8a62"), (1.0, "#b2182b"))
 SEQUENTIAL = ((0.0, "#2b4b8f"), (0.25, "#5a6f96"), (0.5, "#8b8f86"), (0.75, "#c6b45d"), (1.0, "#fde333"))
 
@@ -44,7 +48,7 @@ class PlotAxis:
     """An axis: its label with the unit.
 
     dates : whether values are days since 1970, UTC · names : of the places 0, 1, … of a categorical axis
-    low, high : limits; None for those of the values
+    low, high : limits; None for those of the values · step : distance of the ticks; None for a round one
     """
 
     label: str
@@ -53,6 +57,7 @@ class PlotAxis:
     names: tuple[str, ...] = ()
     low: float | None = None
     high: float | None = None
+    step: float | None = None
 
 
 @dataclass(frozen=True)
@@ -127,6 +132,18 @@ class Chart:
     def rows(self) -> int:
         """Number of rows of plots."""
         return -(-len(self.plots) // self.columns)
+
+
+def level(x: Array, value: float, role: Role = "muted", name: str = "") -> Trace:
+    """A dashed horizontal line over the range of values."""
+    ends = np.array([np.min(x), np.max(x)], dtype=np.float64)
+    return Trace(name, ends, np.full(2, value), "line", role, dashed=True, legend=bool(name))
+
+
+def between(x: Array, low: float, high: float, name: str, role: Role = "muted") -> Trace:
+    """A horizontal band over the range of values."""
+    ends = np.array([np.min(x), np.max(x)], dtype=np.float64)
+    return Trace(name, ends, np.full(2, low), "band", role, high=np.full(2, high))
 
 
 def symmetric(values: Array, label: str) -> ColourScale:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipelines.report.charts.chart import DIVERGING, SEQUENTIAL
-from pipelines.report.charts.ticks import log_ticks
+from pipelines.drawing.chart import DIVERGING, SEQUENTIAL
+from pipelines.drawing.ticks import log_ticks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pipelines.report.charts.chart import Chart, Plot, PlotAxis, Trace
+    from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 
 MANY = 4000
 """Points from which WebGL draws faster than SVG."""
@@ -134,6 +134,8 @@ def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]
         every = -(-len(axis.names) * columns // MOST_NAMES) if side == "x" else 1
         places = list(range(0, len(axis.names), every))
         out |= {"tickvals": places, "ticktext": [_cut(axis.names[k]) for k in places]}
+    if axis.step is not None:
+        out["dtick"] = axis.step
     if axis.low is not None and axis.high is not None:
         out["range"] = [axis.low, axis.high]
     return out

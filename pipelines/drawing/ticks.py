@@ -12,9 +12,9 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 Ticks = list[tuple[float, str]]
 
 
-def linear_ticks(low: float, high: float, most: int) -> Ticks:
-    """Places in [low, high] and their labels, at most ``most`` + 1 of them."""
-    step = _step((high - low) / max(most, 1))
+def linear_ticks(low: float, high: float, most: int, step: float | None = None) -> Ticks:
+    """Places in [low, high] and their labels: at the distance ``step``, else at a round one, at most ``most`` + 1 of them."""
+    step = step or _step((high - low) / max(most, 1))
     first = int(np.ceil(low / step - 1e-9))
     values = [step * k for k in range(first, int(np.floor(high / step + 1e-9)) + 1)]
     return [(value, _label(value, step, max(abs(low), abs(high)))) for value in values]

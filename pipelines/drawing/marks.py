@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.report.charts.chart import DIVERGING, ROLES, SEQUENTIAL
+from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from pipelines.report.charts.chart import Anchor, ColourScale, Trace
+    from pipelines.drawing.chart import Anchor, ColourScale, Trace
 
     Array = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ class Place:
     along: Callable[[Array], Array]
 
     def x(self, values: Array) -> Array:
-        """Horizontal places of values."""
-        return self.left + self.width * self.across(values)
+        """Horizontal places of values, not outside of the rectangle."""
+        return self.left + self.width * np.clip(self.across(values), 0.0, 1.0)
 
     def y(self, values: Array) -> Array:
         """Vertical places of values, not outside of the rectangle."""
@@ -103,7 +103,7 @@ def marks(x: Array, y: Array, trace: Trace, colour: str, wider: float = 0.0) -> 
 def _line(trace: Trace, place: Place, scale: ColourScale | None) -> str:
     del scale
     x, y = place.x(trace.x), place.y(trace.y)
-    whole = np.isfinite(x + y)
+    whole = np.isfinite(x + y) & (np.abs(place.across(trace.x) - 0.5) <= 0.5 + INSIDE) & ~_far_outside(place, trace.y)
     path, pen = "", "M"
     for a, b, there in zip(x, y, whole, strict=True):
         path += f"{pen}{a:.1f} {b:.1f}" if there else ""
@@ -111,6 +111,12 @@ def _line(trace: Trace, place: Place, scale: ColourScale | None) -> str:
     dash = ' stroke-dasharray="6 4"' if trace.dashed else ""
     width = trace.width or (1.6 if trace.name else 0.8)
     return f'<path d="{path}" stroke="{ROLES[trace.role]}" stroke-width="{width:g}" fill="none"{dash}/>' if path else ""
+
+
+def _far_outside(place: Place, y: Array) -> NDArray[np.bool_]:
+    """Which points of a line are above or below the rectangle with their neighbours: the line does not follow its edge."""
+    outside = np.abs(place.along(y) - 0.5) > 0.5 + INSIDE
+    return outside & np.append(outside[1:], True) & np.append(True, outside[:-1])
 
 
 def _band(trace: Trace, place: Place, scale: ColourScale | None) -> str:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.report.charts.chart import Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Plot, PlotAxis, Trace
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pipelines.report.charts.chart import Anchor
+    from pipelines.drawing.chart import Anchor
 
     Array = NDArray[np.float64]
 

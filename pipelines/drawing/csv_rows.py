@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pipelines.report.charts.chart import Chart, Plot, Trace
+    from pipelines.drawing.chart import Chart, Plot, Trace
 
 COLUMNS = ("plot", "series", "x_label", "x", "y_label", "y", "high", "error", "colour", "text", "pick")
 _LEADS = ("=", "+", "-", "@", "\t", "\r")

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.report.charts.chart import ROLES
-from pipelines.report.charts.marks import DRAW, Place, marks, shade
-from pipelines.report.charts.ticks import Ticks, date_ticks, linear_ticks, log_ticks
+from pipelines.drawing.chart import ROLES
+from pipelines.drawing.marks import DRAW, Place, marks, shade
+from pipelines.drawing.ticks import Ticks, date_ticks, linear_ticks, log_ticks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pipelines.report.charts.chart import Chart, ColourScale, Plot, PlotAxis, Trace
+    from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
 
     Array = NDArray[np.float64]
 
@@ -31,6 +31,7 @@ ROOM = 0.05  # of a range, on both sides of the values
 BAR = 84.0
 SPHERE_TOP = 26.0
 MOST_NAMES = 26
+LONGEST_TURNED = 14
 LEGEND_MARK = 7.0  # as large for all, as Plotly has it
 GRID, FRAME, TEXT, QUIET = "#e4e4e4", "#8a8f98", "#1d1f23", "#55585f"
 
@@ -46,7 +47,8 @@ class _Scaled:
 
     def at(self, values: Array) -> Array:
         """Values as shares of the axis, from its low end."""
-        inner = np.log10(values) if self.axis.log else values
+        with np.errstate(divide="ignore", invalid="ignore"):  # nothing at or below zero has a place
+            inner = np.log10(values) if self.axis.log else values
         return (inner - self.low) / (self.high - self.low)
 
 
@@ -92,6 +94,11 @@ def part(title: str, height: float, content: str) -> str:
     return f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" {box}>{content}</svg>'
 
 
+def alone(picture: str) -> str:
+    """The SVG text of a picture as that of a file, which takes no font from a page."""
+    return picture.replace("<svg ", '<svg font-family="sans-serif" ', 1)
+
+
 def _scaled(plot: Plot, wide: float, tall: float) -> tuple[_Scaled, _Scaled]:
     return (
         _axis(plot.x, [t.x for t in plot.traces], int(wide // 75)),
@@ -115,14 +122,14 @@ def _axis(axis: PlotAxis, arrays: list[Array], most: int) -> _Scaled:
     if axis.low is not None and axis.high is not None:
         low, high = (float(np.log10(axis.low)), float(np.log10(axis.high))) if axis.log else (axis.low, axis.high)
     if axis.names:
-        every = 1 + len(axis.names) // MOST_NAMES
+        every = 1 + len(axis.names) // max(MOST_NAMES, 3 * most)
         ticks = [(float(k), axis.names[k]) for k in range(0, len(axis.names), every) if low <= k <= high]
     elif axis.log:
         ticks = log_ticks(10.0**low, 10.0**high)
     elif axis.dates:
         ticks = date_ticks(low, high, most)
     else:
-        ticks = linear_ticks(low, high, most)
+        ticks = linear_ticks(low, high, most, axis.step)
     return _Scaled(axis, low, high, ticks)
 
 
@@ -153,7 +160,7 @@ def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled
         turn = (
             f'text-anchor="end" transform="rotate(-38 {x:.1f} {base + 13:.1f})"' if turned else 'text-anchor="middle"'
         )
-        parts.append(text_at(x, base + 15.0, text[:14] if turned else text, f'{turn} fill="{QUIET}"'))
+        parts.append(text_at(x, base + 15.0, _cut(text) if turned else text, f'{turn} fill="{QUIET}"'))
     parts += [text_at(place.left - 6.0, y + 4.0, text, f'text-anchor="end" fill="{QUIET}"') for y, text in y_ticks]
     parts.append(
         text_at(place.left + 0.5 * place.width, base + (43.0 if turned else 34.0), plot.x.label, 'text-anchor="middle"')
@@ -165,6 +172,10 @@ def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled
         )
         parts.append(text_at(x, y, plot.y.label, f'text-anchor="middle" transform="rotate(-90 {x:.1f} {y:.1f})"'))
     return "".join(parts)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LONGEST_TURNED else f"{text[: LONGEST_TURNED - 1]}…"
 
 
 def _sphere_place(plot: Plot, x: float, y: float, wide: float, tall: float) -> Place:

@@ -1,0 +1,145 @@
+"""``python -m deploy.weight``: packages, megabytes and unusual licences of the product and of each of its extras.
+
+What is measured is what is installed in the present environment: the files that the metadata of each package list, with the
+compiled modules among them. Extras that are not installed whole are left out.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from functools import cache
+from importlib import metadata
+from importlib.util import cache_from_source
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from deploy.sbom import ROOT, licence_of, project_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+NOT_OF_USERS = {"build", "dev", "bench", "docs"}
+TESTS = frozenset({"test", "tests"})
+KINDS = {
+    "AGPL": ("AGPL", "Affero"),
+    "LGPL": ("LGPL", "Lesser General"),
+    "GPL": ("GPL", "General Public"),
+    "MPL": ("MPL", "Mozilla"),
+    "EPL": ("EPL", "Eclipse"),
+}
+"""Kinds of licences that ask more of who passes a program on than its notice, by what their names contain."""
+
+
+class Weight(NamedTuple):
+    """What one part of the product installs: packages, their size without their own tests' compiled modules, and licences."""
+
+    part: str
+    packages: tuple[str, ...]
+    megabytes: float
+    unusual: dict[str, str]
+
+
+def weights() -> list[Weight]:
+    """The product first, then each extra that is installed whole: what it adds."""
+    project = project_of(ROOT)
+    base = closure(project["dependencies"])
+    parts = [_weight("(none)", base)]
+    for extra, requirements in sorted(project["optional-dependencies"].items()):
+        if extra in NOT_OF_USERS:
+            continue
+        added = closure(_flat(requirements, project["optional-dependencies"])) - base
+        if all(_held(name) is not None for name in added):
+            parts.append(_weight(extra, added))
+    return parts
+
+
+def closure(requirements: Iterable[str]) -> set[str]:
+    """Normalised names of all packages that some requirements bring, on this Python; those that are missing are among them."""
+    left = [Requirement(one) for one in requirements]
+    seen: set[tuple[str, frozenset[str]]] = set()
+    while left:
+        one = left.pop()
+        key = (canonicalize_name(one.name), frozenset(one.extras))
+        held = _held(key[0])
+        if key in seen:
+            continue
+        seen.add(key)
+        for needed in map(Requirement, held.requires or () if held is not None else ()):
+            extras = one.extras or {""}
+            if needed.marker is None or any(needed.marker.evaluate({"extra": extra}) for extra in extras):
+                left.append(needed)
+    return {name for name, _ in seen}
+
+
+def kind_of(licence: str) -> str:
+    """The kind of an unusual licence; empty for one that asks for its notice only, and for a choice with such a one."""
+    both = re.split(r" AND ", licence)  # each part holds; names after a comma are a choice, as OR is
+    kinds = [[_kind(one) for one in re.split(r"\bOR\b|, ", part)] for part in both]
+    return next((choice[0] for choice in kinds if all(choice)), "")
+
+
+def _kind(name: str) -> str:
+    return next((kind for kind, words in KINDS.items() if any(word.lower() in name.lower() for word in words)), "")
+
+
+def _weight(part: str, packages: set[str]) -> Weight:
+    licences = {name: text for name in sorted(packages) if kind_of(text := _licence(name))}
+    return Weight(part, tuple(sorted(packages)), sum(map(megabytes, packages)), licences)
+
+
+@cache
+def megabytes(name: str) -> float:
+    """Size of the installed files of a package and of its compiled modules, those of its own tests left out, 10⁶ bytes."""
+    held = _held(name)
+    total = 0
+    for file in (held.files or ()) if held is not None else ():
+        path = Path(str(file.locate()))
+        if path.suffix == ".pyc" or not path.is_file():
+            continue  # a compiled module is listed only if it was compiled by the installer
+        total += path.stat().st_size
+        compiled = Path(cache_from_source(str(path))) if path.suffix == ".py" and not TESTS & set(path.parts) else path
+        total += compiled.stat().st_size if compiled != path and compiled.is_file() else 0
+    return total / 1e6
+
+
+def _licence(name: str) -> str:
+    held = _held(name)
+    found = licence_of(held.metadata) if held is not None else {}
+    return str(found.get("expression") or found.get("license", {}).get("name", ""))
+
+
+def _held(name: str) -> metadata.Distribution | None:
+    try:
+        return metadata.distribution(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _flat(requirements: Iterable[str], extras: dict[str, list[str]]) -> list[str]:
+    """The requirements of an extra, with those of the extras of this product that it names."""
+    flat: list[str] = []
+    for text in requirements:
+        one = Requirement(text)
+        flat += (
+            [deep for extra in one.extras for deep in _flat(extras[extra], extras)]
+            if one.name == "tumbleline"
+            else [text]
+        )
+    return flat
+
+
+def table() -> str:
+    """The weights as a table of a document."""
+    rows = ["| extra | packages | MB | licences that ask for more than their notice |", "|---|---|---|---|"]
+    for one in weights():
+        by_licence = ", ".join(f"{name}: {licence}" for name, licence in one.unusual.items()) or "–"
+        rows.append(f"| `{one.part}` | {len(one.packages)} | {one.megabytes:.0f} | {by_licence} |")
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(table() + "\n")

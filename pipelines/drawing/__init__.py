@@ -1,0 +1,8 @@
+"""Charts as plain descriptions, drawn by Plotly in a page, as SVG or PNG without a browser, and written as CSV."""
+
+from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
+from pipelines.drawing.csv_rows import csv_text
+from pipelines.drawing.plotly_figure import plotly_figure
+from pipelines.drawing.vector import svg_text
+
+__all__ = ["Chart", "ColourScale", "Plot", "PlotAxis", "Trace", "csv_text", "plotly_figure", "svg_text"]

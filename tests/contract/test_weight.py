@@ -1,0 +1,148 @@
+"""What a user installs: no more packages than are needed, none that the code does not find, no licence that is not told."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.markers import Marker
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from deploy.weight import closure, kind_of, megabytes, table
+
+ROOT = Path(__file__).resolve().parents[2]
+SHIPPED = ("inertial", "schemas", "stations", "pipelines")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+MOST_PACKAGES, MOST_MB = 110, 650.0
+ENTRY = re.compile(r"^([\w.-]+)(?:\[[\w, -]+\])?==[^\s;\\]+(?:\s*;\s*([^\\]+))?", re.MULTILINE)
+SELF = re.compile(r"^tumbleline\[([\w,]+)\]$")
+
+
+def modules_of(distributions: set[str]) -> set[str]:
+    """Names that can be imported from some installed distributions."""
+    return {
+        module
+        for module, names in metadata.packages_distributions().items()
+        if {canonicalize_name(name) for name in names} & distributions
+    }
+
+
+def names(requirements: list[str]) -> set[str]:
+    """Distributions of a list of requirements, with those of extras of this product."""
+    found: set[str] = set()
+    for text in requirements:
+        own = SELF.match(text)
+        extras = own[1].split(",") if own else []
+        found |= {name for extra in extras for name in names(PROJECT["optional-dependencies"][extra])}
+        found |= set() if own else {canonicalize_name(Requirement(text).name)}
+    return found
+
+
+EXTRAS = {
+    name
+    for extra, requirements in PROJECT["optional-dependencies"].items()
+    if extra not in {"build", "dev", "bench", "docs"}
+    for name in names(requirements)
+}
+
+
+def imports(path: Path) -> dict[str, set[str]]:
+    """Top-level names of the modules that a file imports: at its top, inside functions, and for type checkers only."""
+    found: dict[str, set[str]] = {"top": set(), "inside": set(), "types": set()}
+
+    def walk(node: ast.AST, where: str) -> None:
+        if isinstance(node, ast.Import):
+            found[where] |= {one.name.partition(".")[0] for one in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+            found[where].add(node.module.partition(".")[0])
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            for one in node.body:
+                walk(one, "types")
+            for one in node.orelse:
+                walk(one, where)
+            return
+        inner = "inside" if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and where == "top" else where
+        for one in ast.iter_child_nodes(node):
+            walk(one, inner)
+
+    walk(ast.parse(path.read_text(encoding="utf-8")), "top")
+    return found
+
+
+@pytest.fixture(scope="module")
+def imported() -> dict[Path, dict[str, set[str]]]:
+    """The imports of every module that is shipped, of other distributions only."""
+    own = set(sys.stdlib_module_names) | set(SHIPPED)
+    return {
+        path.relative_to(ROOT): {where: modules - own for where, modules in imports(path).items()}
+        for top in SHIPPED
+        for path in sorted((ROOT / top).rglob("*.py"))
+    }
+
+
+def test_no_module_imports_at_its_top_what_is_not_among_the_dependencies(imported) -> None:
+    there = modules_of(closure(PROJECT["dependencies"]))
+    wrong = {str(path): sorted(found["top"] - there) for path, found in imported.items() if found["top"] - there}
+    # reached by the option --dask alone, which asks for the extra first
+    assert wrong == {"pipelines/flows/dask.py": ["prefect_dask"]}
+
+
+def test_what_is_imported_inside_a_function_is_a_dependency_or_an_extra(imported) -> None:
+    there = modules_of(closure(PROJECT["dependencies"]) | EXTRAS | closure(["prefect-dask"]))
+    wrong = {str(path): sorted(found["inside"] - there) for path, found in imported.items() if found["inside"] - there}
+    assert wrong == {}
+
+
+def test_no_module_names_a_library_of_drawing_or_of_table_contracts(imported) -> None:
+    everything = {module for found in imported.values() for modules in found.values() for module in modules}
+    assert not everything & {"matplotlib", "pandera", "pyreadr", "allantools"}
+
+
+@pytest.mark.parametrize("version", ["3.11.7", "3.12.1", "3.13.0", "3.14.0"])
+def test_the_lock_of_a_run_has_no_more_packages_than_are_told(version: str) -> None:
+    here = {"python_full_version": version, "python_version": version.rpartition(".")[0]}
+    lock = (ROOT / "requirements-run.lock").read_text(encoding="utf-8")
+    held = {
+        canonicalize_name(name)
+        for name, marker in ENTRY.findall(lock)
+        if not marker.strip() or Marker(marker.strip()).evaluate(here)
+    }
+    assert held
+    assert len(held - names(PROJECT["optional-dependencies"]["build"])) <= MOST_PACKAGES
+
+
+def test_the_installed_product_is_no_larger_than_is_told() -> None:
+    packages = closure(PROJECT["dependencies"])
+    assert len(packages) <= MOST_PACKAGES
+    assert sum(map(megabytes, packages)) <= MOST_MB
+
+
+def test_no_package_of_a_run_or_an_extra_has_a_licence_of_which_the_guide_does_not_tell() -> None:
+    guide = (ROOT / "docs" / "how-to" / "install.md").read_text(encoding="utf-8")
+    rows = [line.split(" | ") for line in table().splitlines()[2:]]
+    assert {row[0].strip("| ") for row in rows} >= {"`(none)`", "`allan`", "`dask`", "`r`", "`sql`", "`tdms`"}
+    missing = [
+        (row[0], one) for row in rows for one in row[3].rstrip(" |").split(", ") if one != "–" and one not in guide
+    ]
+    assert missing == []
+    assert "AGPL" not in table()
+
+
+@pytest.mark.parametrize(
+    ("licence", "kind"),
+    [
+        ("MIT", ""),
+        ("MPL-2.0 AND (Apache-2.0 OR MIT)", "MPL"),
+        ("Apache-2.0 OR GPL-3.0-only", ""),
+        ("Public Domain, BSD License, GNU General Public License (GPL)", ""),
+        ("AGPL-3.0-only", "AGPL"),
+        ("GNU LESSER GENERAL PUBLIC LICENSE", "LGPL"),
+        ("LGPL-3.0-only", "LGPL"),
+    ],
+)
+def test_a_licence_that_asks_for_more_than_its_notice_is_found(licence: str, kind: str) -> None:
+    assert kind_of(licence) == kind
