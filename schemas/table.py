@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import pandera.pandas as pa
 
 Kind = Literal["str", "float64", "int64", "bool"]
 """The types of columns, by pandas' names."""
@@ -26,13 +29,14 @@ class Column:
     filled: bool = False
     missing: bool = False
 
-    @property
-    def needed(self) -> str:
-        """What a value must be, in words."""
-        if self.allowed:
-            return f"one of {', '.join(self.allowed)}"
-        words = {"str": "a text", "bool": "true or false", "int64": "a whole number", "float64": "a number"}[self.kind]
-        return words if self.low is None else f"{words} of at least {self.low:g}"
+    def contract(self) -> pa.Column:
+        """The same as a column of the library that explains what is wrong."""
+        import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
+
+        checks = [pa.Check.ge(self.low)] if self.low is not None else []
+        checks += [pa.Check.isin(list(self.allowed))] if self.allowed else []
+        checks += [pa.Check.str_length(min_value=1)] if self.filled else []
+        return pa.Column(str if self.kind == "str" else self.kind, checks=checks, nullable=self.missing)
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,15 @@ class Table:
     finite: tuple[str, ...] = ()
     key: tuple[str, ...] = ()
     only_ok: bool = False
+
+    @cached_property
+    def schema(self) -> pa.DataFrameSchema:
+        """The contract for the library that explains what is wrong."""
+        import pandera.pandas as pa  # noqa: PLC0415 - a table without an error does not need it
+
+        return pa.DataFrameSchema(
+            {name: column.contract() for name, column in self.columns.items()}, strict=False, coerce=True
+        )
 
 
 def text(*allowed: str) -> Column:

@@ -12,12 +12,9 @@ from schemas.errors import DataRejected
 from schemas.tables import TABLES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from pandera.errors import SchemaError
 
-    from schemas.table import Column, Table
-
-EXACT = 2**53
-"""Whole numbers up to it are exact as floating-point numbers."""
+    from schemas.table import Table
 
 
 def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
@@ -35,7 +32,12 @@ def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:
         return frame
     _refuse_not_finite(table, frame, source)
     _refuse_twice(table, frame, source)
-    return _converted(table, frame, source)
+    from pandera.errors import SchemaError  # noqa: PLC0415 - a table without an error does not need it
+
+    try:
+        return table.schema.validate(frame)
+    except SchemaError as problem:
+        raise DataRejected(_explain(problem, frame, source)) from None
 
 
 def _plainly_right(table: Table, frame: pd.DataFrame) -> bool:
@@ -87,45 +89,20 @@ def _refuse_twice(table: Table, frame: pd.DataFrame, source: str) -> None:
         )
 
 
-def _converted(table: Table, frame: pd.DataFrame, source: str) -> pd.DataFrame:
-    """The frame with the types of its contract; refuses the first value that has no place in its column."""
-    right: dict[str, Any] = {}
-    for name, column in table.columns.items():
-        values, wrong = _texts(frame[name], column) if column.kind == "str" else _numbers(frame[name], column)
-        if wrong.any():
-            first = int(np.flatnonzero(wrong)[0])
-            found = frame[name].iloc[first]
-            raise DataRejected(
-                f"{source}: {_row(frame, frame.index[first])}, column {name}: found {'nothing' if found == '' else found}, "
-                f"{column.needed} is needed; correct the row"
-            )
-        right[name] = values.astype(column.kind)
-    return frame.assign(**right)
+def _explain(problem: SchemaError, frame: pd.DataFrame, source: str) -> str:
+    column = getattr(problem.schema, "name", None) or "?"
+    cases = problem.failure_cases
+    if isinstance(cases, pd.DataFrame) and len(cases) and "index" in cases and pd.notna(cases["index"].iloc[0]):
+        index, value = cases["index"].iloc[0], cases["failure_case"].iloc[0]
+        row = _row(frame, index)
+        return f"{source}: {row}, column {column}: found {value}, {_needed(problem)} is needed; correct the row"
+    return f"{source}: column {column}: {str(problem).splitlines()[0]}; correct the column"
 
 
-def _texts(values: pd.Series, column: Column) -> tuple[pd.Series, NDArray[np.bool_]]:
-    """A column as texts, and which of them are wrong."""
-    texts = values.astype("str")
-    wrong = values.isna().to_numpy()
-    if column.allowed:
-        wrong = wrong | ~texts.isin(column.allowed).to_numpy()
-    return texts, wrong | (texts == "").to_numpy() if column.filled else wrong
-
-
-def _numbers(values: pd.Series, column: Column) -> tuple[pd.Series, NDArray[np.bool_]]:
-    """A column of numbers or flags, and which of them are wrong."""
-    if not pd.api.types.is_numeric_dtype(values):
-        values = values.astype("object")
-    found = pd.to_numeric(values, errors="coerce")
-    numbers = found.to_numpy(dtype=float, na_value=np.nan)
-    wrong = np.isnan(numbers) & ~(values.isna().to_numpy() & column.missing)
-    if column.low is not None:
-        wrong |= numbers < column.low
-    if column.kind == "bool":
-        wrong |= ~np.isin(numbers, (0.0, 1.0))
-    if column.kind == "int64" and not pd.api.types.is_integer_dtype(found):
-        wrong |= ~np.isfinite(numbers) | (numbers != np.round(numbers)) | (np.abs(numbers) > EXACT)
-    return pd.Series(numbers, index=values.index) if column.kind == "float64" else found, wrong
+def _needed(problem: SchemaError) -> str:
+    """The requirement of a check, without the library's notation."""
+    words = str(problem.check).removeprefix("<Check ").removesuffix(">")
+    return words.split(": ", 1)[-1].replace("_", " ")
 
 
 def _row(frame: pd.DataFrame, index: Any) -> str:

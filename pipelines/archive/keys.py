@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow")
+LIBRARIES = ("numpy", "scipy", "pandas", "pyarrow", "pandera")
 
 
 def digest(content: object) -> str:
