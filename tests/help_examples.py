@@ -64,7 +64,7 @@ def made_in(folder: Path) -> dict[str, str]:
     """Make the files and runs that the examples name in a folder, the working one; names of places and runs to replace."""
     _line(folder)
     for recipe, repeat in (("line-six.toml", "0"), ("my.toml", "1"), ("my.toml", "0")):
-        done = command(["run", recipe, "--direct", "--units", UNITS, "--repeat", repeat])
+        done = command(["run", recipe, "--station", "line-1.toml", "--direct", "--units", UNITS, "--repeat", repeat])
         assert done.returncode in {0, 1}, done.stderr
     recordings(folder)
     papers(folder)

@@ -142,7 +142,7 @@ def _left(chart: Chart, number: int, scaled: _Scaled) -> float:
     if chart.plots[number].sphere:
         return 0.0
     longest = max((len(label) for _, label in scaled.ticks), default=0)
-    return LETTER * longest + 12.0 + (20.0 if _labelled(chart, number) and scaled.axis.label else 0.0)
+    return LETTER * longest + 12.0 + (23.0 if _labelled(chart, number) and scaled.axis.label else 0.0)
 
 
 def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled: bool) -> str:
@@ -160,14 +160,15 @@ def _axes(plot: Plot, place: Place, scaled: tuple[_Scaled, _Scaled], *, labelled
         turn = (
             f'text-anchor="end" transform="rotate(-38 {x:.1f} {base + 13:.1f})"' if turned else 'text-anchor="middle"'
         )
-        parts.append(text_at(x, base + 15.0, _cut(text) if turned else text, f'{turn} fill="{QUIET}"'))
+        at = x if turned else min(x, WIDTH - 0.5 * LETTER * len(text))  # the last one ends inside
+        parts.append(text_at(at, base + 15.0, _cut(text) if turned else text, f'{turn} fill="{QUIET}"'))
     parts += [text_at(place.left - 6.0, y + 4.0, text, f'text-anchor="end" fill="{QUIET}"') for y, text in y_ticks]
     parts.append(
         text_at(place.left + 0.5 * place.width, base + (43.0 if turned else 34.0), plot.x.label, 'text-anchor="middle"')
     )
     if labelled and plot.y.label:
         x, y = (
-            place.left - LETTER * max((len(text) for _, text in y_ticks), default=0) - 16.0,
+            place.left - LETTER * max((len(text) for _, text in y_ticks), default=0) - 19.0,
             place.top + 0.5 * place.height,
         )
         parts.append(text_at(x, y, plot.y.label, f'text-anchor="middle" transform="rotate(-90 {x:.1f} {y:.1f})"'))

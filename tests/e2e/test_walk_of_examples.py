@@ -3,6 +3,7 @@
 It ends with a result or a verdict; the few that end otherwise here say why in one sentence, which is stated in ``OTHERWISE``.
 """
 
+import io
 import os
 import shlex
 import shutil
@@ -14,6 +15,7 @@ from contextlib import chdir
 from pathlib import Path
 
 import pytest
+from conftest import leave_out_pictures
 from help_examples import examples, made_in, words_of
 from in_process import command
 from typed_commands import printed_commands
@@ -38,7 +40,12 @@ ELSEWHERE = {"run", "investigate", "import"}
 """Commands whose runs are kept in another archive, so that the latest run is the one that the other examples mean."""
 
 OTHERWISE = {
-    "tumbleline operator line-six --go": "no run waits",  # with one that waits: tests/e2e/test_operator.py
+    "tumbleline operator": "no run waits",  # with one that waits: tests/e2e/test_operator.py
+    "tumbleline operator line-six --go": "no run waits",
+    # the example before it has revoked the only certificate
+    "tumbleline revoke SN1 --certificate 2 --reason 'reference out of date'": "has no calibration that holds",
+    # the lot of the folder was measured at one temperature
+    "tumbleline fit latest --limits industrial": "needs effect bias_temperature",
 }
 """Examples that end with status 2 here, and words of their message."""
 
@@ -52,18 +59,15 @@ SHORT = [one for one in ALL if not kept(one) and not any(word in one for word in
 
 
 @pytest.fixture(scope="module")
-def world(tmp_path_factory: pytest.TempPathFactory, no_pictures: None) -> tuple[Path, dict[str, str]]:
+def world(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     """The folder of the examples, and what stands there for names of the reader's own."""
-    del no_pictures
     folder = tmp_path_factory.mktemp("examples")
     with pytest.MonkeyPatch.context() as patch, chdir(folder):
         _at_home(patch, folder)
-        names = made_in(folder)
-        for example in (
-            "tumbleline certify latest",
-            "tumbleline certify latest",
-        ):  # a unit's first and second certificate
-            assert command(words_of(example, names)).returncode == DONE
+        with pytest.MonkeyPatch.context() as quick:
+            leave_out_pictures(quick)
+            names = made_in(folder)
+        assert command(["certify", "latest"]).returncode == DONE
     return folder, names
 
 
@@ -102,6 +106,7 @@ def test_the_examples_of_every_help_end_with_a_result(
         words = words_of(example, names)
         words += ["--direct"] if words[0] in DIRECT else []
         words += ["--archive", "elsewhere"] if words[0] in ELSEWHERE else []
+        monkeypatch.setattr(sys, "stdin", io.StringIO("y\n"))
         done = command(words)
         if example in OTHERWISE:
             right = done.returncode == UNUSABLE and OTHERWISE[example] in done.stderr
@@ -116,7 +121,7 @@ def test_the_examples_of_every_help_end_with_a_result(
             later = command([*line, *(["--direct"] if line[0] in DIRECT else [])])
             if later.returncode not in {DONE, PART_FAILED} or "defect" in later.stderr:
                 wrong.append((f"{example}, then {shlex.join(line)}", later.returncode, later.stderr[-400:]))
-    assert wrong == []
+    assert not wrong, "\n".join(map(str, wrong))
 
 
 @pytest.mark.slow
