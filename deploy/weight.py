@@ -18,6 +18,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from deploy.sbom import ROOT, licence_of, project_of
+from schemas.locks import UNUSED
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -70,6 +71,8 @@ def closure(requirements: Iterable[str]) -> set[str]:
         seen.add(key)
         for needed in map(Requirement, held.requires or () if held is not None else ()):
             extras = one.extras or {""}
+            if canonicalize_name(needed.name) in UNUSED.get(key[0], ()):
+                continue
             if needed.marker is None or any(needed.marker.evaluate({"extra": extra}) for extra in extras):
                 left.append(needed)
     return {name for name, _ in seen}

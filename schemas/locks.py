@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 """The versions that the locks are for; later ones have no wheels of these libraries."""
 
+UNUSED = {
+    "allantools": frozenset({"matplotlib", "numpydoc", "pytest"}),  # plots, documents and tests of its own
+    "prefect": frozenset({"apprise", "docker"}),  # blocks that notify chat services, and workers in containers
+}
+"""What a library asks for and imports only in parts of it that nothing here uses: the locks leave it out."""
+
 _ENTRY = re.compile(r"([\w.-]+)(?:\[[^\]]*\])?==([^\s;\\]+)(?: *; *([^\\\n]+?))? *(?:\\?\n|$)")
 _HASH = re.compile(r"--hash=sha256:([0-9a-f]{64})")
 

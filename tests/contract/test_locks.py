@@ -18,7 +18,7 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 from test_packaging import ROOT, text_of
 
-from schemas.locks import PYTHONS, Pin, on_linux, pins
+from schemas.locks import PYTHONS, UNUSED, Pin, on_linux, pins
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -96,7 +96,8 @@ def resolve(lock: str, python: str, lines: tuple[str, ...]) -> tuple[list[str], 
             continue
         needs = installed(name, pin.version)
         unknown |= {name} if needs is None else set()
-        left += [(name, r, frozenset({"", *requirement.extras})) for r in needs or ()]
+        extras = frozenset({"", *requirement.extras})
+        left += [(name, r, extras) for r in needs or () if canonicalize_name(parsed(r).name) not in UNUSED.get(name, ())]
     return wrong, {canonicalize_name(parsed(line).name) for _, line, _ in seen}, unknown
 
 

@@ -13,6 +13,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from deploy.weight import closure, kind_of, megabytes, table
+from schemas.locks import UNUSED
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ("inertial", "schemas", "stations", "pipelines")
@@ -97,9 +98,17 @@ def test_what_is_imported_inside_a_function_is_a_dependency_or_an_extra(imported
     assert wrong == {}
 
 
-def test_no_module_names_a_library_of_drawing_or_of_table_contracts(imported) -> None:
+def test_no_module_names_a_library_of_drawing(imported) -> None:
     everything = {module for found in imported.values() for modules in found.values() for module in modules}
-    assert not everything & {"matplotlib", "pandera", "pyreadr", "allantools"}
+    assert not everything & {"matplotlib", "pyreadr"}
+
+
+def test_what_the_locks_leave_out_is_asked_for_by_the_library_and_by_no_module(imported) -> None:
+    everything = {module for found in imported.values() for modules in found.values() for module in modules}
+    for library, unused in UNUSED.items():
+        asked = {canonicalize_name(Requirement(line).name) for line in metadata.requires(library) or ()}
+        assert unused <= asked
+        assert not unused & everything
 
 
 @pytest.mark.parametrize("version", ["3.11.7", "3.12.1", "3.13.0", "3.14.0"])
@@ -124,7 +133,7 @@ def test_the_installed_product_is_no_larger_than_is_told() -> None:
 def test_no_package_of_a_run_or_an_extra_has_a_licence_of_which_the_guide_does_not_tell() -> None:
     guide = (ROOT / "docs" / "how-to" / "install.md").read_text(encoding="utf-8")
     rows = [line.split(" | ") for line in table().splitlines()[2:]]
-    assert {row[0].strip("| ") for row in rows} >= {"`(none)`", "`allan`", "`dask`", "`r`", "`sql`", "`tdms`"}
+    assert {row[0].strip("| ") for row in rows} >= {"`(none)`", "`dask`", "`r`", "`sql`", "`tdms`"}
     missing = [
         (row[0], one) for row in rows for one in row[3].rstrip(" |").split(", ") if one != "–" and one not in guide
     ]
