@@ -87,7 +87,7 @@ define lock
 		--override build/unused.in $(UPGRADE) $(4) $(patsubst %,--extra %,$(2)) $(patsubst %,--constraint requirements-%.lock,$(3)) --output-file requirements-$(1).lock
 endef
 CRATE_NEEDS := roc-validator>=0.13
-USERS := build pdf recordings signatures
+USERS := build dask pdf recordings signatures sql
 # UNUSED of schemas/locks.py: what a library asks for and nothing here uses; tests use pytest and docker themselves
 UNUSED := matplotlib numpydoc apprise
 define lock_without
