@@ -95,7 +95,13 @@ def _curves(document: dict[str, Any]) -> Chart:
         if bounded.any():
             traces.append(
                 Trace(
-                    f"{curve['channel']}: interval", tau[bounded], low[bounded], "band", role, high=high[bounded], legend=False
+                    f"{curve['channel']}: interval",
+                    tau[bounded],
+                    low[bounded],
+                    "band",
+                    role,
+                    high=high[bounded],
+                    legend=False,
                 )
             )
         traces.append(Trace(curve["channel"], tau, deviation, role=role, size=5.0))

@@ -97,7 +97,9 @@ def resolve(lock: str, python: str, lines: tuple[str, ...]) -> tuple[list[str], 
         needs = installed(name, pin.version)
         unknown |= {name} if needs is None else set()
         extras = frozenset({"", *requirement.extras})
-        left += [(name, r, extras) for r in needs or () if canonicalize_name(parsed(r).name) not in UNUSED.get(name, ())]
+        left += [
+            (name, r, extras) for r in needs or () if canonicalize_name(parsed(r).name) not in UNUSED.get(name, ())
+        ]
     return wrong, {canonicalize_name(parsed(line).name) for _, line, _ in seen}, unknown
 
 
