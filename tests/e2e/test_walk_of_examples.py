@@ -42,6 +42,8 @@ ELSEWHERE = {"run", "investigate", "import"}
 OTHERWISE = {
     "tumbleline operator": "no run waits",  # with one that waits: tests/e2e/test_operator.py
     "tumbleline operator line-six --go": "no run waits",
+    # the example before it has programmed other units: the simulated station goes on with that lot only
+    "tumbleline program latest --station line-1.toml --form q24 --yes": "it belongs to another station or lot",
     # the example before it has revoked the only certificate
     "tumbleline revoke SN1 --certificate 2 --reason 'reference out of date'": "has no calibration that holds",
     # the lot of the folder was measured at one temperature
