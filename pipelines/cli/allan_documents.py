@@ -8,7 +8,6 @@ import numpy as np
 
 from inertial.noise.allan import CONFIDENCE, overlapping
 from inertial.noise.terms import NAMES, fit_terms, model_deviation
-from pipelines.chain.chain import static_inputs
 from pipelines.importers.series import EvenSeries
 from pipelines.stages.noise import FEWEST, UNEXPLAINED_P, alike, limits_where_unexplained, static_record
 from pipelines.tables.frames import rows_of
@@ -155,6 +154,8 @@ def statistic_of_run(run: Run, spacing: str, statistic: str) -> dict[str, Any]:
         The run has no static record.
     """
     document = allan_of_run(run)
+    from pipelines.chain.chain import static_inputs  # loads the chain, which a file does not need
+
     record = static_record(*static_inputs(run))
     assert record is not None
     parts = [

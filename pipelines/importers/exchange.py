@@ -10,7 +10,6 @@ import pandas as pd
 
 from pipelines.archive import Archive
 from pipelines.importers import files, values
-from pipelines.procedures import MULTI_POSITION
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, close_matches, did_you_mean
@@ -87,7 +86,7 @@ def history_of_run(run: Run) -> pd.DataFrame:
 def refuse_other_procedures(run: Run, wanted: str) -> None:
     """Refuse a run of other procedures than the multi-position test, of which alone ``wanted`` come; says what it has instead."""
     kinds = [part["kind"] for part in (run.about.get("recipe") or {}).get("procedures", ())]
-    if not kinds or MULTI_POSITION in kinds:
+    if not kinds or "multi_position" in kinds:
         return
     raise WrongUse(
         f"run {run.id} has no {wanted}: it measured {', '.join(dict.fromkeys(kinds))}, and they come from the multi-position "

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import termios
 import time
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
-from schemas.library import library
+import serial
+from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
+
 from stations.links.frames import (
     EXCEPTION,
     Malformed,
@@ -22,9 +24,7 @@ from stations.links.wires import CHUNK, Broken, Silence, reason_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from serial import Serial
-
-PARITIES = {"none": "N", "even": "E", "odd": "O"}
+PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
 EXCEPTION_FRAME = 5  # device, function, code, check
 QUIET_CHARACTERS = 3.5  # Modbus over serial line 1.02, 2.5.1.1
 QUIET_S = 0.00175  # above 19200 baud
@@ -68,7 +68,7 @@ class SerialWire:
             self._late_until = time.monotonic() + self.timeout_s
             self._unsure.setdefault(device_id, 0)
             raise
-        except (OSError, termios.error) as problem:  # settings that the line does not support
+        except (serial.SerialException, OSError, termios.error) as problem:  # settings that the line does not support
             self.close()
             raise Broken(reason_of(problem)) from None
 
@@ -80,8 +80,7 @@ class SerialWire:
 
     def _opened(self) -> Serial:
         if self._port is None:
-            serial = library("serial", "serial", f"link: the serial line {self.where}")
-            self._port = serial.Serial(
+            self._port = Serial(
                 self.where,
                 self._baud,
                 parity=self._parity,
@@ -90,7 +89,7 @@ class SerialWire:
                 write_timeout=self.timeout_s,
                 exclusive=True,
             )
-        return cast("Serial", self._port)
+        return self._port
 
     def _discard_late_input(self, port: Serial) -> None:
         """Discards late input, and waits for the silent interval that ends a frame."""

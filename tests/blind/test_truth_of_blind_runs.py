@@ -31,13 +31,18 @@ def force_of(table):
 
 
 def residuals(table, values, *, thermal):
-    """What bias, scale, misalignment (and their two temperature terms) leave of `values`, per unit and axis."""
+    """What bias, scale, misalignment (and their two temperature terms, S(θ)·M) leave of `values`, per unit and axis."""
     left = []
     for rows in table.groupby("unit").indices.values():
         part, force = table.iloc[rows], force_of(table.iloc[rows])
         warmth = part["unit_C"].to_numpy() - 25.0
         for axis in range(3):
-            columns = [np.ones(len(part)), *force.T, *([warmth, warmth * force[:, axis]] if thermal else [])]
+            along = force[:, axis]
+            for _ in range(2 if thermal else 0):  # where the axis points, from the outputs themselves
+                design = np.column_stack([np.ones(len(part)), *force.T, warmth, warmth * along])
+                row = np.linalg.lstsq(design, part[OUTPUTS[axis]].to_numpy(), rcond=None)[0][1:4]
+                along = force @ row / row[axis]
+            columns = [np.ones(len(part)), *force.T, *([warmth, warmth * along] if thermal else [])]
             design = np.column_stack(columns)
             target = values[rows][:, axis]
             left.append(target - design @ np.linalg.lstsq(design, target, rcond=None)[0])

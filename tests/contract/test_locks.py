@@ -125,10 +125,12 @@ def test_a_lock_has_a_version_and_hashes_for_everything_and_no_address(lock: str
 
 
 def test_a_library_has_one_version_in_every_lock_that_a_person_or_a_test_installs() -> None:
-    versions: dict[str, set[str]] = {}
+    versions: dict[tuple[str, str], set[str]] = {}
     for lock in ("run", "all", "dev", "bench"):
         for pin in entries(lock):
-            versions.setdefault(pin.name, set()).add(pin.version)
+            for python in PYTHONS:
+                if pin.marker is None or holds(str(pin.marker), python, ""):
+                    versions.setdefault((pin.name, python), set()).add(pin.version)
     assert {name: found for name, found in versions.items() if len(found) > 1} == {}
 
 

@@ -103,7 +103,7 @@ class One({bases}):
 {methods}
 PROCEDURE = One()
 """
-METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "evaluate", "draw", "measure"))
+METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "evaluate", "chart", "measure"))
 
 
 @pytest.mark.parametrize(

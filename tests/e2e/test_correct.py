@@ -51,14 +51,16 @@ def raw(
     unit: int = 0,
 ) -> pd.DataFrame:
     """Output of unit A1 by the physics of the double, under forces (n, 3) at temperatures (n,), with another bias (n, 3) in g."""
-    own = np.random.default_rng([99, run.about["lot"]["units"][unit]["slot"]])
+    slot = run.about["lot"]["units"][unit]["slot"]
+    own = np.random.default_rng([99, slot])
     zero, tempco = own.normal(0.0, 0.01, 3), own.normal(0.0, 5e-5, 3)
     matrix = np.eye(3) + own.normal(0.0, 3e-3, (3, 3))
     theta = (temperature - 25.0)[:, None]
     mean = zero + bias + tempco * theta + (force @ matrix.T) * (1.0 + 1e-4 * theta)
     values = np.round(LSB_PER_G * (mean + noise_g * rng.normal(size=force.shape)))
     table = pd.DataFrame(values, columns=["x", "y", "z"])
-    return table.assign(time_s=np.arange(len(values)) / RATE, unit_C=temperature)
+    read = temperature + 0.02 * slot  # by the thermometer that the unit was calibrated with
+    return table.assign(time_s=np.arange(len(values)) / RATE, unit_C=read)
 
 
 def correct(run: Run, *words: str) -> tuple[dict, int]:

@@ -62,7 +62,7 @@ BROKEN = {
 
 
 @pytest.fixture
-def run(tmp_path: Path, no_pictures_here: None) -> Path:
+def run(tmp_path: Path) -> Path:
     """The archive of a small run."""
     return finished_run(tmp_path).archive.root
 

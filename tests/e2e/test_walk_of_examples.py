@@ -15,7 +15,6 @@ from contextlib import chdir
 from pathlib import Path
 
 import pytest
-from conftest import leave_out_pictures
 from help_examples import examples, made_in, words_of
 from in_process import command
 from typed_commands import printed_commands
@@ -66,9 +65,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
     folder = tmp_path_factory.mktemp("examples")
     with pytest.MonkeyPatch.context() as patch, chdir(folder):
         _at_home(patch, folder)
-        with pytest.MonkeyPatch.context() as quick:
-            leave_out_pictures(quick)
-            names = made_in(folder)
+        names = made_in(folder)
         assert command(["certify", "latest"]).returncode == DONE
     return folder, names
 

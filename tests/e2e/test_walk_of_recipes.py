@@ -25,8 +25,6 @@ PROCEDURES = sorted(
 )
 STATIONS = sorted((DEPLOY / "stations").glob("*.toml"))
 
-pytestmark = pytest.mark.usefixtures("no_pictures")
-
 
 def named(path: Path) -> str:
     return path.stem

@@ -102,20 +102,21 @@ def test_a_file_without_unit_or_sample_interval_is_refused(tmp_path: Path, rng: 
     rows = "\n".join(f"{a:.9g},{b:.9g}" for a, b in zip(unit.values, reference.values, strict=True))
     bare = tmp_path / "bare.csv"
     bare.write_text(f"dut,ref\n{rows}\n")
+    (part := tmp_path / "part.toml").write_text("scale = 0.3\n")
     columns = {"z": "dut", "reference": "ref"}
     with pytest.raises(DataRejected, match=r"bare.csv: column 'dut' has no unit.*--units output"):
-        import_waveforms([bare], "shock", None, "S1", RecordingLayout(columns, {}), str(tmp_path / "a"))
+        import_waveforms([bare], "shock", part, "S1", RecordingLayout(columns, {}), str(tmp_path / "a"))
     units = {"output": "V", "reference": "g"}
     with pytest.raises(DataRejected, match=r"no sample interval is stated.*--rate"):
-        import_waveforms([bare], "shock", None, "S1", RecordingLayout(columns, units), str(tmp_path / "a"))
+        import_waveforms([bare], "shock", part, "S1", RecordingLayout(columns, units), str(tmp_path / "a"))
     layout = RecordingLayout(columns, units | {"reference": "psi"}, RATE)
     with pytest.raises(DataRejected, match=r"reference in 'psi'"):
-        import_waveforms([bare], "shock", None, "S1", layout, str(tmp_path / "a"))
+        import_waveforms([bare], "shock", part, "S1", layout, str(tmp_path / "a"))
     stated = tmp_path / "stated.csv"
     stated.write_text(f"dut [V],ref [g]\n{rows}\n")
     layout = RecordingLayout({"z": "dut [V]", "reference": "ref [g]"}, {"output": "mV"}, RATE)
     with pytest.raises(WrongUse, match=r"states V, --units has mV"):
-        import_waveforms([stated], "shock", None, "S1", layout, str(tmp_path / "a"))
+        import_waveforms([stated], "shock", part, "S1", layout, str(tmp_path / "a"))
     with pytest.raises(WrongUse, match="can be imported"):
         import_waveforms([bare], "tilt", None, "S1", RecordingLayout(columns, units, RATE), str(tmp_path / "a"))
     assert not (tmp_path / "a").exists() or not Archive(str(tmp_path / "a")).runs()

@@ -56,7 +56,8 @@ def _noise(spec: Spec, lot: Lot, scene: Scene, rng: np.random.Generator) -> Floa
 
 def _reading_noise(lot: Lot, scene: Scene) -> Floats:
     """What the thermometers' noise costs any model that reads them, (U, n, 3), g."""
-    slope = lot.bias_tempco[:, None] + lot.scale_tempco[:, None] * nominal_force(scene)
+    along = np.einsum("uij,nj->uni", lot.axes(), nominal_force(scene))
+    slope = lot.bias_tempco[:, None] + (lot.gain() * lot.scale_tempco)[:, None] * along
     return -slope * scene.reading_error[..., None]
 
 
@@ -150,7 +151,7 @@ def make_run(spec: Spec, seed: int) -> Run:
     scene = scenes.build(spec, line, places, np.random.default_rng(day))
     again = scenes.build(spec, line, places, np.random.default_rng(other_day))
     base = spec.base or starting_model(scene)
-    absorber = Absorber.of(scene, base)
+    absorber = Absorber.of(lot, scene, base)
     errors = [_noise(spec, lot, s, np.random.default_rng(n)) for s, n in ((scene, noise), (again, other_noise))]
     if base != THERMAL_BASE:
         lot = _quiet(lot, scene, absorber, _spread(errors[0]))

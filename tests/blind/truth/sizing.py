@@ -44,9 +44,10 @@ class Absorber:
     basis: Floats
 
     @staticmethod
-    def of(scene: Scene, base: tuple[str, ...]) -> Absorber:
+    def of(lot: Lot, scene: Scene, base: tuple[str, ...]) -> Absorber:
         """The absorber of the model `base` under the run's plan."""
         force = nominal_force(scene)
+        along = np.einsum("uij,nj->uni", lot.axes(), force)
         units, count = scene.units, len(force)
         warmth = reading(scene) - REFERENCE_C
         bases = []
@@ -57,7 +58,7 @@ class Absorber:
                 "scale": [np.broadcast_to(force[:, axis], (units, count))],
                 "misalignment": [np.broadcast_to(force[:, k], (units, count)) for k in others],
                 "bias_temperature": [warmth],
-                "scale_temperature": [warmth * force[:, axis]],
+                "scale_temperature": [warmth * along[..., axis]],
             }
             stack = np.stack([column for name in base for column in columns[name]], axis=-1)
             bases.append(np.linalg.qr(stack)[0])
