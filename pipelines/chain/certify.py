@@ -114,6 +114,7 @@ def _proposals(
     """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
     refuse_overdue(run)
+    adequacy = refuse_inadequate(run)
     refuse_unstated(run)
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
@@ -121,7 +122,7 @@ def _proposals(
     shared: dict[str, Any] = {
         "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
-        "evidence": evidence, "adequacy": refuse_inadequate(run),
+        "evidence": evidence, "adequacy": adequacy,
     }  # fmt: skip
     proposals: list[LedgerEntry] = []
     for serial in units or tuple(grades):
