@@ -79,7 +79,8 @@ def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
         raise ArchiveUnusable(
             f"calibrations: {where} has schema {schema}, this version knows up to {SCHEMA}; use a newer version"
         )
-    known = {"adequacy": ""} | {("start" if name == "from" else name): value for name, value in content.items()}
+    known: dict[str, Any] = {"adequacy": ""}  # events of earlier versions have none
+    known |= {("start" if name == "from" else name): value for name, value in content.items()}
     missing = sorted(_NAMES - known.keys())
     if missing or known["action"] not in get_args(Action):
         fault = f"no {missing[0]}" if missing else f"action {known['action']!r}"

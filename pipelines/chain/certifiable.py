@@ -83,22 +83,23 @@ def refuse_overdue(run: Run) -> None:
 def refuse_inadequate(run: Run) -> str:
     """The verdict on a run's model for its certificate; refused are runs whose verdict their limits do not allow.
 
-    Captured and imported runs are judged alike. At the 5 % of a verdict one good lot in twenty is not adequate by chance, so a p
-    of at least ``adequacy_p_min`` of the limits passes; a model that is not adequate at a larger p has a named error, not chance.
+    Captured and imported runs are judged alike. At the 5 % of a verdict one good lot in twenty is not adequate by chance, so a
+    p of at least ``adequacy_p_min`` of the limits passes. Where what is missing is found, it is not by chance: noise alone shows
+    such a finding in one lot of a thousand. (A p that is drawn is never below 0.01, whatever the model lacks.)
     """
     judged = _verdict(run)
     if judged is None:
         return ""
-    adequate, reason, p = judged
+    adequate, reason, p, named = judged
     least = float((run.about.get("limits") or {}).get("adequacy_p_min") or ADEQUACY_P_MIN)
     see = f"see 'tumbleline diagnose {run.id}'"
     if adequate is None or p is None:
         raise WrongUse(
             f"certify: the model of run {run.id} cannot be judged ({reason}), an adequate one is needed; {see}"
         )
-    if not adequate and p > ADEQUATE_ABOVE:
+    if not adequate and named:
         raise WrongUse(
-            f"certify: the model of run {run.id} is NOT ADEQUATE: an error was found in it (p {equal(p)}), a model without it is "
+            f"certify: the model of run {run.id} is NOT ADEQUATE (p {equal(p)}), and what it lacks is found, a model with it is "
             f"needed; {see}"
         )
     if not passes(p, least):
@@ -108,14 +109,18 @@ def refuse_inadequate(run: Run) -> str:
         )
     if adequate:
         return f"ADEQUATE (p {equal(p)})"
-    return f"NOT ADEQUATE at the level of {100.0 * ADEQUATE_ABOVE:g} % (p {equal(p)}); certified, as p is at least {least:g}"
+    level = f"NOT ADEQUATE at the level of {100.0 * ADEQUATE_ABOVE:g} % (p {equal(p)})"
+    return f"{level}; certified, as nothing is found that it lacks and p is at least {least:g}"
 
 
-def _verdict(run: Run) -> tuple[bool | None, str | None, float | None] | None:
-    """Whether a run's model is adequate, why that cannot be told, and its p; None where there is nothing to judge."""
+def _verdict(run: Run) -> tuple[bool | None, str | None, float | None, bool] | None:
+    """Whether a run's model is adequate, why that cannot be told, its p, and whether what it lacks is found.
+
+    None where there is nothing to judge.
+    """
     if run.about.get("capture"):
         own = adequacy_of(run)
-        return None if own is None else (own["adequate"], own["reason"], own["p_value"])
+        return None if own is None else (own["adequate"], own["reason"], own["p_value"], own["named"])
     if "dwells" not in run.tables():
         return None
     from pipelines.diagnosis.diagnose import diagnose  # loads the search for effects, which captured runs do not need
@@ -123,7 +128,8 @@ def _verdict(run: Run) -> tuple[bool | None, str | None, float | None] | None:
     past = run.table("history") if "history" in run.tables() else None
     effects = list((run.about.get("recipe") or {}).get("effects", ()))
     verdict = diagnose(run.table("dwells"), past, effects or None)
-    return verdict["adequate"], verdict["reason"], verdict["error"]["p_value"]
+    named = bool(verdict["classes"] or verdict["unexplained"] or verdict["removed"])
+    return verdict["adequate"], verdict["reason"], verdict["error"]["p_value"], named
 
 
 def refuse_unstated(run: Run) -> None:

@@ -331,16 +331,18 @@ def test_the_seat_is_asked_for_where_the_frame_is_that_of_the_fixture(run: Run) 
     assert "seat (dominates misalignment)" in frames["fixture"]
 
 
-def verdict(p: float | None, reason: str | None = None) -> dict[str, object]:
+def verdict(p: float | None, reason: str | None = None, named: str = "") -> dict[str, object]:
     adequate = None if p is None else False
-    return {"adequate": adequate, "reason": reason, "rms_ug": 1.0, "floor_ug": 1.0, "p_value": p, "units": 3}
+    figures = {"rms_ug": 1.0, "floor_ug": 1.0, "p_value": p, "named": bool(named)}
+    return {"adequate": adequate, "reason": reason, **figures, "units": 3, "faulty": []}
 
 
 @pytest.mark.parametrize(
     ("judged", "said"),
     [
         (verdict(4e-5), "NOT ADEQUATE (p < 0.001), p of at least 0.001 is needed"),
-        (verdict(0.4), "an error was found in it"),
+        (verdict(0.01, named="warm_up"), "NOT ADEQUATE (p = 0.01), and what it lacks is found"),
+        (verdict(0.4, named="unit_moved"), "NOT ADEQUATE (p = 0.4), and what it lacks is found"),
         (verdict(None, "too few poses"), "cannot be judged (too few poses)"),
     ],
 )
