@@ -175,7 +175,8 @@ def _needed(run: Run, terms: BudgetTerms) -> tuple[tuple[str, ...], str]:
     needed: list[str] = list(NEEDED_OF_TABLE)
     if not captured and not set(ANGLE_COLUMNS) <= columns:
         needed = list(NEEDED_OF_FACES if set(FORCE_COLUMNS) <= columns else NEEDED_OF_NORMS)
-    if "level" in needed and terms.certificate.frame == "fixture":
+    to_fixture = run.table("coefficients")["effect"].eq("misalignment").any()  # it is a result in either frame
+    if "level" in needed and (to_fixture or terms.certificate.frame == "fixture"):
         needed.append("seat")
     if terms.stability is not None and terms.stability.ratiometric > 0.0:
         needed.append("supply")
