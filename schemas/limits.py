@@ -36,6 +36,9 @@ MOST_MONTHS = 120
 Rule = Literal["guarded_acceptance", "simple_acceptance", "allowed_pfa"]
 LARGEST_PFA = 0.02
 """Largest probability of false acceptance of one decision that limits may allow."""
+ADEQUACY_P_MIN = 0.001
+"""Least p of a model that is certified where the limits file does not say. At the 5 % of the verdict one good lot in twenty would
+be refused, at this one in a thousand; a smaller p is a score and no probability."""
 
 
 class Limit(Strict):
@@ -70,6 +73,7 @@ class Limits(Strict):
     ----------
     validity_months : longest that a certificate by these limits may hold; :data:`VALIDITY_MONTHS` where it is not stated.
     pfa_max : probability of false acceptance that the rule ``allowed_pfa`` allows; 2 % where it is not stated.
+    adequacy_p_min : least p of the model's residual with which a run is certified; :data:`ADEQUACY_P_MIN` where it is not stated.
     """
 
     name: Name
@@ -78,6 +82,7 @@ class Limits(Strict):
     grade: Literal["navigation", "industrial", "consumer"] = "consumer"
     validity_months: Annotated[int, Field(strict=True, ge=1, le=MOST_MONTHS)] | None = None
     pfa_max: Annotated[Number, Field(gt=0.0, le=LARGEST_PFA)] | None = None
+    adequacy_p_min: Annotated[Number, Field(ge=ADEQUACY_P_MIN, le=0.05)] | None = None
     figures: Annotated[dict[str, Limit], Field(min_length=1)]
 
     @property
@@ -96,7 +101,7 @@ class Limits(Strict):
     def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without what is not stated: runs are named for their limits, and those of earlier versions keep their names."""
         content = handler(self)
-        later = ("validity_months", "pfa_max")
+        later = ("validity_months", "pfa_max", "adequacy_p_min")
         return {name: value for name, value in content.items() if name not in later or value is not None}
 
     @field_validator("figures")

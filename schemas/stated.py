@@ -40,6 +40,7 @@ class Entry(Strict):
     """One entry of the budget.
 
     rectangular : key of a half-width whose distribution is rectangular unless another one is stated; empty for none
+    exact : what the entry does not state, or states as 0, is exactly 0; without this word a 0 counts as not stated
     """
 
     rectangular: ClassVar[str] = ""
@@ -58,6 +59,10 @@ class Entry(Strict):
             if _part_of(name) == part:
                 return self._converted(form, unit, float(getattr(self, name)))
         return StandardUncertainty(0.0, "", 0.0, "normal", 1.0)
+
+    def states(self, part: str = "") -> bool:
+        """Whether a part of the entry has an uncertainty, or is said to be exact."""
+        return self.exact or self.standard(part).u > 0.0
 
     def _converted(self, form: str, unit: str, value: float) -> StandardUncertainty:
         if form == "U":
@@ -88,7 +93,7 @@ class Entry(Strict):
             raise ValueError("k: missing beside an expanded uncertainty U; add the coverage factor of its certificate")
         if any(form == "half_width" for _, form, _ in given) and self.distribution is None:
             raise ValueError("distribution: missing beside a half_width; add rectangular, triangular or arcsine")
-        if self.exact and given:
+        if self.exact and any(_part_of(name) == "" for name, _, _ in given):
             raise ValueError("exact: true beside an uncertainty; leave one of the two out")
         if not self.exact and not given and self._needs_value:
             raise ValueError("no uncertainty is stated; add u_…, U_… with k, or half_width_… with distribution")

@@ -186,7 +186,7 @@ def refuse_untraced(stated: Uncertainty, references: Sequence[Reference], *, sim
     """
     known = {one.id: one for one in references}
     for name, entry in stated.entries.items():
-        if entry.exact and not simulated:
+        if entry.exact and not simulated and name != "reader":  # that of a digital device is in the device
             raise ValueError(
                 f"uncertainty.{name}.exact: true, a station of kind simulated is needed; state its standard uncertainty"
             )

@@ -59,6 +59,11 @@ class Gravity(RelativeEntry):
             return StandardUncertainty(60e-6, "ppm", 60.0, "normal", 1.0)
         return standard
 
+    def states(self, part: str = "") -> bool:
+        """Whether it has an uncertainty, that of the formula where none is stated, or is said to be exact."""
+        del part
+        return self.exact or self.relative().u > 0.0
+
     @property
     def origin(self) -> str:
         """Survey, or the formula."""
@@ -117,6 +122,11 @@ class Settling(Entry):
 
     tau_s: Annotated[list[Positive], Field(min_length=1, max_length=64)]
     scope: Scope = "run"
+
+    def states(self, part: str = "") -> bool:
+        """By its time constants."""
+        del part
+        return True
 
     @property
     def _needs_value(self) -> bool:
@@ -195,8 +205,16 @@ class Uncertainty(Strict):
 
     @property
     def not_stated(self) -> dict[str, str]:
-        """Entries that are missing, with what they rule."""
-        return {name: rules for name, rules in NEEDED.items() if getattr(self, name) is None}
+        """Entries that are missing, and parts of entries that are missing or 0 without ``exact``, with what they rule."""
+        missing: dict[str, str] = {}
+        for name, rules in NEEDED.items():
+            entry = getattr(self, name)
+            if entry is None:
+                missing[name] = rules
+            else:
+                gaps = [part for part in PARTS.get(name, ("",)) if not entry.states(part)]
+                missing |= {f"{name} {part}".strip(): rules for part in gaps}
+        return missing
 
     @model_serializer(mode="wrap")
     def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -206,6 +224,9 @@ class Uncertainty(Strict):
 NEEDED = {
     "gravity": "scale", "level": "bias and misalignment", "orthogonality": "bias and misalignment", "outer_offset": "bias of z",
     "inner_offset": "misalignment", "harmonics": "scale", "pose": "scatter of the poses", "seat": "misalignment",
-    "thermometer": "temperature coefficients", "supply": "scale", "reader": "scale and bias",
+    "thermometer": "temperature coefficients", "gradient": "bias and scale over temperature",
+    "settling": "temperature coefficients", "supply": "scale", "reader": "scale and bias",
 }  # fmt: skip
 """Entries that a whole budget has, with the coefficients that each rules."""
+PARTS = {"thermometer": ("offset", "slope"), "reader": ("gain", "offset")}
+"""Parts that such an entry has."""

@@ -70,6 +70,12 @@ class Verdict:
     adequate: bool | None
     unjudged: str = ""
 
+    @property
+    def named(self) -> bool:
+        """Whether something is found that the model lacks or the data spoils: in noise once in a thousand lots, by its bound."""
+        spoilt = bool(self.run.handled) or any(not dwell.tail for dwell in self.removed)
+        return spoilt or bool(self.result.added) or self.unexplained is not None
+
 
 def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
     """The verdict of a lot on a model.

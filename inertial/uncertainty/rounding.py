@@ -1,4 +1,4 @@
-"""Rounding of a value and its uncertainty for print (JCGM 100:2008, 7.2.6).
+"""Rounding for print: of a value and its uncertainty (JCGM 100:2008, 7.2.6), and of a probability.
 
 Commands that only print are to start quickly: this module imports no library of arrays.
 """
@@ -37,3 +37,20 @@ def _to(number: Decimal, place: int) -> Decimal:
 
 def _text(number: Decimal, place: int) -> str:
     return f"{number:.{max(-place, 0)}f}"
+
+
+LEAST_P = 1e-3
+"""Below this a p is a score: noise that no list has reaches it by chance more often than it says."""
+
+
+def chance(p: float | None) -> str:
+    """A probability of so bad an agreement, with two digits, and nothing smaller than :data:`LEAST_P`; empty for None."""
+    if p is None:
+        return ""
+    return f"< {LEAST_P:g}" if p < LEAST_P else f"{p:.2g}"
+
+
+def equal(p: float | None) -> str:
+    """The same with its sign."""
+    text = chance(p)
+    return text if text.startswith("<") else f"= {text}"

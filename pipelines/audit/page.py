@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inertial.uncertainty.rounding import chance
 from pipelines.audit import charts as drawn
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
 from pipelines.audit.finding import WHO
 from pipelines.audit.parameters import unit_text
 from pipelines.drawing import svg_text
-from pipelines.report.numbers import THIN, chance, significant
+from pipelines.report.numbers import THIN, significant
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:

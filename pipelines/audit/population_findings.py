@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from inertial.counts import number_of
+from inertial.uncertainty.rounding import equal
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
 from pipelines.audit.parameters import unit_text
@@ -64,7 +65,7 @@ def _different(audit: Audit) -> Iterator[AuditFinding]:
         if one.by != "lot" and one.p < DIFFERENT_P and one.comparison.effect > TELLING_EFFECT:
             message = (
                 f"{one.device}: {one.figure} differs between {one.by}s: {100 * one.comparison.effect:.0f} % of its variance, "
-                f"p = {one.p:.1g} over {one.comparison.groups} {one.by}s; find out which, and why"
+                f"p {equal(one.p)} over {one.comparison.groups} {one.by}s; find out which, and why"
             )
             who = "station" if one.by in {"station", "slot"} else "product"
             evidence = {"figure": one.figure, "by": one.by, "share": one.comparison.effect, "p_value": one.p}

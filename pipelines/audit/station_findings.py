@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial.counts import number_of
+from inertial.uncertainty.rounding import equal
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
 
@@ -94,7 +95,7 @@ def _standards(audit: Audit) -> Iterator[AuditFinding]:
                 f"{chart.station}: check standard {chart.standard}, {chart.parameter}: "
                 f"{number_of(chart.alarms, 'alarm')} on the control chart "
                 f"since {date_of(chart.day[first])}, {chart.expected:.1f} expected by chance "
-                f"(p = {chart.p_value:.1g}); measure the standard on another station to find which of the two has changed"
+                f"(p {equal(chart.p_value)}); measure the standard on another station to find which of the two has changed"
             )
             evidence = {"station": chart.station, "standard": chart.standard, "parameter": chart.parameter,
                         "first": date_of(chart.day[first]), "alarms": chart.alarms, "expected": chart.expected,

@@ -27,12 +27,15 @@ def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> 
 
     Parameters
     ----------
-    known : calibrations of the unit in the ledger, in order.
+    known : calibrations of the unit in the ledger, in order. One that was revoked after this was issued was good on that day:
+        the same certificate says the same whenever it is written.
     """
     before = [
         one
         for one in known
-        if one.event.sequence < calibration.event.sequence and one.run != run.id and one.state != "revoked"
+        if one.event.sequence < calibration.event.sequence
+        and one.run != run.id
+        and not (one.state == "revoked" and one.ended_by and one.ended_by.sequence < calibration.event.sequence)
     ]
     if not before:
         return Adjustment(earlier="", earlier_date="", text="no earlier calibration of this unit is in the archive")

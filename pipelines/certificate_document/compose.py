@@ -21,9 +21,11 @@ from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, stated_budget
 from pipelines.certificates.statement import stated
 from pipelines.stages.budget_rows import LABELS
+from pipelines.stages.contributions import left_out
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
 from schemas.errors import ArchiveUnusable, WrongUse
+from schemas.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
     from pipelines.archive import Run
@@ -39,7 +41,7 @@ QUANTITIES = {
     "scale_temperature": "temperature coefficient of sensitivity",
     "output": "corrected output, anywhere in the certified range",
     "bias_error": "error of the corrected output, verification (RMS)",
-    "verification_norm": "error of the norm of gravity, verification (RMS)",
+    "verification_norm": "error of the norm of gravity, verification (largest of the poses)",
     "bias_error_period": "error of the corrected output to be expected over the stated period (standard deviation)",
 }
 BUDGETS = ("bias", "scale", "output", "bias_error_period")
@@ -115,6 +117,8 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         adjustment=adjustment(run, calibration, known),
         amendment=_amendment(calibration, known),
         interval=_interval(calibration, agreed=budget["customer_agreed"]),
+        adequacy=event.adequacy,
+        left_out=_left_out(run),
         uncertainty_note=UNCERTAINTY,
         declaration=DECLARATION,
         software=f"Tumbleline {(about.get('software') or {}).get('tumbleline', 'version not known')}",
@@ -239,6 +243,14 @@ def _traceability(budget: StatedBudget, stated_entries: dict[str, Any]) -> str:
         return text
     named = ", ".join(rest).replace("_", " ")
     return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {named}."
+
+
+def _left_out(run: Run) -> str:
+    """The contributions that the statement of the references lacks: U counts them as zero."""
+    terms = run.manifest("budget")["parameters"].get("uncertainty") or {}
+    names = left_out(Uncertainty.model_validate(terms))
+    named = ", ".join(LABELS.get(name, name) for name in names)
+    return f"Not stated, and not contained in the uncertainties U: {named}." if names else ""
 
 
 def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:

@@ -122,6 +122,7 @@ class Amendment(Strict):
 class CertificateContent(Strict):
     """One certificate of one unit.
 
+    adequacy : verdict on the model with its p, as certified; left_out : contributions that U does not contain
     statement_rule : rule of decision; interval : empty unless the customer agreed to have one printed
     software : release that computed the results; coefficients_sha256 : of the certified table
     """
@@ -151,6 +152,8 @@ class CertificateContent(Strict):
     adjustment: Adjustment
     amendment: Amendment
     interval: str
+    adequacy: str
+    left_out: str
     uncertainty_note: str
     declaration: str
     software: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pipelines.certificate_document.numbers import si_unit
+from pipelines.certificate_document.numbers import least_of, si_unit
 from pipelines.certificate_document.schema_files import EXTRA, WHERE, validate
 from schemas.library import library
 
@@ -125,7 +125,9 @@ def statements_of(c: CertificateContent) -> list[str]:
         else "",
         c.declaration,
         c.uncertainty_note,
+        c.left_out,
         c.traceability,
+        f"Model of the fit, by its residuals: {c.adequacy}" if c.adequacy else "",
         f"Frame of the results: {c.frame}",
         f"Accreditation: {a.body}, {a.number}" if (a := c.who.laboratory.accreditation) is not None else "",
         f"Replaces certificate {', '.join(c.amendment.replaces)}; changed: {c.amendment.reason or 'reason not stated'}"
@@ -225,7 +227,8 @@ def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:
 
 def _conformity(w: _Writer, parent: Any, one: Conformity, c: CertificateContent) -> None:
     w.add(parent, "norm", one_line(c.decision_rule))
-    text = f"{one.figure}: limit {one.limit:g} {one.unit} of '{c.limits}', specific probability of false acceptance {one.pfa:.2g}"
+    limit = f"limit {one.limit:g} {one.unit} of '{c.limits}'"
+    text = f"{one.figure}: {limit}, specific probability of false acceptance {least_of(one.pfa)}"
     w.text(parent, "declaration", text)
     w.add(parent, "conformity", OUTCOMES.get(one.outcome, "noPass"))
 

@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 class FileCheckDocument(TypedDict):
     """One check of a file of a certificate."""
 
-    check: Literal["file", "attachment", "schema", "signature", "signer", "archive", "state", "origin"]
+    check: Literal["file", "attachment", "schema", "signature", "signer", "archive", "laboratory", "state", "origin"]
     state: Literal["good", "bad", "not checked"]
     message: str
 

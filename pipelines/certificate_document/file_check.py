@@ -17,7 +17,7 @@ from pipelines.certificate_document.signature_check import (
     pdf_signers,
     xml_signature,
 )
-from pipelines.certificate_document.signers import WHERE, Signer, not_trusted
+from pipelines.certificate_document.signers import WHERE, Signer, not_trusted, time_of
 from pipelines.certificate_document.xml_facts import CertificateFacts, facts_of
 from schemas.errors import WrongUse
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from cryptography.x509 import Certificate
 
     from pipelines.archive import Archive
+    from pipelines.certificate_document.laboratory import LaboratoryFile
 
 State = Literal["good", "bad", "not checked"]
 
@@ -73,11 +74,13 @@ class Against:
 
     trusted : certificates that vouch for signers; archive : None for the files alone
     demanded : whether the archive must know the certificate: it was named for this check
+    laboratory : the laboratory's file, which proves with the archive what the archive cannot know
     """
 
     trusted: Sequence[Certificate] = ()
     archive: Archive | None = None
     demanded: bool = False
+    laboratory: LaboratoryFile | None = None
 
 
 def check_file(path: Path, against: Against) -> CheckedFile:
@@ -98,7 +101,7 @@ def check_file(path: Path, against: Against) -> CheckedFile:
         done.add("file", "bad", str(problem))
         return done
     _schema(done, root)
-    _archive(done, against)
+    _archive(done, root, against)
     if done.facts.simulated:
         done.add("origin", "good", "SIMULATED: the certificate says that no device was measured")
     return done
@@ -139,7 +142,7 @@ def _signature(data: bytes, done: CheckedFile, against: Against) -> Any | None:
         done.add("signature", "bad", str(problem))
         return None
     done.add("signature", "good", f"the XML is as it was signed by {signer.name}")
-    _trust(done, [signer], against, root)
+    _trust(done, [signer], against)
     return root
 
 
@@ -158,7 +161,7 @@ def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
         if signers:
             names = ", ".join(one.name for one in signers)
             done.add("signature", "good", f"pages and attachment are as they were signed by {names}")
-            _trust(done, signers, against, root)
+            _trust(done, signers, against)
         else:
             done.add("signature", "not checked", "the PDF is not signed: nothing shows that its pages are unchanged")
     beside = done.path.with_suffix(".xml")
@@ -172,20 +175,19 @@ def _pdf(data: bytes, done: CheckedFile, against: Against) -> Any | None:
     return root
 
 
-def _trust(done: CheckedFile, signers: Sequence[Signer], against: Against, root: Any) -> None:
+def _trust(done: CheckedFile, signers: Sequence[Signer], against: Against) -> None:
     done.signers = [one.name for one in signers]
     if not against.trusted:
         done.add(
             "signer", "not checked", "no trusted certificate is given: anybody can sign in this name; give --trust FILE"
         )
         return
-    issued = facts_of(root).issued
     # the laboratory signs first; who receives the file may add a signature of their own
-    why = not_trusted(signers[0], against.trusted, issued)
+    why = not_trusted(signers[0], against.trusted)
     if why:
         done.add("signer", "bad", f"no certificate of --trust vouches for {signers[0].name}: {why}")
         return
-    done.add("signer", "good", f"a certificate of --trust vouches for {signers[0].name}")
+    done.add("signer", "good", f"a certificate of --trust vouches for {signers[0].name}; {time_of(signers[0])}")
     done.proven_by = (*done.proven_by, "signature")
 
 
@@ -207,13 +209,13 @@ def _schema(done: CheckedFile, root: Any) -> None:
         done.add("schema", "good", f"the XML is valid against DCC {VERSION}")
 
 
-def _archive(done: CheckedFile, against: Against) -> None:
+def _archive(done: CheckedFile, root: Any, against: Against) -> None:
     if against.archive is None or done.facts is None:
         done.add(
             "archive", "not checked", "without --archive: whether the certificate was revoked or replaced is not known"
         )
         return
-    compared, place = compare(done.facts, against.archive), against.archive.root
+    compared, place = compare(root, done.facts, against.archive, against.laboratory), against.archive.root
     if not compared.known:
         named = f"certificate {done.facts.number} of unit {done.facts.serial}"
         done.add("archive", "bad" if against.demanded else "not checked", f"archive {place} has no {named}")
@@ -225,8 +227,12 @@ def _archive(done: CheckedFile, against: Against) -> None:
     else:
         done.add("state", "good", compared.until or "neither revoked nor replaced, by the ledger of the archive")
     if compared.reason:
-        done.add("archive", "not checked", f"the numbers were not compared: {compared.reason}")
-    elif not compared.different:
-        done.add("archive", "good", f"{compared.count} numbers, dates and decisions are those of archive {place}")
-        if done.path.suffix.lower() != ".pdf":  # the pages of an unsigned PDF may say anything
-            done.proven_by = (*done.proven_by, "archive")
+        done.add("archive", "not checked", f"the document was not compared: {compared.reason}")
+        return
+    if compared.different:
+        return
+    done.add("archive", "good", f"{compared.count} texts and numbers are those of the document of archive {place}")
+    if compared.unproven:
+        done.add("laboratory", "not checked", f"not proven by the archive: {compared.unproven}")
+    elif done.path.suffix.lower() != ".pdf":  # the pages of an unsigned PDF may say anything
+        done.proven_by = (*done.proven_by, "archive")

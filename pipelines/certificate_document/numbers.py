@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from inertial.uncertainty.rounding import rounded as printed
 from schemas.units import STANDARD_GRAVITY_M_S2
 
 MINUS = "\N{MINUS SIGN}"
@@ -59,14 +60,6 @@ def _per(text: str, factor: float, below: str) -> SIUnit | None:
     return SIUnit(text.removeprefix(r"\one") or text, factor)
 
 
-def places_of(expanded: float) -> int:
-    """Decimal places with two significant digits of an uncertainty (JCGM 100, 7.2.6)."""
-    if not math.isfinite(expanded) or expanded <= 0.0:
-        return 3
-    places = 1 - math.floor(math.log10(expanded))
-    return places - 1 if round(expanded, places) >= 10.0 ** (2 - places) else places
-
-
 def rounded(value: float, places: int) -> str:
     """A number with so many decimal places; below zero places the digits that are not known are zeros."""
     text = f"{round(value, places):.{max(places, 0)}f}"
@@ -75,9 +68,8 @@ def rounded(value: float, places: int) -> str:
 
 def with_uncertainty(value: float | None, expanded: float) -> tuple[str, str]:
     """A value and its U as they are printed: U with two digits, the value to the same place."""
-    places = places_of(expanded)
-    shown = rounded(expanded, places)
-    return ("" if value is None else rounded(value, places)), shown
+    shown, u = (text.replace("-", MINUS) for text in printed(0.0 if value is None else value, expanded))
+    return ("" if value is None else shown), u
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -92,6 +84,15 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:.{digits - 1}e}".replace("-", MINUS)
 
 
+LEAST = 1e-4
+"""A smaller probability of false acceptance says more of the tail of a normal distribution than of the item."""
+
+
 def probability(value: float) -> str:
     """A probability in percent; never below what is worth saying."""
-    return "< 0.01 %" if value < 1e-4 else f"{100.0 * value:.2g} %"
+    return "< 0.01 %" if value < LEAST else f"{100.0 * value:.2g} %"
+
+
+def least_of(value: float) -> str:
+    """The same as a number."""
+    return f"< {LEAST:.0e}".replace("e-0", "e-") if value < LEAST else f"{value:.2g}"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
+from pipelines.certificate_document.content import Contribution
 from pipelines.certificate_document.numbers import probability, rounded, significant, with_uncertainty
 
 if TYPE_CHECKING:
     from pipelines.certificate_document.content import Adjustment, CertificateContent
+
+SMALLEST_SHARE = 5e-4  # of a row of a budget: less is printed as 0.0 %
 
 PREVAILS = (
     "The same results are attached to this file as certificate.xml (Digital Calibration Certificate 3.0.0). The attached XML "
@@ -86,6 +90,7 @@ def _parts(c: CertificateContent) -> list[dict[str, Any]]:
     deviations = c.who.method.deviations or "none stated"
     return [
         {"title": "Method", "before": [c.method], "facts": [["Evaluated by", ", ".join(c.norms)], ["Deviations", deviations],
+         *([["Model of the fit", c.adequacy]] if c.adequacy else []),
          ["Software", c.software], ["Record", f"run {c.run}"]]},
         {"title": "Conditions", "facts": [[one.name.capitalize(), _span(one.low, one.high, one.unit)] for one in c.conditions]},
         _references(c),
@@ -141,6 +146,7 @@ def _results(c: CertificateContent) -> dict[str, Any]:
     table = _table("", heads, rows, [1, "auto", "auto", "auto", "auto", "auto"], [2, 3, 5])
     after = [
         c.uncertainty_note,
+        *([c.left_out] if c.left_out else []),
         f"Frame: {c.frame}. 1 g = 9.80665 m/s². Of the corrected output the uncertainty alone is stated.",
     ]
     return {"title": "Results", "tables": [table], "after": after}  # fmt: skip
@@ -177,6 +183,23 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
     return {"title": "Conformity", "before": before, "tables": [table]}  # fmt: skip
 
 
+def _folded(rows: tuple[Contribution, ...]) -> list[Contribution]:
+    """The rows of a budget, those that would be printed with a share of 0.0 % as one."""
+    small = [row for row in rows if row.share < SMALLEST_SHARE]
+    if len(small) < 2:
+        return list(rows)
+    others = Contribution(
+        name=f"{len(small)} others, each below {100.0 * SMALLEST_SHARE:g} %",
+        type="",
+        distribution="",
+        u=math.hypot(*(row.u for row in small)),
+        unit=small[0].unit,
+        share=sum(row.share for row in small),
+        source=", ".join(row.name for row in small),
+    )
+    return [*(row for row in rows if row.share >= SMALLEST_SHARE), others]
+
+
 def _budgets(c: CertificateContent) -> dict[str, Any]:
     tables = []
     for one in c.budgets:
@@ -189,7 +212,7 @@ def _budgets(c: CertificateContent) -> dict[str, Any]:
                 f"{100.0 * row.share:.1f} %",
                 row.source,
             ]
-            for row in one.rows
+            for row in _folded(one.rows)
         ]
         head = f"{one.quantity}: {significant(one.u, 2) if one.k is None else f'u = {significant(one.u)}'} {one.unit}"
         if one.k is not None and one.expanded is not None:

@@ -72,7 +72,10 @@ def xml_signature(data: bytes) -> tuple[Signer, Any]:
     if not named:
         raise SignatureBroken("the signature names no certificate of its signer")
     pem = named[0].public_bytes(Encoding.PEM).decode()
-    expected = signxml.SignatureConfiguration(location="./", require_x509=True)
+    # whether the certificate is valid today is decided with whom to trust, for XML and PDF alike
+    expected = signxml.SignatureConfiguration(
+        location="./", require_x509=True, verification_time=named[0].not_valid_after_utc
+    )
     try:
         good = signxml.XMLVerifier().verify(root, x509_cert=pem, expect_config=expected)
     except Exception as problem:  # noqa: BLE001 - a file of others may break any part of the reader

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -61,31 +60,31 @@ def read_trusted(paths: Sequence[Path]) -> tuple[Certificate, ...]:
     return tuple(trusted)
 
 
-def not_trusted(signer: Signer, trusted: Sequence[Certificate], issued: str) -> str:
-    """Why none of the trusted certificates vouches for a signer; empty where one does.
+def not_trusted(signer: Signer, trusted: Sequence[Certificate]) -> str:
+    """Why none of the trusted certificates vouches for a signer today; empty where one does.
 
-    A certificate that is among the trusted ones vouches for itself. Any other must lead to one of them, on the day of the
-    check or, where it has expired since, at the time that the signature or the document states.
-
-    Parameters
-    ----------
-    issued : date of issue that the document states, ISO; may be empty.
+    A certificate that is among the trusted ones vouches for itself, any other must lead to one of them. It has to be valid on the
+    day of the check: whoever has the key of an expired one can state any time of signing.
     """
-    own = signer.certificate
-    if any(own == one for one in trusted):
+    now, own = datetime.now(UTC), signer.certificate
+    if outside := not_valid(own, now):
+        return f"{outside}, and nothing proves that it was signed before: {time_of(signer)}"
+    return "" if any(own == one for one in trusted) else _path_problem(signer, trusted, now)
+
+
+def not_valid(one: Certificate, now: datetime) -> str:
+    """Why a certificate is not valid at a time; empty where it is."""
+    first, last = one.not_valid_before_utc, one.not_valid_after_utc
+    if first <= now <= last:
         return ""
-    moment = _moment(signer, issued)
-    if moment is None:
-        return f"the signer's certificate is valid from {own.not_valid_before_utc:%Y-%m-%d} to {own.not_valid_after_utc:%Y-%m-%d}"
-    return _path_problem(signer, trusted, moment)
+    return f"the certificate is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, not on {now:%Y-%m-%d}"
 
 
-def _moment(signer: Signer, issued: str) -> datetime | None:
-    """A time at which the signer's certificate is valid: now, else the time of the signature or of the issue."""
-    own = signer.certificate
-    stated = [datetime.fromisoformat(issued).replace(tzinfo=UTC)] if re.fullmatch(r"\d{4}-\d\d-\d\d", issued) else []
-    times = [datetime.now(UTC), *([signer.when] if signer.when is not None else []), *stated]
-    return next((time for time in times if own.not_valid_before_utc <= time <= own.not_valid_after_utc), None)
+def time_of(signer: Signer) -> str:
+    """What is known of the time of signing: no time stamp of others is written or read here."""
+    if signer.when is None:
+        return "the signature states no time and has no time stamp"
+    return f"the time of signing, {signer.when:%Y-%m-%d %H:%M} UTC, is the signer's own statement, without a time stamp"
 
 
 def _path_problem(signer: Signer, trusted: Sequence[Certificate], moment: datetime) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509 import Certificate, load_pem_x509_certificates
 
 from pipelines.certificate_document.schema_files import WHERE
+from pipelines.certificate_document.signers import not_valid
 from schemas.errors import WrongUse
 from schemas.library import library
 
@@ -42,7 +44,7 @@ def read_key(path: Path, password_file: Path | None = None) -> SigningKey:
     Raises
     ------
     WrongUse
-        It cannot be read, the password is missing or wrong, or there is no certificate beside the key.
+        It cannot be read, the password is missing or wrong, there is no certificate beside the key, or it is not valid today.
     """
     try:
         data = path.read_bytes()
@@ -67,6 +69,12 @@ def read_key(path: Path, password_file: Path | None = None) -> SigningKey:
         raise WrongUse(
             f"--sign-with: {path}: the first certificate is not that of the key; put the key's own certificate first"
         )
+    for one in (own, *chain):
+        if outside := not_valid(one, datetime.now(UTC)):
+            raise WrongUse(
+                f"--sign-with: {path}: {outside} ({one.subject.rfc4514_string()}); nothing was signed: renew it, and give "
+                "the new file"
+            )
     return SigningKey(key, own, tuple(chain))
 
 

@@ -1,16 +1,13 @@
-"""What the XML of a certificate states: its number, unit, run, dates and results."""
+"""What the XML of a certificate states: its number, unit, run and dates."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.certificate_document.dcc import DCC, SI
 from pipelines.certificate_document.signature_check import SignatureBroken
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 SPACES = {"dcc": DCC, "si": SI}
 ISSUED = re.compile(r"^Date of issue: (\d{4}-\d\d-\d\d)$")
@@ -21,9 +18,7 @@ COEFFICIENTS = re.compile(r"^SHA-256 of the table of coefficients: ([0-9a-f]{64}
 class CertificateFacts:
     """Statements of a certificate's XML; empty where it does not make them.
 
-    measured : first and last day; coefficients : SHA-256 of the certified table
-    numbers : by name of the result, quantity and label: value, unit, expanded uncertainty and k as text
-    conformity : by declaration: the decision
+    coefficients : SHA-256 of the certified table
     """
 
     version: str
@@ -31,11 +26,8 @@ class CertificateFacts:
     serial: str
     run: str
     issued: str
-    measured: tuple[str, str]
     coefficients: str
     simulated: bool
-    numbers: Mapping[str, tuple[str, ...]]
-    conformity: Mapping[str, str]
 
 
 def facts_of(root: Any) -> CertificateFacts:
@@ -48,7 +40,7 @@ def facts_of(root: Any) -> CertificateFacts:
     """
     if root.tag != f"{{{DCC}}}digitalCalibrationCertificate":
         raise SignatureBroken(f"it is not a Digital Calibration Certificate: its root element is {root.tag}")
-    said = [text.strip() for text in _all(root, "//dcc:statement/dcc:declaration/dcc:content/text()")]
+    said = [text.strip() for text in statements(root)]
     core = "/*/dcc:administrativeData/dcc:coreData"
     run = f"{core}/dcc:identifications/dcc:identification[dcc:name/dcc:content='run']/dcc:value/text()"
     serial = (
@@ -57,49 +49,28 @@ def facts_of(root: Any) -> CertificateFacts:
     )
     return CertificateFacts(
         version=root.get("schemaVersion", ""),
-        number=_first(root, f"{core}/dcc:uniqueIdentifier/text()"),
-        serial=_first(root, serial),
-        run=_first(root, run),
+        number=first(root, f"{core}/dcc:uniqueIdentifier/text()"),
+        serial=first(root, serial),
+        run=first(root, run),
         issued=_matched(ISSUED, said),
-        measured=(
-            _first(root, f"{core}/dcc:beginPerformanceDate/text()"),
-            _first(root, f"{core}/dcc:endPerformanceDate/text()"),
-        ),
         coefficients=_matched(COEFFICIENTS, said),
         simulated=any(text.startswith("SIMULATED") for text in said),
-        numbers=_numbers(root),
-        conformity={
-            _first(one, "dcc:declaration/dcc:content/text()"): _first(one, "dcc:conformity/text()")
-            for one in _all(root, "//dcc:metaData[dcc:conformity]")
-        },
     )
 
 
-def _all(root: Any, path: str) -> list[Any]:
-    return list(root.xpath(path, namespaces=SPACES))
+def statements(root: Any) -> list[str]:
+    """What a document declares beside its results."""
+    return _all(root, "//dcc:statement/dcc:declaration/dcc:content/text()")
 
 
-def _first(root: Any, path: str) -> str:
-    return next((str(text) for text in _all(root, path)), "")
+def _all(root: Any, path: str) -> list[str]:
+    return [str(text) for text in root.xpath(path, namespaces=SPACES)]
+
+
+def first(root: Any, path: str) -> str:
+    """The first text at a path; empty where there is none."""
+    return next(iter(_all(root, path)), "")
 
 
 def _matched(pattern: re.Pattern[str], lines: list[str]) -> str:
     return next((match[1] for line in lines if (match := pattern.match(line))), "")
-
-
-def _numbers(root: Any) -> dict[str, tuple[str, ...]]:
-    numbers: dict[str, tuple[str, ...]] = {}
-    for result in _all(root, "//dcc:result"):
-        head = _first(result, "dcc:name/dcc:content/text()")
-        for real in _all(result, ".//si:real"):
-            quantity = _first(real, "../dcc:name/dcc:content/text()")
-            own = [part for part in (head, quantity, _first(real, "si:label/text()")) if part]
-            key, count = "; ".join(own), 1
-            while key in numbers:  # a second number of the same name does not hide the first
-                count += 1
-                key = f"{'; '.join(own)} ({count})"
-            numbers[key] = tuple(
-                _first(real, f"{path}/text()")
-                for path in ("si:value", "si:unit", "si:expandedUnc/si:uncertainty", "si:expandedUnc/si:coverageFactor")
-            )
-    return numbers

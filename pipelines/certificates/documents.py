@@ -28,6 +28,7 @@ LedgerEntryDocument = TypedDict(
         "evidence": Annotated[
             dict[str, str], "SHA-256 of the manifests of the run that support the decision, by table"
         ],
+        "adequacy": Annotated[str, "verdict on the model with its p; empty in entries of earlier versions"],
         "schema": int,
     },
 )

@@ -29,6 +29,7 @@ class LedgerEntry:
     coefficients : hash of the table of coefficients.
     evidence : hashes of the manifests of the run that support the decision, by table.
     previous : hash of the file of the unit's previous event; empty for the first.
+    adequacy : verdict on the run's model with its p, as it was certified; empty in events of earlier versions.
     """
 
     serial: str
@@ -49,6 +50,7 @@ class LedgerEntry:
     reason: str
     previous: str
     evidence: tuple[tuple[str, str], ...] = ()
+    adequacy: str = ""
 
     @property
     def certificate(self) -> str:
@@ -77,7 +79,8 @@ def event_of(content: Mapping[str, Any], where: str) -> LedgerEntry:
         raise ArchiveUnusable(
             f"calibrations: {where} has schema {schema}, this version knows up to {SCHEMA}; use a newer version"
         )
-    known = {("start" if name == "from" else name): value for name, value in content.items()}
+    known: dict[str, Any] = {"adequacy": ""}  # events of earlier versions have none
+    known |= {("start" if name == "from" else name): value for name, value in content.items()}
     missing = sorted(_NAMES - known.keys())
     if missing or known["action"] not in get_args(Action):
         fault = f"no {missing[0]}" if missing else f"action {known['action']!r}"

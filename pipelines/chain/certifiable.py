@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from inertial.criticism.decisions import ADEQUATE_ABOVE
+from inertial.probability import passes
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
+from inertial.uncertainty.rounding import equal
 from pipelines.archive import Archive, Run
 from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.measured import END, measured_span
 from pipelines.integrity import verify
+from pipelines.jobs.adequacy import adequacy_of
 from pipelines.jobs.terms import archived_terms
 from pipelines.stages.grade import BUDGET
 from schemas.errors import ArchiveUnusable, WrongUse
+from schemas.limits import ADEQUACY_P_MIN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,12 +24,13 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     from pipelines.certificates.ledger import Ledger
+    from pipelines.stages.budget_terms import BudgetTerms
 
-NEVER_LEFT_OUT = ("gravity", "level", "orthogonality", "outer_offset", "harmonics", "pose", "thermometer")
-"""Entries of [uncertainty] without which nothing is certified; without the seat the misalignment to the case is not."""
-NEEDED_OF_FACES = ("gravity", "level", "pose", "thermometer")
+NEEDED_OF_TABLE = ("gravity", "level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose", "reader")
+"""Entries of [uncertainty] without which nothing is certified that a table turned."""
+NEEDED_OF_FACES = ("gravity", "level", "pose", "reader")
 """The same for an import whose units were put down on known faces: there are no encoders."""
-NEEDED_OF_NORMS = ("gravity", "thermometer")
+NEEDED_OF_NORMS = ("gravity", "reader")
 """The same for an import of unknown orientations: the norm of gravity does not depend on the poses."""
 
 
@@ -74,22 +80,56 @@ def refuse_overdue(run: Run) -> None:
             )
 
 
-def refuse_inadequate_import(run: Run) -> None:
-    """Refuse an import whose model is not adequate, or cannot be judged: none of its poses was kept to verify it with."""
-    about = run.about
-    if about.get("capture") or "dwells" not in run.tables():
-        return
+def refuse_inadequate(run: Run) -> str:
+    """The verdict on a run's model for its certificate; refused are runs whose verdict their limits do not allow.
+
+    Captured and imported runs are judged alike. At the 5 % of a verdict one good lot in twenty is not adequate by chance, so a
+    p of at least ``adequacy_p_min`` of the limits passes. Where what is missing is found, it is not by chance: noise alone shows
+    such a finding in one lot of a thousand. (A p that is drawn is never below 0.01, whatever the model lacks.)
+    """
+    judged = _verdict(run)
+    if judged is None:
+        return ""
+    adequate, reason, p, named = judged
+    least = float((run.about.get("limits") or {}).get("adequacy_p_min") or ADEQUACY_P_MIN)
+    see = f"see 'tumbleline diagnose {run.id}'"
+    if adequate is None or p is None:
+        raise WrongUse(
+            f"certify: the model of run {run.id} cannot be judged ({reason}), an adequate one is needed; {see}"
+        )
+    if not adequate and named:
+        raise WrongUse(
+            f"certify: the model of run {run.id} is NOT ADEQUATE (p {equal(p)}), and what it lacks is found, a model with it is "
+            f"needed; {see}"
+        )
+    if not passes(p, least):
+        raise WrongUse(
+            f"certify: the model of run {run.id} is NOT ADEQUATE (p {equal(p)}), p of at least {least:g} is needed "
+            f"(adequacy_p_min of the limits); {see}"
+        )
+    if adequate:
+        return f"ADEQUATE (p {equal(p)})"
+    level = f"NOT ADEQUATE at the level of {100.0 * ADEQUATE_ABOVE:g} % (p {equal(p)})"
+    return f"{level}; certified, as nothing is found that it lacks and p is at least {least:g}"
+
+
+def _verdict(run: Run) -> tuple[bool | None, str | None, float | None, bool] | None:
+    """Whether a run's model is adequate, why that cannot be told, its p, and whether what it lacks is found.
+
+    None where there is nothing to judge.
+    """
+    if run.about.get("capture"):
+        own = adequacy_of(run)
+        return None if own is None else (own["adequate"], own["reason"], own["p_value"], own["named"])
+    if "dwells" not in run.tables():
+        return None
     from pipelines.diagnosis.diagnose import diagnose  # loads the search for effects, which captured runs do not need
 
     past = run.table("history") if "history" in run.tables() else None
-    effects = list((about.get("recipe") or {}).get("effects", ()))
+    effects = list((run.about.get("recipe") or {}).get("effects", ()))
     verdict = diagnose(run.table("dwells"), past, effects or None)
-    if verdict["adequate"] is not True:
-        why = f"cannot be judged ({verdict['reason']})" if verdict["adequate"] is None else "is not adequate"
-        raise WrongUse(
-            f"certify: run {run.id} was imported and its model {why}, an adequate one is needed; see 'tumbleline diagnose "
-            f"{run.id}'"
-        )
+    named = bool(verdict["classes"] or verdict["unexplained"] or verdict["removed"])
+    return verdict["adequate"], verdict["reason"], verdict["error"]["p_value"], named
 
 
 def refuse_unstated(run: Run) -> None:
@@ -113,11 +153,13 @@ def refuse_unstated(run: Run) -> None:
             f'certify: run {run.id} rests on assumed uncertainties (grade_source = "assumed"), certificates or data sheets are '
             "needed; state where the figures of [uncertainty] come from and measure again"
         )
-    needed, again = _needed(run)
-    missing = {name: rules for name, rules in terms.stated.not_stated.items() if name in needed}
+    needed, again = _needed(run, terms)
+    missing = {name: rules for name, rules in terms.stated.not_stated.items() if name.split()[0] in needed}
     if missing:
         listed = ", ".join(f"{name} (dominates {rules})" for name, rules in missing.items())
-        raise WrongUse(f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] and {again}")
+        raise WrongUse(
+            f"certify: run {run.id}: not stated: {listed}; add it to [uncertainty] (a 0 needs exact = true) and {again}"
+        )
     if not run.table("uncertainties")["quantity"].eq("bias_error_period").any():
         kept = "verification poses" if run.about.get("capture") else "dwells held out by --verify N"
         raise WrongUse(
@@ -126,15 +168,23 @@ def refuse_unstated(run: Run) -> None:
         )
 
 
-def _needed(run: Run) -> tuple[tuple[str, ...], str]:
-    """Entries of [uncertainty] without which a run is not certified, and what is to be done where one is missing."""
-    if run.about.get("capture"):
-        return NEVER_LEFT_OUT, "measure again"
-    columns = set(run.table("dwells").columns)
-    again = "import the recording again"
-    if set(ANGLE_COLUMNS) <= columns:
-        return NEVER_LEFT_OUT, again
-    return NEEDED_OF_FACES if set(FORCE_COLUMNS) <= columns else NEEDED_OF_NORMS, again
+def _needed(run: Run, terms: BudgetTerms) -> tuple[tuple[str, ...], str]:
+    """Entries of [uncertainty] that the run's results depend on, and what is to be done where one is missing."""
+    captured, columns = bool(run.about.get("capture")), set(run.table("dwells").columns)
+    again = "measure again" if captured else "import the recording again"
+    needed: list[str] = list(NEEDED_OF_TABLE)
+    if not captured and not set(ANGLE_COLUMNS) <= columns:
+        needed = list(NEEDED_OF_FACES if set(FORCE_COLUMNS) <= columns else NEEDED_OF_NORMS)
+    to_fixture = run.table("coefficients")["effect"].eq("misalignment").any()  # it is a result in either frame
+    if "level" in needed and (to_fixture or terms.certificate.frame == "fixture"):
+        needed.append("seat")
+    if terms.stability is not None and terms.stability.ratiometric > 0.0:
+        needed.append("supply")
+    if not terms.reads_own_temperature:
+        needed += ["thermometer", "gradient", *(["settling"] if captured else [])]
+    elif terms.stated is not None and terms.stated.thermometer is None:
+        needed.append("thermometer")
+    return tuple(needed), again
 
 
 def refuse_two_at_once(ledger: Ledger, run: Run, serial: str) -> None:

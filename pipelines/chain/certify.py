@@ -13,7 +13,7 @@ from pipelines.certificates.entries import FOLDER, LedgerEntry
 from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
 from pipelines.chain.certifiable import (
-    refuse_inadequate_import,
+    refuse_inadequate,
     refuse_meanwhile,
     refuse_overdue,
     refuse_two_at_once,
@@ -114,7 +114,7 @@ def _proposals(
     """What is to be certified, and what is not with the reason; a named unit that may not be is refused."""
     grades = {str(row["unit"]): row for row in rows_of(_grades(run))}
     refuse_overdue(run)
-    refuse_inadequate_import(run)
+    adequacy = refuse_inadequate(run)
     refuse_unstated(run)
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
@@ -122,7 +122,7 @@ def _proposals(
     shared: dict[str, Any] = {
         "device": about["lot"]["device"], "run": run.id, "start": first, "until": last, "station": station,
         "recipe": about["recipe"]["name"], "coefficients": run.manifest("coefficients")["sha256"], "reason": reason,
-        "evidence": evidence,
+        "evidence": evidence, "adequacy": adequacy,
     }  # fmt: skip
     proposals: list[LedgerEntry] = []
     for serial in units or tuple(grades):

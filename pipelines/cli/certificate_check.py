@@ -41,12 +41,16 @@ def certificate_files(names: Sequence[str]) -> list[Path]:
     return files
 
 
-def check_certificates(files: Sequence[Path], trust: Sequence[Path], archive: str | None, *, as_json: bool) -> bool:
+def check_certificates(
+    files: Sequence[Path], trust: Sequence[Path], archive: str | None, laboratory: Path | None, *, as_json: bool
+) -> bool:
     """Check files of certificates and print the result; whether all are accepted."""
     from pipelines.certificate_document.file_check import Against, check_file
+    from pipelines.certificate_document.laboratory import read_laboratory
     from pipelines.certificate_document.signers import read_trusted
 
-    against = Against(read_trusted(trust), _archive(archive), demanded=archive is not None)
+    who = None if laboratory is None else read_laboratory(laboratory)
+    against = Against(read_trusted(trust), _archive(archive), archive is not None, who)
     done = [check_file(path, against) for path in files]
     accepted = all(one.accepted for one in done)
     if as_json:
@@ -113,4 +117,6 @@ def _needed(one: CheckedFile) -> str:
     signed = any(check.check == "signature" and check.state == "good" for check in one.checks)
     if one.path.suffix.lower() == ".pdf" and not signed:
         return "the pages of an unsigned PDF cannot be proven: give its XML with --archive, or ask for a signed PDF"
-    return "give --trust FILE with the certificate of the laboratory's key, or --archive"
+    if any(check.check == "laboratory" for check in one.checks):
+        return "names and addresses are not proven by the archive: give --laboratory FILE, or --trust for its signature"
+    return "give --trust FILE with the certificate of the laboratory's key, or --archive with --laboratory"

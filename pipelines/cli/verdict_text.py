@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from inertial.uncertainty.rounding import equal
 from pipelines.cli.options import short
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
@@ -60,18 +61,3 @@ def class_text(group: dict[str, Any]) -> str:
     units, dwells = group.get("units") or [], group.get("dwells") or []
     where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
     return f"{' or '.join(group['effects'])} ({where})"
-
-
-def chance(p: float | None) -> str:
-    """A probability for people."""
-    if p is None:
-        return ""
-    if p <= 1e-299:
-        return "< 1e-299"
-    return short(p, 2) if p > 1e-3 else f"{p:.0e}"
-
-
-def equal(p: float) -> str:
-    """A probability with its sign: equal, or below the smallest value that is printed."""
-    text = chance(p)
-    return text if text.startswith("<") else f"= {text}"

@@ -41,6 +41,14 @@ def command(
             help="Certificate of a laboratory's key, or of its authority, that vouches for the signatures of FILE.",
         ),
     ] = None,
+    laboratory: Annotated[
+        Path | None,
+        typer.Option(
+            "--laboratory",
+            metavar="FILE.toml",
+            help="The laboratory's file, as for 'certificate': with --archive it proves names and addresses of FILE.",
+        ),
+    ] = None,
     key: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,9 +67,9 @@ def command(
 ) -> None:
     """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 
-    Files of certificates are checked alone: form, schema, signatures, attachment. --trust decides who may sign, --archive
-    compares numbers with the archive and finds revoked and replaced certificates. Exit status 1: there are findings, or nothing
-    proves where a certificate comes from.
+    Files of certificates are checked alone: form, schema, signatures, attachment. --trust decides who may sign. With --archive
+    the XML is made again from the archive and compared whole, and revoked and replaced certificates are found. Exit status 1:
+    there are findings, or nothing proves where a certificate comes from.
     """
     from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
@@ -71,11 +79,12 @@ def command(
     from schemas.errors import WrongUse
 
     if files := certificate_files(runs or ()):
-        accepted = check_certificates(files, trust or (), archive, as_json=as_json)
+        accepted = check_certificates(files, trust or (), archive, laboratory, as_json=as_json)
         raise typer.Exit(DONE if accepted else PART_FAILED)
-    if trust:
+    if trust or laboratory:
         raise WrongUse(
-            "--trust: no file of a certificate is given, one is needed; give FILE.pdf or FILE.xml, or leave it out"
+            f"{'--trust' if trust else '--laboratory'}: no file of a certificate is given, one is needed; give FILE.pdf or "
+            "FILE.xml, or leave it out"
         )
     store = Archive(archive)
     store.refuse_none()

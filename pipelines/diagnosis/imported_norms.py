@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from inertial.counts import degrees_of_freedom
 from inertial.state import T_REFERENCE
+from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.stages.norm_fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
@@ -159,7 +160,7 @@ def _noise_line(error: dict[str, Any], count: int) -> str:
     """Noise floor and probability; for a long record judged by a part of its dwells also the residual of that part."""
     white = "" if error.get("white_noise_ug") is None else f" (white noise alone {error['white_noise_ug']:.1f} µg)"
     judged = f"; judged by {MOST} of the dwells, residual {error['rms_ug']:.1f} µg" if count > MOST else ""
-    return f"noise floor between dwells {error['floor_ug']:.1f} µg{white}; p = {error['p_value']:.2g}{judged}"
+    return f"noise floor between dwells {error['floor_ug']:.1f} µg{white}; p {equal(error['p_value'])}{judged}"
 
 
 def _evidence_line(done: FittedNorms, smaller: FittedNorms | None, evidence: dict[str, Any], out_unit: str) -> str:

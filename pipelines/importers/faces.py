@@ -8,6 +8,7 @@ import numpy as np
 
 from inertial.fits.ferraris import Faces, faces, ferraris
 from inertial.probability import passes
+from inertial.uncertainty.rounding import equal
 from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
 from pipelines.importers.mapping import FACES
 from schemas.errors import DataRejected
@@ -123,7 +124,7 @@ def _face_line(k: int, fit: Faces, published: float, unit: str) -> str:
     misfit = f"lack of fit {fit.rms[k]:.3g}"
     if not np.isfinite(fit.p_value[k]):
         return f"{bias}; {misfit} {unit}"
-    return f"{bias}; {misfit}, the samples allow {fit.pure_error[k]:.2g} {unit} (p = {fit.p_value[k]:.1g})"
+    return f"{bias}; {misfit}, the samples allow {fit.pure_error[k]:.2g} {unit} (p {equal(fit.p_value[k])})"
 
 
 def _face_coefficients(unit: str, fit: Faces, data: Imported) -> list[dict[str, Any]]:

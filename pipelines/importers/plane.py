@@ -10,6 +10,7 @@ from inertial.counts import number_of
 from inertial.errors import NotIdentified
 from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm, inside_of, plane_across, quiet_axis
 from inertial.probability import passes
+from inertial.uncertainty.rounding import equal
 from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
 from pipelines.tables.dwells import measured
 from schemas.errors import DataRejected
@@ -185,7 +186,7 @@ def _opened(fit: PlaneFit, *, known: bool) -> list[str]:
 
 def _head(fit: PlaneFit) -> str:
     i, j = (AXES[k] for k in fit.inside)
-    p = f"harmonics of the angle: p = {fit.p_value:.2g}"
+    p = f"harmonics of the angle: p {equal(fit.p_value)}"
     axes = f"turned about {AXES[fit.across]}: {i} and {j} are calibrated in their plane"
     return f"{axes}; residual {MICRO * fit.rms:.1f} µg rms, {p}"
 

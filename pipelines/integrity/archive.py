@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import Archive, Run
+from pipelines.archive.listing import SEALED
+from pipelines.archive.records import COMPLETE
 from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath
 from pipelines.integrity.caches import check_ledger_index, check_list
@@ -90,7 +92,10 @@ def verify(
     also: Sequence[Callable[[Archive, VerifiedPart], None]] = (),
     progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Report:
-    """Verify an archive.
+    """Verify an archive. While something in it is being written, only what two readings find is told.
+
+    A record that was stored between two looks at its capture is no finding, and neither is a seal that is newer than the chain
+    that was read.
 
     Parameters
     ----------
@@ -100,6 +105,39 @@ def verify(
     head : hash of an entry of the chain from a copy kept elsewhere.
     also : further checks of the whole archive, of tables that this package does not know.
     """
+    open_still = _being_written(archive, runs)
+
+    def looked() -> Report:
+        return _verified(archive, runs, keys, demanded=demanded, head=head, also=also, progress=progress)
+
+    report = looked()
+    if not (report.checked.findings and open_still):
+        return report
+    first, report = {(one.kind, one.path) for one in report.checked.findings}, looked()
+    report.checked.findings = [one for one in report.checked.findings if (one.kind, one.path) in first]
+    return report
+
+
+def _being_written(archive: Archive, runs: Sequence[str]) -> bool:
+    """Whether a capture is not finished or a run not sealed: their writers may be at work."""
+    chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
+    captures = _below(archive.root / "captures") if not runs else []
+    return any(not (one.path / SEALED).is_file() for one in chosen) or any(
+        not (path / COMPLETE).is_file() for path in captures
+    )
+
+
+def _verified(
+    archive: Archive,
+    runs: Sequence[str],
+    keys: Mapping[str, Ed25519PublicKey],
+    *,
+    demanded: bool,
+    head: str,
+    also: Sequence[Callable[[Archive, VerifiedPart], None]],
+    progress: Callable[[int, int], None],
+) -> Report:
+    """One reading of an archive."""
     from schemas import tables
 
     start, total = time.perf_counter(), VerifiedPart(archive.root, keys)

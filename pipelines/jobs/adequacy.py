@@ -30,6 +30,7 @@ class AdequacyDocument(TypedDict):
     rms_ug: Annotated[float | None, "root mean square residual of the units without a data fault, µg"]
     floor_ug: Annotated[float | None, "noise of the measurement: white noise and wander between the dwells, µg"]
     p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
+    named: Annotated[bool, "whether an effect, a driver or an error of handling is found that the model lacks"]
     units: Annotated[int, "number of units that were judged"]
     faulty: Annotated[list[str], "units that were left out because of a data fault"]
 
@@ -95,6 +96,7 @@ def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequen
         "rms_ug": error["rms_ug"],
         "floor_ug": error["floor_ug"],
         "p_value": error["p_value"],
+        "named": verdict.named,
         "units": len(measurement.units) - len(faulty),
         "faulty": faulty,
     }
@@ -107,6 +109,7 @@ def _not_judged(reason: str, faulty: Sequence[str] = ()) -> AdequacyDocument:
         "rms_ug": None,
         "floor_ug": None,
         "p_value": None,
+        "named": False,
         "units": 0,
         "faulty": list(faulty),
     }

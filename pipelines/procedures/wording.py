@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from inertial.counts import degrees_of_freedom
 from inertial.dynamics.goodness import adequate, p_value
+from inertial.uncertainty.rounding import equal, rounded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,18 +15,16 @@ if TYPE_CHECKING:
     from inertial.dynamics.goodness import Fitted
 
 MINUS = "−"
-SMALLEST = 1e-99  # a smaller probability is below what a distribution's tail means
+SMALLEST_FIXED, LARGEST_FIXED = 1e-5, 1e8  # of U in fixed notation
 
 
 def with_uncertainty(value: float, expanded: float) -> str:
     """``value ± U``, U to two digits and the value to the same place (GUM 7.2.6)."""
     if not math.isfinite(expanded) or expanded <= 0.0:
         return f"{value:.4g}".replace("-", MINUS)
-    places = 1 - math.floor(math.log10(expanded))
-    if abs(places) > 6:
+    if not SMALLEST_FIXED <= expanded < LARGEST_FIXED:
         return f"{value:.3e} ± {expanded:.1e}".replace("-", MINUS)
-    shown = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, expanded))
-    return " ± ".join(shown).replace("-", MINUS)
+    return " ± ".join(rounded(value, expanded)).replace("-", MINUS)
 
 
 def verdict_of(fit: Fitted) -> str:
@@ -53,5 +52,5 @@ def signed(value: float, places: int) -> str:
 
 
 def probability(p: float) -> str:
-    """A probability with its sign: ``p = 0.68``, ``p < 1e−99``."""
-    return f"p < {SMALLEST:.0e}".replace("-", MINUS) if p < SMALLEST else f"p = {p:.2g}".replace("-", MINUS)
+    """A probability with its sign: ``p = 0.68``, ``p < 0.001``."""
+    return f"p {equal(p)}"

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 from typing import TYPE_CHECKING
+
+from inertial.uncertainty.rounding import rounded
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,29 +33,14 @@ def scientific(value: float, number: Callable[[float], str] = significant) -> st
     return f"{value / 10.0**exponent:.2f}·10{str(exponent).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
 
 
-def chance(p: float | None) -> str:
-    """A probability for people."""
-    if p is None:
-        return ""
-    if p <= 1e-299:
-        return "< 1e−299"
-    return significant(p, 2) if p > 1e-3 else f"{p:.0e}".replace("-", "−")
-
-
-def equal(p: float) -> str:
-    """A probability with its sign: equal, or below the smallest value that is printed."""
-    text = chance(p)
-    return text if text.startswith("<") else f"= {text}"
-
-
 def with_uncertainty(value: float, expanded: float) -> tuple[str, str]:
     """Value and expanded uncertainty, the uncertainty to two digits and the value to the same place (GUM 7.2.6)."""
     if not math.isfinite(expanded) or expanded <= 0.0:
         return significant(value, 4), ""
-    places = 1 - math.floor(math.log10(expanded))
-    if places > 8:
+    if expanded < 1e-7:
         return _signed(f"{value:.3e}"), _signed(f"{expanded:.1e}")
-    return _fixed(value, places), _fixed(expanded, places)
+    shown, u = (_signed(f"{Decimal(text):,f}".replace(",", THIN)) for text in rounded(value, expanded))
+    return shown, u
 
 
 def _fixed(value: float, places: int) -> str:

@@ -76,6 +76,13 @@ class BudgetTerms:
             return None
         return FollowedSupply(own.supply_V, own.ratiometric)
 
+    @property
+    def reads_own_temperature(self) -> bool:
+        """Whether fit and user read the same thermometer of the device, so that its errors are in the coefficients alike."""
+        entry = None if self.stated is None else self.stated.thermometer
+        user = self.stability is None or self.stability.temperature_of == "device"
+        return entry is not None and entry.measures == "device" and user
+
     def document(self) -> dict[str, Any]:
         """As JSON values."""
         if self.stated is None:

@@ -80,6 +80,17 @@ _PARTS: dict[str, dict[str, str]] = {
 }
 
 
+def left_out(stated: Uncertainty) -> list[str]:
+    """The contributions that a statement has no figure for, and does not call exact, by name."""
+    names: list[str] = []
+    for name in type(stated).model_fields:
+        if name != "grade_source":
+            entry: Entry | None = getattr(stated, name)
+            parts = _PARTS.get(name, {"": name})
+            names += [label for part, label in parts.items() if entry is None or not entry.states(part)]
+    return names
+
+
 def influences(
     stated: Uncertainty, at: DwellConditions, stability: Stability | None = None
 ) -> tuple[list[InputQuantity], list[Scattered]]:

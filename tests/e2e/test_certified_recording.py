@@ -43,7 +43,9 @@ unit = "K"
 [uncertainty]
 grade_source = "certificates"
 gravity = { value_m_s2 = 9.80942, u_ppm = 200.0, reference = "G-01" }
-thermometer = { measures = "chamber", offset_U_K = 2.0, k = 2.0, reference = "PT-7" }
+thermometer = { measures = "chamber", offset_U_K = 2.0, slope_U_percent = 0.01, k = 2.0, reference = "PT-7" }
+gradient = { u_K = 0.01, source = "nine sensors" }
+reader = { exact = true }
 
 [stability]
 switch_on_ug = 50.0

@@ -133,7 +133,7 @@ def test_an_import_whose_model_is_not_adequate_gets_no_certificate(tmp_path: Pat
     assert ([unit["outcome"] for unit in fitted["units"]], fitted["adequate"], status) == (["pass"], False, 1)
     problem = run("certify", fitted["run"], archive=tmp_path / "archive").exception
     assert isinstance(problem, WrongUse)
-    assert "its model is not adequate" in str(problem)
+    assert "is NOT ADEQUATE" in str(problem)
 
 
 def test_known_poses_go_the_same_way(tmp_path: Path) -> None:

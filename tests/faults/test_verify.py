@@ -15,9 +15,11 @@ from pipelines.archive import Archive, Run, files
 from pipelines.archive.signatures import VARIABLE, make_key, name_of, public_keys
 from pipelines.certificates import Ledger
 from pipelines.chain.certify import certify
+from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
-from pipelines.integrity import Report, seals, verify
+from pipelines.integrity import Report, captures, seals, verify
+from pipelines.integrity.findings import VerifiedPart
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.event import Event
 
@@ -476,3 +478,41 @@ def test_a_state_of_the_station_that_was_changed_is_not_gone_on_from(tmp_path: P
     [capture] = (tmp_path / "archive" / "captures").iterdir()
     with pytest.raises(ArchiveUnusable, match=r"is not the station's state that record 00003 was stored with"):
         archive.capture(capture.name).last_state()
+
+
+# beside a run in progress ---------------------------------------------------------------------------------------------
+
+
+def measured_on(folder: Path, records: int) -> None:
+    """A run whose capture is measured for so many records more, and then stops."""
+    runner = Runner(small_job(folder), Archive(folder / "archive"), measure=CaptureDouble(stop_after=records))
+    with pytest.raises(PulledPlug):
+        runner.stage(ORDER[0])
+
+
+def test_a_record_that_is_stored_during_the_check_is_no_finding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "")
+    measured_on(tmp_path, 4)
+    real, looks = captures._check_state, []
+
+    def meanwhile(path: Path, last: tuple, checked: VerifiedPart) -> None:
+        looks.append(last[2].name)
+        measured_on(tmp_path, 1)  # drops the state that the record of this look refers to
+        real(path, last, checked)
+
+    monkeypatch.setattr(captures, "_check_state", meanwhile)
+    assert verify(Archive(tmp_path / "archive"), keys={}).checked.findings == []
+    assert looks == ["00003", "00004"]
+
+
+def test_what_is_missing_of_a_capture_in_progress_is_found_by_both_looks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "")
+    measured_on(tmp_path, 4)
+    [state] = (tmp_path / "archive" / "captures").glob("*/state/*.bin")
+    state.unlink()
+    [finding] = verify(Archive(tmp_path / "archive"), keys={}).checked.findings
+    assert (finding.kind, Path(finding.path).name) == ("missing", state.name)

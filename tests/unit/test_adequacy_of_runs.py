@@ -11,6 +11,7 @@ from capture_double import small_run
 from lots import lot
 from typer.testing import CliRunner
 
+from inertial.uncertainty.rounding import chance
 from pipelines.archive import Run
 from pipelines.cli import app
 from pipelines.cli.adequacy_text import judged, print_adequacy
@@ -20,7 +21,7 @@ from pipelines.cli.verdict_text import verdict
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.jobs.adequacy import adequacy, adequacy_of
 from pipelines.report.context import ReportContext
-from pipelines.report.numbers import chance, significant
+from pipelines.report.numbers import significant
 from pipelines.report.panels import model_adequacy
 
 MODEL = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]

@@ -24,10 +24,16 @@ from signing_keys import made_key, pem
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
+from pipelines.certificate_document import archive_comparison
+from pipelines.certificate_document.compose import compose
+from pipelines.certificate_document.content import CertificateContent
 from pipelines.certificate_document.documents import CertificateCheckDocument
+from pipelines.certificate_document.file_check import Against, check_file
+from pipelines.certificate_document.issue import issue
+from pipelines.certificate_document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificate_document.signature_check import canonical, parsed, xml_signature
 from pipelines.certificate_document.signing import SigningKey, sign_pdf, sign_xml
-from pipelines.certificates import Ledger
+from pipelines.certificates import Calibration, Ledger
 from pipelines.certificates.documents import CertifyDocument
 from pipelines.chain.certify import certify
 from pipelines.cli import app
@@ -176,6 +182,7 @@ def test_with_the_archive_the_numbers_are_compared_and_the_state_is_told(issued:
     checks = {one["check"]: one for one in checked(*words, status=0)["files"][0]["checks"]}
     assert checks["archive"]["state"] == checks["state"]["state"] == "good"
     assert int(checks["archive"]["message"].split()[0]) > 20
+    assert "not proven by the archive: laboratory: Example Sensor Works" in checks["laboratory"]["message"]
 
 
 def test_a_good_signature_of_anybody_proves_nothing(issued: Issued) -> None:
@@ -185,13 +192,143 @@ def test_a_good_signature_of_anybody_proves_nothing(issued: Issued) -> None:
     assert "nothing shows where the file comes from; give --trust FILE" in printed
 
 
-def test_an_unsigned_xml_is_proven_by_the_archive_and_an_unsigned_pdf_is_not(made: Issued, issued: Issued) -> None:
+def test_an_unsigned_xml_is_proven_by_the_archive_with_the_laboratorys_file_and_an_unsigned_pdf_is_not(
+    made: Issued, issued: Issued
+) -> None:
     folder, archive = made.folder / "unsigned", ("--archive", issued.run.archive.root)
+    alone = checked(folder / "A1_1.xml", *archive, status=1)
+    assert not wrong(alone)
+    assert "Example Drones Ltd" in json.dumps(alone)
+    printed = CliRunner().invoke(app, ["verify", *map(str, (folder / "A1_1.xml", *archive))]).stdout
+    assert "names and addresses are not proven by the archive: give --laboratory FILE" in " ".join(printed.split())
+    archive = (*archive, "--laboratory", made.folder / "laboratory.toml")
     assert checked(folder / "A1_1.xml", *archive, status=0)["files"][0]["proven_by"] == ["archive"]
     document = checked(folder / "A1_1.pdf", *archive, status=1)
     assert not wrong(document)
     assert "nothing shows that its pages are unchanged" in json.dumps(document)
     checked(folder / "A1_1.xml", status=1)
+
+
+# alterations of the XML ------------------------------------------------------------------------------------------------
+
+
+def altered(xml: bytes) -> list[tuple[str, bytes]]:
+    """The document with one text node or attribute altered, for each of them, and with a comment in front."""
+    root = etree.fromstring(xml)
+    out = [("comment", xml.replace(b"<dcc:digital", b"<!-- -->\n<dcc:digital", 1))]
+    for one in root.iter():
+        for part in ("text", *one.attrib):
+            old = one.attrib.get(part, one.text)
+            new = f"{(old or '')[:-1]}{'1' if (old or '')[-1:] != '1' else '2'}"
+            if part in one.attrib:
+                one.set(part, new)
+            else:
+                one.text = new
+            out.append((f"{one.tag.rpartition('}')[2]} {part}: {old!r:.40}", etree.tostring(root)))
+            if part in one.attrib:
+                one.set(part, old)
+            else:
+                one.text = old
+    return out
+
+
+def accepted_alterations(made: Issued, folder: Path, step: int, patch: pytest.MonkeyPatch) -> tuple[int, list[str]]:
+    """How many alterations of a certificate were tried, and those that are accepted by the archive, or by it and the file.
+
+    The archive stays as it is: what it says is read once.
+    """
+    archive = Archive(made.run.archive.root)
+    every = altered((made.folder / "unsigned" / "A1_1.xml").read_bytes())[::step]
+    who, composed, known = read_laboratory(made.folder / "laboratory.toml"), {}, Ledger(archive).calibrations("A1")
+
+    def once(run: Run, one: Calibration, all_known: list[Calibration], by: LaboratoryFile) -> CertificateContent:
+        key = (one.certificate, by.model_dump_json())
+        if key not in composed:
+            composed[key] = compose(run, one, all_known, by)
+        return composed[key]
+
+    patch.setattr(archive_comparison, "compose", once)
+    patch.setattr(Ledger, "calibrations", lambda _self, serial: known if serial == "A1" else [])
+    path = folder / "altered.xml"
+    names: list[str] = []
+    for name, data in every:
+        path.write_bytes(data)
+        against = (Against((), archive, demanded=True), Against((), archive, True, who))
+        names += [name for one in against if check_file(path, one).accepted]
+    return len(every), names
+
+
+def test_no_altered_text_or_attribute_of_a_sample_is_accepted_by_the_archive(
+    made: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert accepted_alterations(made, tmp_path, 23, monkeypatch)[1] == []
+
+
+@pytest.mark.slow
+def test_no_altered_text_or_attribute_is_accepted_by_the_archive(
+    made: Issued, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count, accepted = accepted_alterations(made, tmp_path, 1, monkeypatch)
+    assert count > 290
+    assert accepted == []
+
+
+FORGERIES = (
+    (b"no device was measured", b"a device was measured"),
+    (b"SIMULATED: ", b"Measured: "),
+    (b"The results relate only", b"This accredited laboratory says: the results relate only"),
+    (b"JCGM 100:2008", b"ISO 16063-11"),
+    (b"temperature of the chamber", b"temperature of the item, too"),
+    (b"guard", b"no guard"),
+)
+
+
+@pytest.mark.parametrize(("old", "new"), FORGERIES)
+def test_a_forged_statement_condition_or_rule_is_named_by_the_archive(
+    issued: Issued, old: bytes, new: bytes, tmp_path: Path
+) -> None:
+    xml = (issued.folder / "A1_1.xml").read_bytes()
+    if old not in xml:
+        pytest.skip("this run does not say so")
+    (tmp_path / "forged.xml").write_bytes(xml.replace(old, new, 1))
+    found = checked(tmp_path / "forged.xml", "--archive", issued.run.archive.root, status=1)
+    assert {"archive"} <= set(wrong(found))
+
+
+def test_a_claim_of_accreditation_without_its_body_is_refused(issued: Issued, tmp_path: Path) -> None:
+    xml = (issued.folder / "A1_1.xml").read_bytes()
+    (tmp_path / "forged.xml").write_bytes(xml.replace(b"Example Sensor Works", b"Accredited Sensor Works", 1))
+    found = checked(tmp_path / "forged.xml", "--archive", issued.run.archive.root, status=1)
+    assert "speaks of accreditation" in wrong(found)["archive"]
+
+
+def test_a_name_that_was_changed_is_never_proven_and_found_with_the_laboratorys_file(
+    issued: Issued, made: Issued, tmp_path: Path
+) -> None:
+    xml = (issued.folder / "A1_1.xml").read_bytes()
+    (tmp_path / "forged.xml").write_bytes(xml.replace(b"Example Drones Ltd", b"Somebody Else Ltd"))
+    words = (tmp_path / "forged.xml", "--archive", issued.run.archive.root)
+    assert "customer: Somebody Else Ltd" in json.dumps(checked(*words, status=1))
+    found = wrong(checked(*words, "--laboratory", made.folder / "laboratory.toml", status=1))
+    assert "the file says 'Somebody Else Ltd', the archive 'Example Drones Ltd'" in found["archive"]
+
+
+def test_a_certificate_is_the_same_after_the_earlier_one_was_revoked(issued: Issued, tmp_path: Path) -> None:
+    """As found: what the earlier coefficients made of these readings on the day of issue stays said."""
+    shutil.copytree(str(issued.run.archive.root), tmp_path / "archive")
+    later = small_run(tmp_path, None, ("seed = 5", "seed = 6"))
+    later.seal()
+    ledger, who = Ledger(later.archive), made_laboratory(tmp_path)
+    certify(ledger, later, ["A1"], (datetime.now(tz=UTC).date() + timedelta(days=40)).isoformat(), months=6)
+    issue(later.archive, ["A1/2"], read_laboratory(who), tmp_path)
+    ledger.revoke("A1", "dropped on the floor", certificate=1)
+    words = (tmp_path / "A1_2.xml", "--archive", later.archive.root, "--laboratory", who)
+    assert checked(*words, status=0)["files"][0]["proven_by"] == ["archive"]
+
+
+def made_laboratory(folder: Path) -> Path:
+    (folder / "laboratory.toml").write_text(LABORATORY, encoding="utf-8")
+    return folder / "laboratory.toml"
 
 
 # forgeries ------------------------------------------------------------------------------------------------------------
@@ -434,6 +571,44 @@ def test_a_certificate_of_an_authority_vouches_for_the_laboratories_that_it_name
             for authority_pem, vouches in ((own, True), (authority("Example Authority")[1], False)):
                 trust.write_bytes(authority_pem.public_bytes(Encoding.PEM))
                 assert checked(file, "--trust", trust)["accepted"] is (good and vouches), (file.name, begins, vouches)
+
+
+def expired_key(days: int = 400) -> SigningKey:
+    """A key whose certificate, signed by itself, ended as many days less thirty-one ago."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Example Sensor Works")])
+    now = datetime.now(UTC)
+    builder = (
+        x509.CertificateBuilder().subject_name(name).issuer_name(name).public_key(key.public_key()).serial_number(9)
+    )
+    builder = builder.not_valid_before(now - timedelta(days=days)).not_valid_after(now - timedelta(days=days - 31))
+    return SigningKey(key, builder.sign(key, hashes.SHA256()), ())
+
+
+def test_an_expired_key_does_not_sign(made: Issued, tmp_path: Path) -> None:
+    (tmp_path / "old.pem").write_bytes(pem(expired_key()))
+    words = ["certificate", made.run.id, "--laboratory", str(made.folder / "laboratory.toml"), "--archive"]
+    words += [str(made.run.archive.root), "--output", str(tmp_path / "out"), "--sign-with", str(tmp_path / "old.pem")]
+    problem = CliRunner().invoke(app, words).exception
+    assert isinstance(problem, WrongUse)
+    assert "nothing was signed: renew it" in str(problem)
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_expired_certificate_vouches_for_nothing_even_where_it_is_trusted_itself(
+    issued: Issued, made: Issued, tmp_path: Path
+) -> None:
+    old, trust = expired_key(), tmp_path / "old.pem"
+    trust.write_bytes(old.certificate.public_bytes(Encoding.PEM))
+    xml = (issued.folder / "A1_1.xml").read_bytes()
+    (tmp_path / "A1_1.xml.sig").write_bytes(sign_xml(xml, old))
+    (tmp_path / "A1_1.pdf").write_bytes(sign_pdf((made.folder / "unsigned" / "A1_1.pdf").read_bytes(), old))
+    for name, why in (("A1_1.xml.sig", "states no time"), ("A1_1.pdf", "is the signer's own statement")):
+        found = checked(tmp_path / name, "--trust", trust, status=1)
+        assert "nothing proves that it was signed before" in wrong(found)["signer"], wrong(found)
+        assert why in wrong(found)["signer"]
+    good = checked(issued.folder / "A1_1.pdf", "--trust", issued.trust, status=0)
+    assert "is the signer's own statement, without a time stamp" in json.dumps(good)
 
 
 def test_wrong_use_is_told(issued: Issued, tmp_path: Path) -> None:

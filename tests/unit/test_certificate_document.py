@@ -1,5 +1,6 @@
 """The certificate that is handed out: what ISO/IEC 17025 lists is on it, what must not be said is not, its XML is valid."""
 
+import html
 import json
 import re
 import shutil
@@ -14,18 +15,21 @@ from capture_double import small_run
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
+from inertial.uncertainty.rounding import rounded
 from pipelines.archive import Archive, Run
 from pipelines.certificate_document.compose import compose
 from pipelines.certificate_document.content import CertificateContent, Coefficient, ReferenceStandard
 from pipelines.certificate_document.dcc import DCC, SI, dcc
 from pipelines.certificate_document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificate_document.numbers import si_unit, with_uncertainty
+from pipelines.certificate_document.pages import page_content
 from pipelines.certificate_document.pdf import pdf
 from pipelines.certificate_document.schema_files import DocumentInvalid, validate
 from pipelines.certificates import Ledger
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.cli.documents.certificates import CertificateDocument
+from pipelines.report.numbers import with_uncertainty as report_rounding
 from schemas.errors import RecipeInvalid, WrongUse
 
 etree = pytest.importorskip("lxml.etree")
@@ -394,3 +398,44 @@ def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
     assert "of the standards listed: gravity." in text
     assert text.endswith("by the sources in the budgets (certificates): seat.")
     assert "not claimed" in _traceability({"references": [], "grade_source": "data_sheet"}, entries)
+
+
+def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(run: Run) -> None:
+    made = content(run)
+    assert re.fullmatch(r"ADEQUATE \(p (= 0\.\d+|= 1)\)", made.adequacy)
+    assert made.left_out.startswith("Not stated, and not contained in the uncertainties U: ")
+    assert "vibration" in made.left_out
+    assert "seat" not in made.left_out
+    declared = dcc(made).decode()
+    assert f"Model of the fit, by its residuals: {made.adequacy}" in declared
+    assert made.left_out in declared
+    printed = json.dumps(page_content(made), ensure_ascii=False)
+    assert made.adequacy in printed
+    assert made.left_out in printed
+
+
+def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_one(run: Run) -> None:
+    made = content(run)
+    none = made.model_copy(update={"conformity": tuple(one.model_copy(update={"pfa": 0.0}) for one in made.conformity)})
+    assert "probability of false acceptance < 1e-4" in html.unescape(dcc(none).decode())
+    for table in next(part for part in page_content(made)["parts"] if part.get("title") == "Uncertainty budgets")[
+        "tables"
+    ]:
+        assert sum(row[4] == "0.0 %" for row in table["rows"]) <= 1
+    results = next(part for part in page_content(made)["parts"] if part.get("title") == "Results")
+    names = {row[0] for row in results["tables"][0]["rows"]}
+    assert "error of the norm of gravity, verification (largest of the poses)" in names
+
+
+def test_certificate_and_report_round_by_one_function() -> None:
+    for value, expanded in (
+        (2.5, 25.0),
+        (485.37, 549.6),
+        (12.345, 0.105),
+        (-0.0049, 0.0104),
+        (0.125, 0.02),
+        (10.0, 0.98),
+    ):
+        plain = rounded(value, expanded)
+        assert tuple(text.replace("−", "-") for text in with_uncertainty(value, expanded)) == plain
+        assert tuple(text.replace("−", "-") for text in report_rounding(value, expanded)) == plain

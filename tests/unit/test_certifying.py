@@ -1,6 +1,7 @@
 """What is certified, for how long, by whom, and once: the run is named, its dates are allowed, its files are sound and signed."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,9 @@ from pipelines.certificates.coefficient_remarks import library_remarks
 from pipelines.certificates.days import months_after
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.refusals import allowed_months
+from pipelines.chain import certifiable
 from pipelines.chain import certify as certifying
+from pipelines.chain.certifiable import refuse_unstated
 from pipelines.chain.certify import certify
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
@@ -272,3 +275,99 @@ def test_tables_made_with_different_libraries_are_told_wherever_they_are_handed_
     for words in (("show", run.id), ("export", run.id), ("certify", run.id)):
         assert "tables made with scipy 0.1 (coefficients)" in typed(*words).stderr, words
     assert "tables made with scipy 0.1 (coefficients)" in typed("verify").stdout
+
+
+def restated(run: Run, **entries: object) -> Run:
+    """A run whose station states other entries of its uncertainty; None takes one away."""
+    about = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
+    for name, entry in entries.items():
+        about["station"]["uncertainty"].pop(name, None)
+        if entry is not None:
+            about["station"]["uncertainty"][name] = entry
+    (run.path / "run.json").write_bytes(files.json_bytes(about))
+    return Archive(run.archive.root).run(run.id)
+
+
+@pytest.mark.parametrize(
+    ("entries", "named"),
+    [
+        ({"reader": None}, "reader (dominates scale and bias)"),
+        ({"reader": {"gain_u_ppm": 0.0, "offset_u_ug": 2.0, "source": "s"}}, "reader gain (dominates"),
+        ({"inner_offset": None}, "inner_offset (dominates misalignment)"),
+        ({"level": {"u_urad": 0.0}}, "level (dominates bias and misalignment)"),
+        ({"thermometer": None}, "thermometer (dominates"),
+        (
+            {
+                "gradient": None,
+                "thermometer": {"measures": "slot", "offset_u_K": 0.1, "slope_u_percent": 0.1, "source": "s"},
+            },
+            "gradient (dominates bias and scale over temperature)",
+        ),
+    ],
+)
+def test_an_entry_that_the_results_depend_on_is_asked_for_and_a_zero_is_none(
+    run: Run, entries: dict[str, object], named: str
+) -> None:
+    refuse_unstated(run)
+    with pytest.raises(WrongUse, match="not stated: ") as refused:
+        refuse_unstated(restated(run, **entries))
+    assert named in str(refused.value)
+    assert "a 0 needs exact = true" in str(refused.value)
+
+
+def test_the_seat_is_asked_for_in_either_frame_as_the_misalignment_is_a_result(run: Run) -> None:
+    bare = restated(run, seat=None)
+    about = json.loads((bare.path / "run.json").read_text(encoding="utf-8"))
+    for frame in ("fixture", "intrinsic"):
+        about["recipe"]["certificate"] = {**(about["recipe"].get("certificate") or {}), "frame": frame}
+        (bare.path / "run.json").write_bytes(files.json_bytes(about))
+        with pytest.raises(WrongUse, match=r"not stated: seat \(dominates misalignment\)"):
+            refuse_unstated(Archive(bare.archive.root).run(bare.id))
+
+
+def verdict(p: float | None, reason: str | None = None, named: str = "") -> dict[str, object]:
+    adequate = None if p is None else False
+    figures = {"rms_ug": 1.0, "floor_ug": 1.0, "p_value": p, "named": bool(named)}
+    return {"adequate": adequate, "reason": reason, **figures, "units": 3, "faulty": []}
+
+
+@pytest.mark.parametrize(
+    ("judged", "said"),
+    [
+        (verdict(4e-5), "NOT ADEQUATE (p < 0.001), p of at least 0.001 is needed"),
+        (verdict(0.01, named="warm_up"), "NOT ADEQUATE (p = 0.01), and what it lacks is found"),
+        (verdict(0.4, named="unit_moved"), "NOT ADEQUATE (p = 0.4), and what it lacks is found"),
+        (verdict(None, "too few poses"), "cannot be judged (too few poses)"),
+    ],
+)
+def test_a_captured_run_whose_model_is_not_adequate_is_not_certified(
+    run: Run, monkeypatch: pytest.MonkeyPatch, judged: dict, said: str
+) -> None:
+    monkeypatch.setattr(certifiable, "adequacy_of", lambda _run: judged)
+    with pytest.raises(WrongUse, match=re.escape(said)):
+        certify(Ledger(run.archive), run)
+    assert Ledger(run.archive).events("A1") == []
+
+
+def test_a_p_that_one_good_lot_in_twenty_has_is_certified_unless_the_limits_ask_for_more(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certifiable, "adequacy_of", lambda _run: verdict(0.01))
+    strict = tmp_path / "strict.toml"
+    strict.write_text(LIMITS.replace("[figures]", "adequacy_p_min = 0.02\n[figures]"), encoding="utf-8")
+    new = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(strict))).new)
+    with pytest.raises(WrongUse, match=r"NOT ADEQUATE \(p = 0.01\), p of at least 0.02 is needed"):
+        certify(Ledger(run.archive), new)
+    event = certify(Ledger(run.archive), run).written[0]
+    assert event.adequacy.startswith("NOT ADEQUATE at the level of 5 % (p = 0.01)")
+    assert Ledger(run.archive).events("A1")[0].adequacy == event.adequacy
+
+
+def test_a_lot_with_an_effect_that_its_model_lacks_is_not_certified(tmp_path: Path) -> None:
+    """By its own verdict: temperature terms left out of a run over 50 K."""
+    (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
+    own = ('limits = "consumer"', f'limits = "{tmp_path / "half.toml"}"')
+    lacking = small_run(tmp_path, None, (', "bias_temperature", "scale_temperature"]', "]"), own)
+    lacking.seal()
+    with pytest.raises(WrongUse, match=r"is NOT ADEQUATE \(p < 0\.001\)"):
+        certifiable.refuse_inadequate(lacking)

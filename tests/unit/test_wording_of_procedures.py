@@ -32,5 +32,5 @@ def test_a_table_prints_no_negative_zero() -> None:
 
 def test_a_probability_is_never_printed_as_zero() -> None:
     assert probability(0.68) == "p = 0.68"
-    assert probability(3.2e-12) == "p = 3.2e−12"
-    assert probability(0.0) == "p < 1e−99"
+    assert probability(3.2e-12) == "p < 0.001"
+    assert probability(0.0) == "p < 0.001"

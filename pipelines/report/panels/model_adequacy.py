@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from inertial.uncertainty.rounding import chance
 from pipelines.jobs.adequacy import adequacy_of
-from pipelines.report.numbers import chance, significant
+from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
+from inertial.uncertainty.rounding import chance
 from pipelines.audit.finding import WHO
-from pipelines.report.numbers import chance
 from pipelines.stages.figures import FIGURES
 from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import requests

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
+from inertial.uncertainty.rounding import chance, equal
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.report.evolution import evolution_chart
-from pipelines.report.numbers import chance
 from pipelines.workbench.pages import (
     RequestBody,
     figure,
@@ -57,7 +57,7 @@ def missing(request: Request) -> Response:
         except TumblelineError as problem:
             problems, work = [*problems, str(problem)], {}
     return page(
-        request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows, chance=chance,
+        request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows, chance=chance, equal=equal,
         jobs={kind: bench.jobs.known(kind, content) for kind, (_, content) in work.items()},
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),
