@@ -42,8 +42,8 @@ def refuse_weak(token: str) -> None:
         else f"a token of {len(set(token))} different characters"
     )  # fmt: skip
     raise WrongUse(
-        f"workbench: {found} was found, a random token of at least {BITS} bits is needed (32 hexadecimal digits, or 22 letters and "
-        "digits); make one with 'openssl rand -hex 16' and put it into TUMBLELINE_WORKBENCH_TOKEN, or leave it out"
+        f"workbench: {found} was found, a random token of at least {BITS} bits is needed (32 hexadecimal digits, or 22 letters "
+        "and digits); make one with 'openssl rand -hex 16' and put it into TUMBLELINE_WORKBENCH_TOKEN, or leave it out"
     )
 
 

@@ -92,7 +92,7 @@ def _refused(scope: Scope, settings: WorkbenchSettings) -> str | None:
     if scope["method"] in READING:
         return _refused_to_read(scope, headers, settings)
     if scope["method"] in CHANGING:
-        return _refused_to_change(scope, headers, settings)
+        return _refused_to_change(headers, settings)
     return f"workbench: method {scope['method'][:20]} is not supported"
 
 
@@ -125,7 +125,7 @@ def _local(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> bool:
     )
 
 
-def _refused_to_change(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> str | None:
+def _refused_to_change(headers: Headers, settings: WorkbenchSettings) -> str | None:
     origin = headers.get("origin")
     if origin is None and not _bearer(headers):
         return "workbench: a change without an origin is refused; send the token as 'Authorization: Bearer …'"

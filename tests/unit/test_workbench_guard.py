@@ -3,6 +3,8 @@
 import asyncio
 import gzip
 import hashlib
+import json
+import re
 from dataclasses import replace
 from importlib import import_module
 from importlib.resources import files
@@ -197,7 +199,7 @@ def test_no_address_leads_to_another_host(settings: WorkbenchSettings, path: str
 
 def raw(settings: WorkbenchSettings, path: str, query: str = "", http: str = "1.1") -> httpx.Response:
     """The answer to a path as it is written: clients normalise it."""
-    sent: list[dict[str, Any]] = []
+    sent: list[Any] = []
     scope = {
         "type": "http", "method": "GET", "path": unquote(path), "raw_path": path.encode(), "query_string": query.encode(),
         "headers": [(b"host", b"127.0.0.1:8321")], "http_version": http, "scheme": "http", "server": ("127.0.0.1", 8321),
@@ -207,10 +209,13 @@ def raw(settings: WorkbenchSettings, path: str, query: str = "", http: str = "1.
     async def receive() -> dict[str, Any]:
         return {"type": "http.request", "body": b"", "more_body": False}
 
-    async def send(message: dict[str, Any]) -> None:
+    async def send(message: Any) -> None:
         sent.append(message)
 
-    asyncio.run(create_app(settings)(scope, receive, send))
+    async def asked() -> None:
+        await create_app(settings)(scope, receive, send)
+
+    asyncio.run(asked())
     body = b"".join(one.get("body", b"") for one in sent[1:])
     return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=body)
 
@@ -311,3 +316,60 @@ def test_an_empty_archive_has_every_page(tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
     assert client.get("/run?run=latest").status_code == 422
     assert client.get("/nowhere").status_code == 404
+
+
+@pytest.mark.parametrize("figure", ["residuals", "response", "allan", "history", "samples"])
+@pytest.mark.parametrize("ending", ["png", "json", "csv"])
+def test_a_figure_of_a_unit_without_data_is_a_sentence(client: AsgiClient, figure: str, ending: str) -> None:
+    answer = client.get(f"/unit/figure/{figure}.{ending}?run=latest&unit=NOBODY&dwell=NOBODY:1&parameter=x")
+    assert answer.status_code == 422
+    assert re.search("; (choose|click) ", answer.json()["problem"])
+
+
+@pytest.mark.parametrize(
+    "address", ["/run/table/a%00b.csv?run=latest", "/unit/figure/a%00b.png", "/jobs/a%00b", "/static/a%00/b%00.js"]
+)
+def test_a_null_byte_in_a_path_is_a_sentence(client: AsgiClient, address: str) -> None:
+    answer = client.get(address)
+    assert answer.status_code == 400
+    assert "correct it" in answer.text
+
+
+@pytest.mark.parametrize("address", ["/units?search=a%00b", "/run?run=a%00b", "/unit?run=latest&unit=a%00b", "/a?a%00b=1",
+                                     "/run/table/units.csv?run=a%00b", "/station?run=a%00", "/models?model=a%00b"])  # fmt: skip
+def test_a_null_byte_in_a_query_is_no_defect(client: AsgiClient, address: str) -> None:
+    answer = client.get(address)
+    assert answer.status_code in {200, 404, 422}
+    assert "defect" not in answer.text
+
+
+@pytest.mark.parametrize(
+    "key", ["slot-x", "slot-", "slot-²", "slot-0", "slot--1", "slot-01", "slot-99999", "slot-" + "9" * 5000]
+)
+def test_a_slot_that_is_none_is_refused(client: AsgiClient, key: str) -> None:
+    answer = told(client, "/operator/start", {"recipe": "production", key: "A1"})
+    assert answer.status_code == 422
+    assert "a slot from 1 to 8 of the station is needed" in answer.json()["problem"]
+
+
+@pytest.mark.parametrize(
+    ("address", "body"),
+    [
+        ("/operator/start", {"recipe": "production", "slot-1": "A\0"}),
+        ("/operator/start", {"recipe": "\ud800"}),
+        ("/jobs", {"kind": "\ud800"}),
+        ("/jobs", {"kind": "diagnose", "address": "http://[x"}),
+        ("/plan/pose", {"address": "http://[x"}),
+        ("/plan/save", {"name": "a\0b"}),
+        ("/jobs", ["kind"]),
+    ],
+)
+def test_a_body_that_cannot_be_used_is_a_sentence(client: AsgiClient, address: str, body: object) -> None:
+    answer = told(client, address, body)
+    assert answer.status_code == 422
+    assert "reload the page" in answer.json()["problem"] or "correct it" in answer.json()["problem"]
+
+
+def told(client: AsgiClient, address: str, body: object) -> httpx.Response:
+    headers = {"authorization": f"Bearer {TOKEN}", "content-type": "application/json"}
+    return client.post(address, headers=headers, content=json.dumps(body))
