@@ -18,7 +18,7 @@ from in_process import command
 from served_station import modbus_station, served, station_file
 from small_station import lot_of
 
-from pipelines.cli.serving_pages import listening_socket
+from pipelines.serving.listening import listening_socket
 from schemas.errors import WrongUse
 from stations.clock import WallClock
 from stations.opening import open_station
