@@ -237,6 +237,7 @@ def sent(line: Orchestrator, path: str, size: int, key: str, *, chunked: bool) -
                 client.sendall(b"%x\r\n%b\r\n" % (len(part), part) if chunked else part)
                 if select.select([client], [], [], 0.0)[0]:
                     break
+            client.sendall(b"0\r\n\r\n" if chunked else b"")
         with suppress(ConnectionError):
             answer = client.recv(4096)
     return int(answer[9:12] or 0)
