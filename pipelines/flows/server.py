@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from pipelines.flows.new_database import make_database
 from pipelines.flows.quick_imports import quick_imports
 from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_database, use_key
-from pipelines.serving.connections import ConnectionLimits, TimedRequests
+from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests
 from pipelines.serving.listening import bound_socket
 from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
@@ -78,7 +78,9 @@ def serve(
         from pipelines.flows.application import application  # Prefect reads its settings when it is imported
 
         app = application(known, own, key)
-    place = bound_socket(host, port, "orchestrator", ConnectionLimits(plain=tls is None))
+    # another machine is a worker's: each process of its flows has connections
+    limits = ConnectionLimits(of_one_address=MOST // 2, plain=tls is None)
+    place = bound_socket(host, port, "orchestrator", limits)
     config = uvicorn.Config(
         TimedRequests(app, place.connections),
         host=host,

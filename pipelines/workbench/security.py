@@ -64,7 +64,10 @@ class Guard:
             await send({"type": "websocket.close", "code": 1008})
             return
         if _misspelt(scope["path"]):
-            text = "workbench: the address has a control character, a backslash or two slashes at its beginning; correct it"
+            text = (
+                "workbench: the address is no path, or has a control character, a backslash or two slashes at its beginning; "
+                "correct it"
+            )
             await PlainTextResponse(text, 400)(scope, receive, _with_headers(send))
             return
         refusal = _refused(scope, self._settings)
@@ -80,7 +83,12 @@ class Guard:
 
 def _misspelt(path: str) -> bool:
     """Whether no page has this path, and browsers would read it as another host or not at all."""
-    return path.startswith("//") or "\\" in path or any(letter < " " or letter == "\x7f" for letter in path)
+    return (
+        not path.startswith("/")
+        or path.startswith("//")
+        or "\\" in path
+        or any(letter < " " or letter == "\x7f" for letter in path)
+    )
 
 
 def _refused(scope: Scope, settings: WorkbenchSettings) -> str | None:

@@ -294,6 +294,14 @@ def test_a_server_without_a_key_does_not_start() -> None:
     assert "PREFECT_SERVER_API_AUTH_STRING" in done.stderr
 
 
+def test_a_port_in_use_is_told_in_one_sentence(line: Orchestrator) -> None:
+    command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(line.port)]
+    environment = line.environment | {"PREFECT_SERVER_API_AUTH_STRING": line.key}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert f"orchestrator: port {line.port} of 127.0.0.1 cannot be used (Address already in use)" in done.stderr
+
+
 def test_doctor_finds_the_server_good_and_a_wrong_key_at_fault(
     line: Orchestrator, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -189,7 +189,8 @@ def test_behind_a_proxy_or_by_another_name_nothing_is_local(settings: WorkbenchS
 
 
 @pytest.mark.parametrize("path", ["//evil.example", "//evil.example/%2e%2e", "/%5Cevil.example", "/\\evil.example",
-                                  "/%2Fevil.example", "/%09/evil.example", "/%0d%0aset-cookie:x", "/units%00"])  # fmt: skip
+                                  "/%2Fevil.example", "http://evil.example/",
+                                  "/%09/evil.example", "/%0d%0aset-cookie:x", "/units%00"])  # fmt: skip
 def test_no_address_leads_to_another_host(settings: WorkbenchSettings, path: str) -> None:
     answer = raw(settings, path, f"token={TOKEN}")
     assert answer.status_code == 400
