@@ -24,6 +24,7 @@ from pipelines.cli import app
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.flows.credentials import REFUSED
 from pipelines.flows.server_check import check_server
+from pipelines.serving.connections import MOST
 from schemas.errors import LinkLost, WrongUse
 
 EVIL = "http://evil.example"
@@ -258,7 +259,9 @@ def resident_mb(line: Orchestrator) -> float:
 @pytest.mark.parametrize("chunked", [False, True])
 @pytest.mark.parametrize("key", ["", "tumbleline:wrong"])
 def test_a_body_without_the_key_is_refused_unread(line: Orchestrator, path: str, key: str, chunked: bool) -> None:  # noqa: FBT001
-    assert sent(line, path, 40_000_000, key, chunked=chunked) == 401
+    before = resident_mb(line)
+    assert sent(line, path, 100_000_000, key, chunked=chunked) == 401
+    assert resident_mb(line) < before + 20.0
 
 
 @pytest.mark.parametrize("chunked", [False, True])
@@ -266,7 +269,6 @@ def test_a_body_of_more_than_a_megabyte_is_refused_with_the_key(line: Orchestrat
     assert sent(line, "/api/flow_runs/", 40_000_000, line.key, chunked=chunked) == 413
     assert sent(line, "/api/variables/", 2_000_000, line.key, chunked=chunked) == 413
     assert sent(line, "/api/logs/", 4_000_000, line.key, chunked=chunked) == 422  # read: its logs are none
-    assert line.ask("/api/variables/", {"name": "a" * 2_000_000, "value": "1"})[0] == 413
 
 
 @pytest.mark.slow
@@ -280,9 +282,10 @@ def test_a_body_of_a_gigabyte_and_a_half_takes_no_memory(line: Orchestrator, key
 
 def test_idle_connections_do_not_shut_the_line_out(line: Orchestrator) -> None:
     with ExitStack() as within:
-        for _ in range(700):
-            within.enter_context(socket.create_connection(("127.0.0.1", line.port), timeout=20.0))
+        idle = [within.enter_context(socket.create_connection(("127.0.0.1", line.port), 20.0)) for _ in range(700)]
         assert line.ask("/api/health", key="") == (200, True)
+        closed = select.select(idle, [], [], 1.0)[0]
+        assert len(closed) >= len(idle) - 1.25 * MOST
 
 
 def test_a_server_without_a_key_does_not_start() -> None:
