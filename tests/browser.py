@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 AXE = ROOT / "tests" / "data" / "axe" / "axe-core-4.14.1.min.js.gz"
-TOKEN = "token-of-the-tests"
+TOKEN = "token.of-the-tests_4Qx7"
 NOBODY = "127.0.0.1:9"
 """A proxy that is not there, for all addresses but those of this machine."""
 PATIENCE_S = float(os.environ.get("TUMBLELINE_PATIENCE_S", "120"))

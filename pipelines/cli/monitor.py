@@ -94,15 +94,17 @@ def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits
 
     import uvicorn
 
-    from pipelines.cli.serving_pages import listening_socket, run_until_stopped
+    from pipelines.cli.serving_pages import run_until_stopped
     from pipelines.monitoring.service import alerting, application
+    from pipelines.serving.connections import TimedRequests
+    from pipelines.serving.listening import listening_socket
 
     place = listening_socket(host, port, "monitor")
     console().print(f"http://{host}:{place.getsockname()[1]}/healthz", soft_wrap=True)
     sys.stdout.flush()  # a program that started it waits for the address
     config = uvicorn.Config(
-        application(monitor), log_level="warning", access_log=False, server_header=False, ws="none",
-        timeout_graceful_shutdown=2,
+        TimedRequests(application(monitor), place.connections), log_level="warning", access_log=False, server_header=False,
+        ws="none", timeout_graceful_shutdown=2, proxy_headers=False,
     )  # fmt: skip
     with place, alerting(monitor, poster, audits) if poster is not None else nullcontext():
         run_until_stopped(uvicorn.Server(config), place, "monitor")

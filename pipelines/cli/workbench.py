@@ -74,7 +74,9 @@ def command(
     import uvicorn
 
     from pipelines.archive import Archive
-    from pipelines.cli.serving_pages import listening_socket, run_until_stopped
+    from pipelines.cli.serving_pages import run_until_stopped
+    from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests
+    from pipelines.serving.listening import listening_socket
     from pipelines.workbench.application import create_app
     from pipelines.workbench.settings import WorkbenchSettings
     from schemas.station import load_station
@@ -84,7 +86,10 @@ def command(
     given = os.environ.get("TUMBLELINE_WORKBENCH_TOKEN", "")
     for one in station or ():
         load_station(one)  # a broken file is refused now, not when the page is opened
-    with listening_socket(host, port, "workbench") as place:
+    # a proxy connects for everybody from one address, and limits addresses itself
+    own = {"of_one_address": MOST} if behind_proxy else {}
+    limits = ConnectionLimits(plain=certificate is None, **own)
+    with listening_socket(host, port, "workbench", limits) as place:
         listening = place.getsockname()[1]
         settings = WorkbenchSettings(
             archive=Archive(archive or None).address, folder=folder, host=host, port=listening, names=tuple(name or ()),
@@ -97,8 +102,9 @@ def command(
         sys.stdout.flush()  # a program that started it waits for the address
         error_console().print("Open the address above; Ctrl-C ends the workbench.")
         config = uvicorn.Config(
-            app, host=host, port=listening, log_level="warning", access_log=False, server_header=False, ws="none",
-            timeout_graceful_shutdown=PATIENCE_S, ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=behind_proxy,
+            TimedRequests(app, place.connections), host=host, port=listening, log_level="warning", access_log=False,
+            server_header=False, ws="none", timeout_graceful_shutdown=PATIENCE_S,
+            ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=False,
         )  # fmt: skip
         servers.append(uvicorn.Server(config))
         run_until_stopped(servers[0], place, "workbench")

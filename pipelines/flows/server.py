@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING
 from pipelines.flows.new_database import make_database
 from pipelines.flows.quick_imports import quick_imports
 from pipelines.flows.settings import JSON_FORMAT, LOOPBACK, SERVER_KEY, closed, kept, origins, use_database, use_key
+from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests
+from pipelines.serving.listening import bound_socket
 from schemas.errors import TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
 from stations.safety.folder import state_folder
@@ -55,7 +57,8 @@ def serve(
     known, scheme = [*LOOPBACK, *names], "http" if tls is None else "https"
     own = origins(known, port, scheme)
     os.umask(PRIVATE)
-    os.environ.update(closed(use_key(SERVER_KEY), own))
+    key = use_key(SERVER_KEY)
+    os.environ.update(closed(key, own))
     use_database()
     os.environ.setdefault("PREFECT_SERVER_UI_API_URL", f"{scheme}://{known[-1]}:{port}/api")
     if wants_json():
@@ -74,21 +77,26 @@ def serve(
 
         from pipelines.flows.application import application  # Prefect reads its settings when it is imported
 
-        app = application(known, own)
+        app = application(known, own, key)
+    # another machine is a worker's: each process of its flows has connections
+    limits = ConnectionLimits(of_one_address=MOST // 2, plain=tls is None)
+    place = bound_socket(host, port, "orchestrator", limits)
     config = uvicorn.Config(
-        app,
+        TimedRequests(app, place.connections),
         host=host,
         port=port,
         log_config=None,  # in the format of Prefect's logging
         log_level="warning",
         timeout_graceful_shutdown=5,
+        proxy_headers=False,
         ssl_certfile=tls[0] if tls else None,
         ssl_keyfile=tls[1] if tls else None,
     )
     server = uvicorn.Server(config)
     if home is not None:
         threading.Thread(target=_leave_when_alone, args=(home, server), daemon=True).start()
-    server.run()
+    with place:
+        server.run(sockets=[place])
 
 
 def _pages_folder() -> Path:

@@ -9,6 +9,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
 from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
@@ -58,6 +59,7 @@ def create_app(settings: WorkbenchSettings, ending: Callable[[], bool] = lambda:
     app.add_exception_handler(TumblelineError, _problem)
     app.add_exception_handler(InertialError, _problem)
     app.add_exception_handler(HTTPException, _not_there)
+    app.add_exception_handler(RequestValidationError, _not_readable)
     app.add_exception_handler(Exception, _defect)
     return Guard(app, settings)
 
@@ -70,6 +72,13 @@ def _problem(request: Request, problem: Exception) -> Response:
 def _not_there(request: Request, problem: Exception) -> Response:
     status = problem.status_code if isinstance(problem, HTTPException) else 404
     return _answer(request, f"{request.url.path[:80]}: there is no such page; choose one above", status)
+
+
+def _not_readable(request: Request, problem: Exception) -> Response:
+    del problem  # it would give the body back
+    return _answer(
+        request, "request: its body or a parameter cannot be read, a JSON object is needed; reload the page", 422
+    )
 
 
 def _defect(request: Request, problem: Exception) -> Response:

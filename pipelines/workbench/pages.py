@@ -14,6 +14,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from fastapi import Body, Request
 from jinja2 import Environment, FunctionLoader, StrictUndefined
+from pydantic import AfterValidator
 from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from pipelines.archive import Archive
@@ -25,6 +26,7 @@ from pipelines.report.unit_panels.budget import without_nothing
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
 from schemas.errors import WrongUse
+from schemas.foreign import shown
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -37,7 +39,20 @@ if TYPE_CHECKING:
     from pipelines.workbench.state import PageState
 
 State = TypeVar("State", bound="PageState")
-RequestBody = Annotated[dict[str, Any], Body()]
+
+
+def _written(body: dict[str, Any]) -> dict[str, Any]:
+    """The body, whose texts are ones that files can have as names and answers can quote."""
+    for key, value in body.items():
+        for text in (key, value):
+            if isinstance(text, str) and any(letter == "\0" or "\ud800" <= letter <= "\udfff" for letter in text):
+                raise WrongUse(
+                    f"request: {shown(key, 40)} has a null character or half of a character, a text is needed; correct it"
+                )
+    return body
+
+
+RequestBody = Annotated[dict[str, Any], Body(), AfterValidator(_written)]
 """Body of a change request, JSON."""
 PARAMETER = {"json": "application/json", "csv": "text/csv; charset=utf-8", "png": "image/png"}
 
@@ -78,8 +93,17 @@ def state_of(request: Request, kind: type[State]) -> tuple[State, list[str]]:
 
 def state_at(body: Mapping[str, Any], kind: type[State]) -> State:
     """The state of the page that sent a form: its ``address``."""
-    query = urlsplit(str(body.get("address", ""))).query
-    return kind.parse(parse_qsl(query, keep_blank_values=True))[0]
+    return kind.parse(page_address(body)[1])[0]
+
+
+def page_address(body: Mapping[str, Any]) -> tuple[str, list[tuple[str, str]]]:
+    """Path and query of the ``address`` of a form."""
+    text = str(body.get("address", ""))
+    try:
+        parts = urlsplit(text)
+    except ValueError:
+        raise WrongUse(f"request: {shown(text, 80)} is no address of a page; reload the page") from None
+    return parts.path, parse_qsl(parts.query, keep_blank_values=True)
 
 
 def page(

@@ -1,7 +1,8 @@
 """Access control for reading and changes: an ASGI application around all requests, including event streams.
 
-Reading needs a known host name, so that no foreign page reaches the service by its own name (DNS rebinding); from
-another machine it also needs the token. A change also needs the same origin and the token.
+Reading needs a known host name, so that no foreign page reaches the service by its own name (DNS rebinding). Without the
+token only this machine reads: a request to a loopback name that shows no sign of a proxy, because a proxy on this machine
+passes on requests of everybody. A change also needs the same origin and the token.
 """
 
 from __future__ import annotations
@@ -10,10 +11,13 @@ import secrets
 from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qsl, urlencode
+from urllib.parse import parse_qsl, quote, urlencode
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
+
+from pipelines.workbench.access import SESSION_S, change_proof, session, session_holds
+from pipelines.workbench.settings import LOOPBACK_HOSTS
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -22,6 +26,13 @@ if TYPE_CHECKING:
 
 READING = frozenset({"GET", "HEAD"})
 CHANGING = frozenset({"POST", "PUT", "DELETE"})
+PROOF = "x-change-proof"
+"""Header of the changes of pages: the cookie, which other ports get too, is not enough."""
+PROXIES = (
+    "forwarded", "via", "x-forwarded", "x-real-ip", "x-client-ip", "x-cluster-client-ip", "x-original-", "x-envoy-",
+    "true-client-ip", "cf-connecting-ip", "fastly-client-ip", "x-proxy", "proxy-",
+)  # fmt: skip
+"""Beginnings of headers that proxies add."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     "connect-src 'self'; worker-src 'self' blob:; font-src 'self'; form-action 'self'; base-uri 'none'; "
@@ -49,18 +60,35 @@ class Guard:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        refusal = _refused(scope, self._settings)
         if scope["type"] != "http":  # no WebSockets
             await send({"type": "websocket.close", "code": 1008})
             return
+        if _misspelt(scope["path"]):
+            text = (
+                "workbench: the address is no path, or has a control character, a backslash or two slashes at its beginning; "
+                "correct it"
+            )
+            await PlainTextResponse(text, 400)(scope, receive, _with_headers(send))
+            return
+        refusal = _refused(scope, self._settings)
         if refusal is None and (entered := _entering(scope, self._settings)) is not None:
             await entered(scope, receive, _with_headers(send))
             return
         if refusal is not None:
             await PlainTextResponse(refusal, 403)(scope, receive, _with_headers(send))
             return
-        scope["state"] = {**scope.get("state", {}), "may_change": _token_given(scope, self._settings)}
+        scope["state"] = {**scope.get("state", {}), "may_change": _known(scope, self._settings)}
         await self._app(scope, receive, _with_headers(send))
+
+
+def _misspelt(path: str) -> bool:
+    """Whether no page has this path, and browsers would read it as another host or not at all."""
+    return (
+        not path.startswith("/")
+        or path.startswith("//")
+        or "\\" in path
+        or any(letter < " " or letter == "\x7f" for letter in path)
+    )
 
 
 def _refused(scope: Scope, settings: WorkbenchSettings) -> str | None:
@@ -69,12 +97,10 @@ def _refused(scope: Scope, settings: WorkbenchSettings) -> str | None:
     name = _host(headers)
     if name not in settings.hosts:
         return f"workbench: host '{name[:80]}' is not a name of this service; open {settings.address}"
-    if scope["type"] != "http":
-        return "workbench: WebSockets are not supported"
     if scope["method"] in READING:
         return _refused_to_read(scope, headers, settings)
     if scope["method"] in CHANGING:
-        return _refused_to_change(scope, headers, settings)
+        return _refused_to_change(headers, settings)
     return f"workbench: method {scope['method'][:20]} is not supported"
 
 
@@ -88,18 +114,36 @@ def _host(headers: Headers) -> str:
 def _refused_to_read(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> str | None:
     if headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-mode") not in {None, "navigate"}:
         return "workbench: requests from other sites are refused"
-    if not settings.local and not _token_given(scope, settings) and not _asks_to_enter(scope):
-        return "workbench: from another machine the token is needed; open the address that the command printed"
+    if not _local(scope, headers, settings) and not _known(scope, settings) and not _asks_to_enter(scope):
+        return (
+            "workbench: from another machine or through a proxy the token is needed; open the address that the command "
+            "printed"
+        )
     return None
 
 
-def _refused_to_change(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> str | None:
+def _local(scope: Scope, headers: Headers, settings: WorkbenchSettings) -> bool:
+    """Whether the request is one of this machine; by HTTP/1.0, which no browser uses, some proxies ask without a header."""
+    return (
+        settings.local
+        and not settings.proxied
+        and scope["http_version"] != "1.0"
+        and _host(headers) in LOOPBACK_HOSTS
+        and not any(name.startswith(PROXIES) for name in headers)
+    )
+
+
+def _refused_to_change(headers: Headers, settings: WorkbenchSettings) -> str | None:
     origin = headers.get("origin")
     if origin is None and not _bearer(headers):
         return "workbench: a change without an origin is refused; send the token as 'Authorization: Bearer …'"
     if origin is not None and origin not in _origins(headers, settings):
         return f"workbench: origin '{origin[:80]}' must not change data"
-    if not _token_given(scope, settings):
+    if _bearer_given(headers, settings):
+        return None
+    value = _session(headers, settings)
+    proof = change_proof(settings.token, _bound(headers, settings), value)
+    if not value or not secrets.compare_digest(headers.get(PROOF, "").encode(), proof.encode()):
         return "workbench: this browser has read access only; open the address with the token that the command printed"
     return None
 
@@ -116,13 +160,28 @@ def _bearer(headers: Headers) -> str:
     return value.strip() if kind.lower() == "bearer" else ""
 
 
-def _token_given(scope: Scope, settings: WorkbenchSettings) -> bool:
-    headers = Headers(scope=scope)
+def _bearer_given(headers: Headers, settings: WorkbenchSettings) -> bool:
+    return secrets.compare_digest(_bearer(headers).encode(), settings.token.encode())
+
+
+def _bound(headers: Headers, settings: WorkbenchSettings) -> str:
+    """The origin that a session belongs to, and the service behind it."""
+    return f"{'https' if settings.secure else 'http'}://{headers.get('host', '').lower()} {settings.address}"
+
+
+def _session(headers: Headers, settings: WorkbenchSettings) -> str:
+    """The session of the cookie; empty where there is none that holds."""
     cookie: Any = None
     with suppress(CookieError):
         cookie = SimpleCookie(headers.get("cookie", "")).get(settings.cookie)
-    offered = [_bearer(headers), "" if cookie is None else cookie.value]
-    return any(secrets.compare_digest(one.encode(), settings.token.encode()) for one in offered)
+    value = "" if cookie is None else str(cookie.value)
+    return value if session_holds(settings.token, _bound(headers, settings), value) else ""
+
+
+def _known(scope: Scope, settings: WorkbenchSettings) -> bool:
+    """Whether the request has the token or a session."""
+    headers = Headers(scope=scope)
+    return _bearer_given(headers, settings) or bool(_session(headers, settings))
 
 
 def _asks_to_enter(scope: Scope) -> bool:
@@ -130,7 +189,10 @@ def _asks_to_enter(scope: Scope) -> bool:
 
 
 def _entering(scope: Scope, settings: WorkbenchSettings) -> RedirectResponse | PlainTextResponse | None:
-    """The token of the address exchanged for a cookie, so that it does not remain in the address."""
+    """The token of the address exchanged for a session, so that it does not remain in the address.
+
+    The proof for changes is behind the address' #: browsers do not send this part, and the page stores it.
+    """
     if scope["method"] not in READING or not _asks_to_enter(scope):
         return None
     query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
@@ -140,13 +202,18 @@ def _entering(scope: Scope, settings: WorkbenchSettings) -> RedirectResponse | P
             "workbench: this is not the token of this service; use the address that it printed", 403
         )
     rest = urlencode([one for one in query if one[0] != "token"])
-    answer = RedirectResponse(f"{scope['path']}{'?' + rest if rest else ''}", 303)
+    headers = Headers(scope=scope)
+    bound = _bound(headers, settings)
+    value = session(settings.token, bound)
+    target = f"{quote(scope['path'])}{'?' + rest if rest else ''}#change={change_proof(settings.token, bound, value)}"
+    answer = RedirectResponse(target, 303)
     answer.set_cookie(
         settings.cookie,
-        settings.token,
+        value,
+        max_age=SESSION_S,
         httponly=True,
         samesite="strict",
-        secure=settings.tls or settings.proxied,
+        secure=settings.secure,
         path="/",
     )
     return answer

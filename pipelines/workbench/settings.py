@@ -6,12 +6,15 @@ import secrets
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from pipelines.workbench.access import refuse_weak
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+LOOPBACK_HOSTS = frozenset({*LOOPBACK, "[::1]"})
+"""Names of this machine in the header Host."""
 PORT = 8321
 
 
@@ -23,7 +26,7 @@ class WorkbenchSettings:
     pause_lots : whether lots are paused when the server ends
     host, port : interface to listen on · names : further host names
     stations : files of the stations that lots are measured on; empty for the simulated one
-    token : allows a browser to change data · tls : whether it uses HTTPS · proxied : whether a proxy encrypts
+    token : allows a browser to change data, 128 bits at least · tls : whether it uses HTTPS · proxied : whether a proxy encrypts
     """
 
     archive: str
@@ -45,18 +48,23 @@ class WorkbenchSettings:
 
     @property
     def local(self) -> bool:
-        """Whether only this machine reaches it."""
+        """Whether it listens for this machine only; a proxy on it may still pass on requests of others."""
         return self.host in LOOPBACK
 
     @property
     def hosts(self) -> frozenset[str]:
         """Permitted host names, without a port."""
-        return frozenset({*LOOPBACK, "[::1]", *self.names, *([] if self.host in {"0.0.0.0", "::"} else [self.host])})  # noqa: S104
+        return frozenset({*LOOPBACK_HOSTS, *self.names, *([] if self.host in {"0.0.0.0", "::"} else [self.host])})  # noqa: S104
 
     @property
     def cookie(self) -> str:
         """Name of the cookie; cookies know no ports, and several workbenches can run on one host."""
-        return f"tumbleline-workbench-{self.port}"
+        return f"{'__Host-' if self.secure else ''}tumbleline-workbench-{self.port}"
+
+    @property
+    def secure(self) -> bool:
+        """Whether browsers reach it by https."""
+        return self.tls or self.proxied
 
     @property
     def address(self) -> str:
@@ -66,7 +74,8 @@ class WorkbenchSettings:
         return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self.port}"
 
     def refuse_unsafe(self) -> None:
-        """Refuse access from other machines without encryption."""
+        """Refuse a token that can be guessed, and access from other machines without encryption."""
+        refuse_weak(self.token)
         if not self.local and not self.tls and not self.proxied:
             raise WrongUse(
                 f"workbench: host {self.host} is reachable from other machines, encryption is needed; give --certificate and "

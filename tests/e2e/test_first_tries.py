@@ -18,7 +18,7 @@ from in_process import command
 from served_station import modbus_station, served, station_file
 from small_station import lot_of
 
-from pipelines.cli.serving_pages import listening_socket
+from pipelines.serving.listening import listening_socket
 from schemas.errors import WrongUse
 from stations.clock import WallClock
 from stations.opening import open_station
@@ -190,7 +190,7 @@ def test_a_port_in_use_is_refused_before_an_address_is_printed() -> None:
 
 def test_ctrl_c_with_an_open_page_ends_the_workbench_in_one_line(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "pipelines.cli", "workbench", str(tmp_path / "archive"), "--port", "0"]
-    kept = {**os.environ, "TUMBLELINE_WORKBENCH_TOKEN": "t" * 32, "PYTHONPATH": str(ROOT)}
+    kept = {**os.environ, "TUMBLELINE_WORKBENCH_TOKEN": "0123456789abcdef" * 2, "PYTHONPATH": str(ROOT)}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(words, cwd=tmp_path, env=kept, **pipes) as process:
         address = process.stdout.readline().split("/?")[0]

@@ -1,12 +1,18 @@
 """The orchestrator that the product starts: who it answers, what it stores, and that scheduled runs appear in it."""
 
 import asyncio
+import base64
 import json
 import os
+import re
+import select
+import socket
 import stat
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from pathlib import Path
 
 import pytest
 import websockets
@@ -18,6 +24,7 @@ from pipelines.cli import app
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.flows.credentials import REFUSED
 from pipelines.flows.server_check import check_server
+from pipelines.serving.connections import MOST
 from schemas.errors import LinkLost, WrongUse
 
 EVIL = "http://evil.example"
@@ -217,6 +224,73 @@ def test_an_orchestrator_that_does_not_answer_is_told(monkeypatch: pytest.Monkey
         check_server()
 
 
+def sent(line: Orchestrator, path: str, size: int, key: str, *, chunked: bool, heeds: bool = True) -> int:
+    """Status of a POST with a body of zeros, which ends at the answer where the client heeds it; 0 where it was cut off."""
+    lines = [f"POST {path} HTTP/1.1", f"host: 127.0.0.1:{line.port}", "content-type: application/json"]
+    lines += ["transfer-encoding: chunked" if chunked else f"content-length: {size}"]
+    lines += [f"authorization: Basic {base64.b64encode(key.encode()).decode()}"] if key else []
+    part = bytes(1_000_000)
+    answer = b""
+    with socket.create_connection(("127.0.0.1", line.port), timeout=60.0) as client:
+        client.sendall("\r\n".join([*lines, "", ""]).encode())
+        with suppress(ConnectionError):  # it does not wait for the end of a body that it has refused
+            for _ in range(size // len(part)):
+                client.sendall(b"%x\r\n%b\r\n" % (len(part), part) if chunked else part)
+                if heeds and select.select([client], [], [], 0.0)[0]:
+                    break
+            client.sendall(b"0\r\n\r\n" if chunked else b"")
+        with suppress(ConnectionError):
+            answer = client.recv(4096)
+    return int(answer[9:12] or 0)
+
+
+def resident_mb(line: Orchestrator) -> float:
+    """Memory of the server."""
+    (found,) = [
+        int(path.parent.name)
+        for path in Path("/proc").glob("[0-9]*/cmdline")
+        if f"pipelines.flows.server\0--port\0{line.port}\0".encode() in path.read_bytes()
+    ]
+    text = Path(f"/proc/{found}/status").read_text()
+    return int(re.search(r"VmHWM:\s+(\d+) kB", text)[1]) / 1e3
+
+
+@pytest.mark.parametrize("path", ["/api/flow_runs/", "/api/flow_runs/filter", "/api/variables/"])
+@pytest.mark.parametrize("chunked", [False, True])
+@pytest.mark.parametrize("key", ["", "tumbleline:wrong"])
+def test_a_body_without_the_key_is_refused_unread(line: Orchestrator, path: str, key: str, chunked: bool) -> None:  # noqa: FBT001
+    before = resident_mb(line)
+    assert sent(line, path, 100_000_000, key, chunked=chunked) == 401
+    assert resident_mb(line) < before + 20.0
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_a_body_of_more_than_a_megabyte_is_refused_with_the_key(line: Orchestrator, chunked: bool) -> None:  # noqa: FBT001
+    assert sent(line, "/api/flow_runs/", 40_000_000, line.key, chunked=chunked) == 413
+    assert sent(line, "/api/variables/", 2_000_000, line.key, chunked=chunked) == 413
+    assert sent(line, "/api/logs/", 4_000_000, line.key, chunked=chunked) == 422  # read: its logs are none
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", ["", "right"])
+def test_a_body_of_a_gigabyte_and_a_half_takes_no_memory(line: Orchestrator, key: str) -> None:
+    before = resident_mb(line)
+    used = line.key if key else ""
+    for chunked in (False, True):
+        assert sent(line, "/api/flow_runs/", 1_500_000_000, used, chunked=chunked) == (413 if key else 401)
+        sent(line, "/api/flow_runs/", 1_500_000_000, used, chunked=chunked, heeds=False)
+    assert resident_mb(line) < before + 20.0
+    assert line.ask("/api/health", key="") == (200, True)
+
+
+def test_idle_connections_do_not_shut_the_line_out(line: Orchestrator) -> None:
+    with ExitStack() as within:
+        idle = [within.enter_context(socket.create_connection(("127.0.0.1", line.port), 20.0)) for _ in range(700)]
+        assert line.ask("/api/health", key="") == (200, True)
+        closed = select.select(idle, [], [], 1.0)[0]
+        assert len(closed) >= len(idle) - 1.25 * MOST
+
+
 def test_a_server_without_a_key_does_not_start() -> None:
     environment = {key: value for key, value in os.environ.items() if not key.endswith("AUTH_STRING")}
     command = [sys.executable, "-m", "pipelines.flows.server", "--port", "1"]
@@ -224,6 +298,14 @@ def test_a_server_without_a_key_does_not_start() -> None:
     assert done.returncode == 2
     assert "orchestrator: no key was found" in done.stderr
     assert "PREFECT_SERVER_API_AUTH_STRING" in done.stderr
+
+
+def test_a_port_in_use_is_told_in_one_sentence(line: Orchestrator) -> None:
+    command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(line.port)]
+    environment = line.environment | {"PREFECT_SERVER_API_AUTH_STRING": line.key}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert f"orchestrator: port {line.port} of 127.0.0.1 cannot be used (Address already in use)" in done.stderr
 
 
 def test_doctor_finds_the_server_good_and_a_wrong_key_at_fault(

@@ -14,6 +14,7 @@ from typer.main import get_command
 
 from pipelines.cli import app
 from pipelines.flows import server, worker
+from pipelines.serving.connections import MOST
 from schemas.safety import SAFE_WITHIN_S
 from schemas.station import load_station
 
@@ -103,6 +104,11 @@ def test_the_worker_is_asked_to_stop_and_its_watchdog_has_time() -> None:
     assert 60 * int(minutes[1]) > 10 * SAFE_WITHIN_S
     assert float(re.search(r"--wait (\d+)", service["ExecStop"][0])[1]) < 60 * int(minutes[1])
     assert service["OOMPolicy"] == ["continue"]
+
+
+@pytest.mark.parametrize("name", ["server", "workbench", "monitor"])
+def test_a_server_has_more_files_than_connections(name: str) -> None:
+    assert int(unit(f"tumbleline-{name}")["Service"]["LimitNOFILE"][0]) >= 4 * MOST
 
 
 @pytest.mark.skipif(

@@ -1,11 +1,17 @@
 """Who may ask the workbench, and who may change something; nothing that is named becomes markup."""
 
+import asyncio
 import gzip
 import hashlib
+import json
+import re
+from dataclasses import replace
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from pkgutil import iter_modules
+from typing import Any
+from urllib.parse import unquote
 
 import httpx
 import pytest
@@ -15,10 +21,11 @@ from capture_double import small_run
 from pipelines.workbench import routes
 from pipelines.workbench.application import create_app
 from pipelines.workbench.routes.static_files import PLOTLY, PLOTLY_SHA256
+from pipelines.workbench.security import PROOF
 from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import WrongUse
 
-TOKEN = "a-token-of-a-test"
+TOKEN = "Zq8vXy3nR5tB7wK1mP4sD9"
 ORIGIN = "http://127.0.0.1:8321"
 SCRIPT = "<img src=x onerror=alert(1)><script>alert(2)</script>"
 
@@ -78,15 +85,145 @@ def test_every_change_is_guarded(client: AsgiClient) -> None:
         assert client.get(address).status_code in {404, 405, 422}, route.path
 
 
-def test_the_token_of_the_address_becomes_a_cookie_that_no_script_reads(client: AsgiClient) -> None:
+def enter(client: AsgiClient, address: str = "/units") -> tuple[str, str]:
+    """The session's cookie and the proof for changes, as a browser gets them."""
+    answer = client.get(f"{address}?token={TOKEN}")
+    assert answer.status_code == 303
+    cookie = answer.headers["set-cookie"].partition(";")[0].partition("=")[2]
+    return cookie, answer.headers["location"].rpartition("#change=")[2]
+
+
+def test_the_token_of_the_address_becomes_a_session_that_no_script_reads(client: AsgiClient) -> None:
     answer = client.get(f"/missing?source=x&token={TOKEN}")
     assert answer.status_code == 303
-    assert answer.headers["location"] == "/missing?source=x"
+    assert answer.headers["location"].partition("#")[0] == "/missing?source=x"
+    assert TOKEN not in str(answer.headers)
     cookie = answer.headers["set-cookie"].lower()
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
     assert client.get("/missing?token=wrong").status_code == 403
-    assert change(client, origin=ORIGIN).status_code == 422  # the client keeps the cookie
+    proof = answer.headers["location"].rpartition("#change=")[2]
+    assert change(client, origin=ORIGIN, **{PROOF: proof}).status_code == 422  # the client keeps the cookie
+
+
+def test_the_cookie_that_other_ports_get_changes_nothing_and_is_no_bearer(client: AsgiClient) -> None:
+    cookie, proof = enter(client)
+    assert change(client, origin=ORIGIN).status_code == 403
+    assert change(client, origin=ORIGIN, **{PROOF: "0" * 64}).status_code == 403
+    for secret in (cookie, proof):
+        assert change(client, authorization=f"Bearer {secret}").status_code == 403
+        assert client.get(f"/units?token={secret}").status_code == 403
+    assert enter(client) != (cookie, proof)
+    assert change(client, origin=ORIGIN, **{PROOF: proof}).status_code == 403  # that of another session
+
+
+def test_a_session_is_of_one_origin_and_ends(
+    client: AsgiClient, settings: WorkbenchSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cookie, proof = enter(client)
+    own = {"origin": ORIGIN, "cookie": f"{settings.cookie}={cookie}", PROOF: proof}
+
+    def told(service: WorkbenchSettings, host: str) -> int:
+        sent = own | {"origin": f"http://{host}", "cookie": f"{service.cookie}={cookie}"}
+        return change(AsgiClient(create_app(service), f"http://{host}"), **sent).status_code
+
+    assert told(settings, "127.0.0.1:8321") == 422
+    assert told(settings, "localhost:8321") == 403
+    assert told(settings, "127.0.0.1:8322") == 403
+    assert told(replace(settings, port=8322), "127.0.0.1:8322") == 403
+    assert told(replace(settings, token=TOKEN[::-1]), "127.0.0.1:8321") == 403
+    end, rest = cookie.partition(".")[::2]
+    forged = f"{int(end) + 1}.{rest}"
+    assert change(client, **own | {"cookie": f"{settings.cookie}={forged}"}).status_code == 403
+    monkeypatch.setattr("pipelines.workbench.access.time.time", lambda: float(end))
+    assert told(settings, "127.0.0.1:8321") == 403
+
+
+@pytest.mark.parametrize(
+    ("token", "found"),
+    [
+        ("", "0 bits"),
+        ("secret", "a token of 6 characters"),
+        ("0123456789abcdef" * 2 + "g", ""),
+        ("0123456789abcdef012345678", "100 bits"),
+        ("1" * 40, "1 different characters"),
+        ("Zq8vXy3nR5tB7wK1mP4s", "121 bits"),
+        ("Zq8vXy3nR5tB7wK1mP4sD9 &x=", "characters other than"),
+    ],
+)
+def test_a_token_that_can_be_guessed_is_refused(settings: WorkbenchSettings, token: str, found: str) -> None:
+    weak = replace(settings, token=token)
+    if not found:
+        weak.refuse_unsafe()
+        return
+    with pytest.raises(WrongUse, match=f"{found}.*at least 128 bits"):
+        create_app(weak)
+
+
+def test_tokens_that_the_workbench_makes_are_long_enough(tmp_path: Path) -> None:
+    for _ in range(200):
+        WorkbenchSettings(archive="x", folder=tmp_path).refuse_unsafe()
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "forwarded", "via", "x-forwarded-for", "x-forwarded-proto", "x-forwarded-host", "x-forwarded-port", "x-forwarded-server",
+        "x-real-ip", "x-original-forwarded-for", "x-client-ip", "true-client-ip", "cf-connecting-ip",
+    ],
+)  # fmt: skip
+def test_what_a_proxy_of_this_machine_passes_on_is_not_local(client: AsgiClient, header: str) -> None:
+    assert client.get("/units").status_code == 200
+    assert client.get("/units", headers={header: "127.0.0.1"}).status_code == 403
+    assert client.get("/units", headers={header: ""}).status_code == 403
+    assert client.get("/units", headers={header: "x", "authorization": f"Bearer {TOKEN}"}).status_code == 200
+
+
+def test_behind_a_proxy_or_by_another_name_nothing_is_local(settings: WorkbenchSettings) -> None:
+    named = AsgiClient(create_app(replace(settings, names=("bench.example",))), ORIGIN)
+    assert named.get("/units", headers={"host": "bench.example"}).status_code == 403
+    assert named.get("/units").status_code == 200
+    proxied = AsgiClient(create_app(replace(settings, proxied=True)), ORIGIN)
+    assert proxied.get("/units").status_code == 403
+    assert "through a proxy the token is needed" in proxied.get("/units").text
+
+
+@pytest.mark.parametrize("path", ["//evil.example", "//evil.example/%2e%2e", "/%5Cevil.example", "/\\evil.example",
+                                  "/%2Fevil.example", "http://evil.example/",
+                                  "/%09/evil.example", "/%0d%0aset-cookie:x", "/units%00"])  # fmt: skip
+def test_no_address_leads_to_another_host(settings: WorkbenchSettings, path: str) -> None:
+    answer = raw(settings, path, f"token={TOKEN}")
+    assert answer.status_code == 400
+    assert "location" not in answer.headers
+    assert "correct it" in answer.text
+
+
+def raw(settings: WorkbenchSettings, path: str, query: str = "", http: str = "1.1") -> httpx.Response:
+    """The answer to a path as it is written: clients normalise it."""
+    sent: list[Any] = []
+    scope = {
+        "type": "http", "method": "GET", "path": unquote(path), "raw_path": path.encode(), "query_string": query.encode(),
+        "headers": [(b"host", b"127.0.0.1:8321")], "http_version": http, "scheme": "http", "server": ("127.0.0.1", 8321),
+        "client": ("127.0.0.1", 50000), "root_path": "",
+    }  # fmt: skip
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    async def asked() -> None:
+        await create_app(settings)(scope, receive, send)
+
+    asyncio.run(asked())
+    body = b"".join(one.get("body", b"") for one in sent[1:])
+    return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=body)
+
+
+def test_a_proxy_that_shows_itself_by_its_old_protocol_alone_is_not_local(settings: WorkbenchSettings) -> None:
+    assert raw(settings, "/upload").status_code == 200
+    assert raw(settings, "/upload", http="1.0").status_code == 403
 
 
 def test_from_another_machine_nothing_is_read_without_the_token(archive: Path, tmp_path: Path) -> None:
@@ -180,3 +317,60 @@ def test_an_empty_archive_has_every_page(tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
     assert client.get("/run?run=latest").status_code == 422
     assert client.get("/nowhere").status_code == 404
+
+
+@pytest.mark.parametrize("figure", ["residuals", "response", "allan", "history", "samples"])
+@pytest.mark.parametrize("ending", ["png", "json", "csv"])
+def test_a_figure_of_a_unit_without_data_is_a_sentence(client: AsgiClient, figure: str, ending: str) -> None:
+    answer = client.get(f"/unit/figure/{figure}.{ending}?run=latest&unit=NOBODY&dwell=NOBODY:1&parameter=x")
+    assert answer.status_code == 422
+    assert re.search("; (choose|click) ", answer.json()["problem"])
+
+
+@pytest.mark.parametrize(
+    "address", ["/run/table/a%00b.csv?run=latest", "/unit/figure/a%00b.png", "/jobs/a%00b", "/static/a%00/b%00.js"]
+)
+def test_a_null_byte_in_a_path_is_a_sentence(client: AsgiClient, address: str) -> None:
+    answer = client.get(address)
+    assert answer.status_code == 400
+    assert "correct it" in answer.text
+
+
+@pytest.mark.parametrize("address", ["/units?search=a%00b", "/run?run=a%00b", "/unit?run=latest&unit=a%00b", "/a?a%00b=1",
+                                     "/run/table/units.csv?run=a%00b", "/station?run=a%00", "/models?model=a%00b"])  # fmt: skip
+def test_a_null_byte_in_a_query_is_no_defect(client: AsgiClient, address: str) -> None:
+    answer = client.get(address)
+    assert answer.status_code in {200, 404, 422}
+    assert "defect" not in answer.text
+
+
+@pytest.mark.parametrize(
+    "key", ["slot-x", "slot-", "slot-²", "slot-0", "slot--1", "slot-01", "slot-99999", "slot-" + "9" * 5000]
+)
+def test_a_slot_that_is_none_is_refused(client: AsgiClient, key: str) -> None:
+    answer = told(client, "/operator/start", {"recipe": "production", key: "A1"})
+    assert answer.status_code == 422
+    assert "a slot from 1 to 8 of the station is needed" in answer.json()["problem"]
+
+
+@pytest.mark.parametrize(
+    ("address", "body"),
+    [
+        ("/operator/start", {"recipe": "production", "slot-1": "A\0"}),
+        ("/operator/start", {"recipe": "\ud800"}),
+        ("/jobs", {"kind": "\ud800"}),
+        ("/jobs", {"kind": "diagnose", "address": "http://[x"}),
+        ("/plan/pose", {"address": "http://[x"}),
+        ("/plan/save", {"name": "a\0b"}),
+        ("/jobs", ["kind"]),
+    ],
+)
+def test_a_body_that_cannot_be_used_is_a_sentence(client: AsgiClient, address: str, body: object) -> None:
+    answer = told(client, address, body)
+    assert answer.status_code == 422
+    assert "reload the page" in answer.json()["problem"] or "correct it" in answer.json()["problem"]
+
+
+def told(client: AsgiClient, address: str, body: object) -> httpx.Response:
+    headers = {"authorization": f"Bearer {TOKEN}", "content-type": "application/json"}
+    return client.post(address, headers=headers, content=json.dumps(body))

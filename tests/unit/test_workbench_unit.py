@@ -11,7 +11,7 @@ from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.workbench.application import create_app
 from pipelines.workbench.settings import WorkbenchSettings
 
-TOKEN = "a-token-of-a-test"
+TOKEN = "Zq8vXy3nR5tB7wK1mP4sD9"
 
 
 def test_figures_and_coefficients_have_their_expanded_uncertainty_once(tmp_path: Path) -> None:

@@ -46,17 +46,19 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
     recipe = str(body.get("recipe", ""))
     if recipe not in known:
         raise WrongUse(f"lot: no recipe is called '{recipe[:60]}'; {did_you_mean(recipe, known)}")
-    seats = {
-        int(key.removeprefix("slot-")): str(value).strip() for key, value in body.items() if key.startswith("slot-")
+    station = stations.named(stations.stations(bench.settings), str(body.get("station", "")))
+    filled = {
+        _slot(key.removeprefix("slot-"), station.slots): serial
+        for key, value in body.items()
+        if key.startswith("slot-") and (serial := str(value).strip())
     }
-    filled = {slot: serial for slot, serial in sorted(seats.items()) if serial}
     if not filled:
         raise WrongUse("lot: no serial number was scanned, one at least is needed; scan a unit into its slot")
     faults = [part.strip() for part in str(body.get("fault", "")).split() if part.strip()]
     repeat = str(body.get("repeat", "0") or "0")
-    if not repeat.isdecimal() or len(repeat) > 6:
+    if not repeat.isdecimal() or not repeat.isascii() or len(repeat) > 6:
         raise WrongUse(f"lot: repeat '{repeat[:20]}', a whole number from 0 on is needed; correct it")
-    station = stations.named(stations.stations(bench.settings), str(body.get("station", "")))
+    filled = dict(sorted(filled.items()))
     lot = lots.start(bench.settings, recipe, list(filled.values()), list(filled), faults, int(repeat), station.file)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
 
@@ -65,7 +67,7 @@ def start(request: Request, body: RequestBody) -> JSONResponse:
 def answer(request: Request, name: str, body: RequestBody) -> JSONResponse:
     """The answer to the question on the page; refused if the question has changed."""
     number = str(body.get("number", ""))
-    if not number.isdecimal():
+    if not number.isdecimal() or not number.isascii() or len(number) > 6:
         raise WrongUse("lot: the number of the question is missing; reload the page")
     lots.answer(workbench_of(request).settings, name, int(number), str(body.get("answer", "")))
     return JSONResponse({"address": OperatorPage(lot=name).address()})
@@ -90,3 +92,11 @@ def again(request: Request, name: str) -> JSONResponse:
     """Continue a stopped lot."""
     lot = lots.again(workbench_of(request).settings, name)
     return JSONResponse({"address": OperatorPage(lot=lot.id).address()})
+
+
+def _slot(text: str, slots: int) -> int:
+    """The number of a slot of the station."""
+    number = int(text) if text.isascii() and text.isdecimal() and len(text) <= 4 else 0
+    if not 1 <= number <= slots or text != str(number):
+        raise WrongUse(f"lot: slot '{text[:20]}', a slot from 1 to {slots} of the station is needed; reload the page")
+    return number

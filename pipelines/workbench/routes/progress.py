@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl, urlsplit
 
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from pipelines.workbench.pages import RequestBody, workbench_of
+from pipelines.workbench.pages import RequestBody, page_address, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.services.events import stream
 from schemas.errors import WrongUse
@@ -22,11 +21,8 @@ router = APIRouter()
 @router.post("/jobs")
 def start(request: Request, body: RequestBody) -> JSONResponse:
     """Start the work that a page needs: ``kind`` and the page's ``address``; the job that does it."""
-    bench = workbench_of(request)
-    kind, address = str(body.get("kind", "")), urlsplit(str(body.get("address", "")))
-    title, content = requests.of_address(
-        bench.settings, kind, address.path, parse_qsl(address.query, keep_blank_values=True)
-    )
+    bench, kind = workbench_of(request), str(body.get("kind", ""))
+    title, content = requests.of_address(bench.settings, kind, *page_address(body))
     return JSONResponse(bench.jobs.submit(kind, title, content).document(), 202)
 
 

@@ -89,11 +89,16 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
         return unit_charts.samples_chart(samples, title, out_unit)
     if name == "history":
         rows = [row for row in _history(bench, state.unit) if unit_charts.parameter_of(row) == state.parameter]
-        return unit_charts.history_chart(rows, state.parameter, str(rows[0]["unit_text"]) if rows else "")
+        if not rows:
+            raise WrongUse(
+                f"figure: unit '{state.unit[:80]}' has no calibrations with '{state.parameter[:80]}', one at least is needed; "
+                "choose a coefficient on its page"
+            )
+        return unit_charts.history_chart(rows, state.parameter, str(rows[0]["unit_text"]))
     if name == "allan":
-        return unit_charts.allan_chart(_table(bench, state, "allan"))
+        return unit_charts.allan_chart(_drawn(bench, state, "allan"))
     if name in {"residuals", "response"}:
-        residuals, dwells = _table(bench, state, "residuals"), _table(bench, state, "dwells")
+        residuals, dwells = _drawn(bench, state, "residuals"), _drawn(bench, state, "dwells")
         draw = unit_charts.residual_chart if name == "residuals" else unit_charts.response_chart
         return draw(state, residuals, dwells)
     raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
@@ -102,6 +107,16 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
 def _table(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
     table = run_table(bench, state.run, name)
     return table[table["unit"] == state.unit]
+
+
+def _drawn(bench: Workbench, state: UnitPage, name: str) -> pd.DataFrame:
+    """The unit's rows of a table to draw."""
+    rows = _table(bench, state, name) if name in bench.archive.run(state.run).tables() else None
+    if rows is None or rows.empty:
+        raise WrongUse(
+            f"figure: unit '{state.unit[:80]}' has no {name} in run {state.run[:80]}, some are needed; choose another unit or run"
+        )
+    return rows
 
 
 def _own(bench: Workbench, state: UnitPage, name: str) -> list[dict[str, Any]]:

@@ -83,9 +83,19 @@ function arrived() {
 }
 
 // --- changes -----------------------------------------------------------------------------------------------------------
+// the storage belongs to this origin with its port; the cookie, which other ports get too, is not enough for a change
+const PROOF = "tumbleline-change-proof";
+const entering = location.hash.match(/^#change=([0-9a-f]{64})$/);
+if (entering) {
+  localStorage.setItem(PROOF, entering[1]);
+  history.replaceState(null, "", location.pathname + location.search);
+}
+
 async function change(address, content, method = "POST") {
   const body = method === "PUT" ? content : JSON.stringify(content ?? {});
   const headers = method === "PUT" ? {} : { "content-type": "application/json" };
+  const proof = localStorage.getItem(PROOF);
+  if (proof) headers["x-change-proof"] = proof;
   const answer = await fetch(address, { method, body, headers });
   const text = await answer.text();
   let found = {};

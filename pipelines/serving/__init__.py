@@ -1,0 +1,1 @@
+"""Limits of the servers of the product: connections, time-outs, sizes of bodies."""
