@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 ATTACHMENT = "certificate.xml"
 DSIG = "http://www.w3.org/2000/09/xmldsig#"
+NUMBERS = "{https://ptb.de/si}*"
+MOST_NAMES, LONGEST_NUMBER = 1000, 1000
 DEEPEST = 20  # levels of the tree of attachments
 
 
@@ -40,12 +42,35 @@ def parsed(data: bytes) -> Any:
         raise SignatureBroken(f"it is not well-formed XML ({problem})") from None
     if root.getroottree().docinfo.doctype:
         raise SignatureBroken("it has a document type declaration, which a certificate does not need")
+    _refuse_slow(data, root)
     return root
+
+
+def _refuse_slow(data: bytes, root: Any) -> None:
+    """Refuse what canonical form and schema take the square of its size for, and no certificate has."""
+    spaces = data.count(b"xmlns")
+    if spaces > MOST_NAMES:
+        raise SignatureBroken(f"it declares {spaces} namespaces, a certificate has at most {MOST_NAMES}")
+    for one in root.iter(NUMBERS):
+        if one.text is not None and len(one.text) > LONGEST_NUMBER:
+            name = one.tag.rpartition("}")[2]
+            raise SignatureBroken(f"{name} has {len(one.text)} characters, a number has at most {LONGEST_NUMBER}")
+    for one in root.iter():
+        if len(one.attrib) > MOST_NAMES:
+            raise SignatureBroken(
+                f"an element has {len(one.attrib)} attributes, one of a certificate at most {MOST_NAMES}"
+            )
 
 
 def canonical(root: Any) -> bytes:
     """An element in exclusive canonical form: equal for documents that say the same."""
-    return library("lxml.etree", "pdf", WHERE).tostring(root, method="c14n", exclusive=True)
+    etree = library("lxml.etree", "pdf", WHERE)
+    try:
+        return etree.tostring(root, method="c14n", exclusive=True)
+    except etree.C14NError as problem:
+        raise SignatureBroken(
+            f"it has no canonical form ({problem}): a namespace in it is not an absolute address"
+        ) from None
 
 
 def xml_signature(data: bytes) -> tuple[Signer, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -88,18 +89,27 @@ def _matched(pattern: re.Pattern[str], lines: list[str]) -> str:
 
 
 def _numbers(root: Any) -> dict[str, tuple[str, ...]]:
+    """Numbers of the results; in a time that grows as the file does, whatever it repeats or nests."""
     numbers: dict[str, tuple[str, ...]] = {}
-    for result in _all(root, "//dcc:result"):
-        head = _first(result, "dcc:name/dcc:content/text()")
-        for real in _all(result, ".//si:real"):
-            quantity = _first(real, "../dcc:name/dcc:content/text()")
-            own = [part for part in (head, quantity, _first(real, "si:label/text()")) if part]
-            key, count = "; ".join(own), 1
-            while key in numbers:  # a second number of the same name does not hide the first
-                count += 1
-                key = f"{'; '.join(own)} ({count})"
-            numbers[key] = tuple(
-                _first(real, f"{path}/text()")
-                for path in ("si:value", "si:unit", "si:expandedUnc/si:uncertainty", "si:expandedUnc/si:coverageFactor")
-            )
+    heads: dict[Any, str] = {}
+    quantities: dict[Any, str] = {}
+    counts: Counter[str] = Counter()
+    for real in root.iter(f"{{{SI}}}real"):
+        result = next(real.iterancestors(f"{{{DCC}}}result"), None)
+        if result is None:
+            continue
+        around = real.getparent()
+        if result not in heads:
+            heads[result] = _first(result, "dcc:name/dcc:content/text()")
+        if around not in quantities:
+            quantities[around] = _first(around, "dcc:name/dcc:content/text()")
+        own = "; ".join(part for part in (heads[result], quantities[around], _first(real, "si:label/text()")) if part)
+        key = own
+        while key in numbers:  # a second number of the same name does not hide the first
+            counts[own] += 1
+            key = f"{own} ({counts[own] + 1})"
+        numbers[key] = tuple(
+            _first(real, f"{path}/text()")
+            for path in ("si:value", "si:unit", "si:expandedUnc/si:uncertainty", "si:expandedUnc/si:coverageFactor")
+        )
     return numbers
