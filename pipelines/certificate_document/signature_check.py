@@ -100,6 +100,8 @@ def xml_signature(data: bytes) -> tuple[Signer, Any]:
     expected = signxml.SignatureConfiguration(location="./", require_x509=True)
     try:
         good = signxml.XMLVerifier().verify(root, x509_cert=pem, expect_config=expected)
+    except MemoryError:  # of this machine: no verdict on the file
+        raise
     except Exception as problem:  # noqa: BLE001 - a file of others may break any part of the reader
         raise SignatureBroken(f"the signature does not hold: {_line(problem)}") from None
     inside = [] if good.signed_xml is None else list(good.signed_xml)
@@ -121,6 +123,8 @@ def attachments(data: bytes) -> list[bytes]:
         document = reader.PdfFileReader(BytesIO(data))
         names = document.root.get("/Names", {}).get("/EmbeddedFiles", {})
         return [spec["/EF"]["/F"].data for name, spec in _named(names, DEEPEST) if name == ATTACHMENT]
+    except MemoryError:  # of this machine: no verdict on the file
+        raise
     except Exception as problem:  # noqa: BLE001 - the same
         raise SignatureBroken(f"it cannot be read as a PDF ({_line(problem)})") from None
 
@@ -147,6 +151,8 @@ def pdf_signers(data: bytes) -> list[Signer]:
         embedded = reader.PdfFileReader(BytesIO(data)).embedded_regular_signatures
         return [_pdf_signer(one) for one in embedded]
     except SignatureBroken:
+        raise
+    except MemoryError:  # of this machine: no verdict on the file
         raise
     except Exception as problem:  # noqa: BLE001 - the same
         raise SignatureBroken(f"the signature of the PDF cannot be read ({_line(problem)})") from None

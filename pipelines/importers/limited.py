@@ -40,6 +40,10 @@ ENVIRONMENT = {
 PROGRAM = "from pipelines.importers.limited_process import main; main()"
 
 
+class ReadingEnded(DataRejected):
+    """A file whose reading reached a limit."""
+
+
 @dataclass(frozen=True)
 class ReadingLimits:
     """Limits of one reading: bytes beyond those of the idle process, seconds of the processor, seconds of the clock."""
@@ -81,12 +85,12 @@ class _Reader:
         except (BrokenPipeError, EOFError):
             status = self._process.wait()
         except TimeoutError:
-            raise DataRejected(
+            raise ReadingEnded(
                 f"{where}: not read after {clock_s:.0f} s, a recording of its size takes a fraction of that; export it as CSV"
             ) from None
         over = status == -getattr(signal, "SIGXCPU", 0)
         found = f"not read after {request[2]} s of the processor" if over else f"its reader was ended (status {status})"
-        raise DataRejected(f"{where}: {found}, a recording that can be read is needed; export it as CSV")
+        raise ReadingEnded(f"{where}: {found}, a recording that can be read is needed; export it as CSV")
 
     def end(self) -> None:
         """End the process, whatever it does."""
@@ -141,7 +145,7 @@ def in_reader(
             else:
                 _idle.append(reader)
     if kind == "memory":
-        raise DataRejected(
+        raise ReadingEnded(
             f"{where}: reading it takes more than {limits.memory_bytes // MIB} MB of memory; divide the recording into several "
             "files, or leave out columns"
         )
