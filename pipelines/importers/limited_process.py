@@ -25,7 +25,7 @@ from schemas.errors import TumblelineError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-KEPT_BYTES = 256 * 2**20
+KEPT_BYTES = 192 * 2**20
 """A process that holds more after a reading ends, so that the memory is free again."""
 _here: list[bool] = []
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 FOLDER = "uploads"
 PART = ".part-"
-LOOK = ReadingLimits(640 * 2**20, 60, 90)
+LOOK = ReadingLimits(560 * 2**20, 60, 90)
 """Of a look at an upload: with the server itself less than 1 GB. What takes more is imported by the command line."""
 KEPT_LOOKS = 32
 WAIT_S = 120.0
@@ -71,7 +71,7 @@ class UploadReading:
 
 
 _looking = threading.Lock()
-_looks: OrderedDict[tuple[str, int, int], UploadReading] = OrderedDict()
+_looks: OrderedDict[tuple[str, int, int], UploadReading | TumblelineError] = OrderedDict()
 
 
 def folder_of(settings: WorkbenchSettings) -> Path:
@@ -135,16 +135,22 @@ def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
         _looks.move_to_end(key)
         while len(_looks) > KEPT_LOOKS:
             _looks.popitem(last=False)
-        return _looks[key]
+        found = _looks[key]
     finally:
         _looking.release()
+    if isinstance(found, TumblelineError):
+        raise type(found)(str(found))
+    return found
 
 
-def _limited(place: Path, page: UploadPage) -> UploadReading:
+def _limited(place: Path, page: UploadPage) -> UploadReading | TumblelineError:
+    """The reading, or why there is none, which is kept as well."""
     try:
         return in_reader(LOOK, place.name, look, place, page)
     except ReadingEnded as problem:
-        raise DataRejected(f"{problem}; or import it with 'tumbleline import {place}'") from None
+        return DataRejected(f"{problem}; or import it with 'tumbleline import {place}'")
+    except TumblelineError as problem:
+        return problem.with_traceback(None)
 
 
 def look(place: Path, page: UploadPage) -> UploadReading:
