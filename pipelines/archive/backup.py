@@ -36,6 +36,7 @@ REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/
 SEAL = re.compile(r"runs/[^/]+/sealed\.json")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
 PAGE = ".html"
+_LISTED = 5
 
 
 @dataclass
@@ -91,9 +92,10 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
     target.prepare()
     _refuse_another(source, target, entries)
     copied, chain = Copied(), _chain_of(source.root, entries)
+    links: list[str] = []
     names = [
         name
-        for name in _names(source.root, "")
+        for name in _names(source.root, "", links)
         if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK
     ]
     kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, chain, copied)]
@@ -102,6 +104,12 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
         raise ArchiveUnusable(
             f"backup: {len(kept)} files of {source.root} are damaged and sound in {target.root}, where they were kept (the "
             f"first is {min(kept)}); run 'tumbleline verify', and restore these files from {target.root}"
+        )
+    if links:
+        raise ArchiveUnusable(
+            f"backup: {len(links)} symbolic links in {source.root} were not followed: {', '.join(sorted(links)[:_LISTED])}"
+            f"{', …' if len(links) > _LISTED else ''}; all other files were copied; replace the links by their content, or "
+            "remove them"
         )
     return copied
 
@@ -153,17 +161,17 @@ def _is_readable(place: Place) -> bool:
         return False
 
 
-def _names(folder: Place, prefix: str) -> set[str]:
-    """Names, below the root, of the files of a folder that are copied."""
+def _names(folder: Place, prefix: str, links: list[str] | None = None) -> set[str]:
+    """Names, below the root, of the files of a folder that are copied; symbolic links are added to ``links``."""
     names: set[str] = set()
-    for path, name in _walk(folder, prefix):
+    for path, name in _walk(folder, prefix, [] if links is None else links):
         if PurePosixPath(name).parts[0] not in {INDEX, packs.FOLDER}:
             names.add(name)
         del path
     return names
 
 
-def _walk(folder: Place, prefix: str) -> Iterator[tuple[Place, str]]:
+def _walk(folder: Place, prefix: str, links: list[str]) -> Iterator[tuple[Place, str]]:
     if not folder.is_dir():
         return
     try:
@@ -172,8 +180,10 @@ def _walk(folder: Place, prefix: str) -> Iterator[tuple[Place, str]]:
         return
     for path in inside:
         name = f"{prefix}/{path.name}" if prefix else path.name
-        if path.is_dir():
-            yield from _walk(path, name)
+        if prefix and isinstance(path, Path) and path.is_symlink():  # a top folder may lie on another disk
+            links.append(name)
+        elif path.is_dir():
+            yield from _walk(path, name, links)
         else:
             yield path, name
 

@@ -15,7 +15,7 @@ import uuid
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive.names import refuse_leading_out
+from pipelines.archive.names import LinkInArchive, refuse_leading_out
 from pipelines.archive.signatures import signed
 from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
@@ -66,6 +66,8 @@ def read_json(path: Place) -> dict[str, Any]:
     """A manifest's content."""
     try:
         data = path.read_bytes()
+    except LinkInArchive:
+        raise
     except OSError:
         raise ArchiveUnusable(_no_manifest(path)) from None
     return parsed(data, path)

@@ -21,6 +21,10 @@ class NameLeadsOut(ArchiveUnusable):
     """A manifest that names a place outside of the archive."""
 
 
+class LinkInArchive(ArchiveUnusable, OSError):
+    """A symbolic link below the top folders: what is behind it is no part of the archive, whoever made it."""
+
+
 def is_plain(name: str) -> bool:
     """Whether a name is a plain file or folder name: no separator, no ``..``, not absolute."""
     return name not in {"", ".", ".."} and not any(mark in name for mark in "/\\\0")

@@ -6,7 +6,7 @@ removed, and a file lies in both for a while: what lists a folder looks at the s
 
 The functions of :mod:`os` stand here where the methods of a path would ask the packs again.
 """
-# ruff: noqa: PTH100, PTH110, PTH116, PTH123, PTH208
+# ruff: noqa: PTH100, PTH110, PTH114, PTH115, PTH116, PTH120, PTH123, PTH208
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from stat import S_IFDIR, S_IFREG, S_ISDIR, S_ISREG
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pipelines.archive import packs
+from pipelines.archive.names import LinkInArchive
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -78,7 +79,8 @@ class PackedPath(Base):
             raise
 
     def open(self, mode: str = "r", *arguments: Any, **options: Any) -> Any:
-        """The file, for reading also from a pack."""
+        """The file, for reading also from a pack; one behind a symbolic link is refused."""
+        self._refuse_link()
         try:
             return open(self, mode, *arguments, **options)
         except (FileNotFoundError, NotADirectoryError):
@@ -99,7 +101,8 @@ class PackedPath(Base):
             return file.read()
 
     def iterdir(self) -> Generator[Any, None, None]:
-        """What lies directly below, by itself or packed, in no particular order."""
+        """What lies directly below, by itself or packed, in no particular order; refused behind a symbolic link."""
+        self._refuse_link()
         try:
             names = set(os.listdir(self))
         except FileNotFoundError:
@@ -135,6 +138,17 @@ class PackedPath(Base):
             if name.startswith(f"{root}/"):
                 return name[len(root) + 1 :]
         return name if str(self.known.root) == "." and not name.startswith("/") else ""
+
+    def _refuse_link(self) -> None:
+        """Refuse a symbolic link on the way from a top folder, which may be one to another disk, to this place."""
+        above, place = self._below_root().count("/"), str(self)
+        for _ in range(above):
+            if os.path.islink(place):
+                raise LinkInArchive(
+                    f"archive: {place} is a symbolic link to {os.readlink(place)[:200]}, what it leads to is no part of the "
+                    "archive and is not read; replace it by the content, or remove it"
+                )
+            place = os.path.dirname(place)
 
     def _packed(self) -> packs.Member | int | None:
         """The packed file of this name, or the time of the packed folder; None where no pack has it."""

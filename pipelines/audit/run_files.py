@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import os
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from errno import ELOOP, ENOENT
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -88,6 +88,8 @@ def stamps_among(root: Path, names: Sequence[str]) -> dict[str, str]:
 
 def _read(path: Place, stamp: str) -> RunFiles:
     content: dict[str, bytes] = {}
+    if isinstance(path, Path) and path.is_symlink():
+        return RunFiles(path.name, stamp, content, "the folder is a symbolic link, which is not followed")
     single = None
     if isinstance(path, PackedPath) and (folder := path.known.folder(f"runs/{path.name}")) is not None:
         single = set(_names(str(path)))
@@ -112,9 +114,17 @@ def _read(path: Place, stamp: str) -> RunFiles:
 
 def _bytes(path: Place, name: str) -> bytes:
     if isinstance(path, Path):
-        with suppress(FileNotFoundError), open(f"{path}/{name}", "rb", buffering=0) as file:  # noqa: PTH123 - many
-            return file.readall()
+        try:
+            with open(f"{path}/{name}", "rb", buffering=0, opener=_no_link) as file:
+                return file.readall()
+        except OSError as problem:
+            if problem.errno not in {ENOENT, ELOOP}:
+                raise
     return (path / name).read_bytes()
+
+
+def _no_link(name: str, flags: int) -> int:
+    return os.open(name, flags | os.O_NOFOLLOW)
 
 
 def _stamps(runs: str, names: Iterable[str], packed: Mapping[str, Mapping[str, str]]) -> dict[str, str]:

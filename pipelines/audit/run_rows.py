@@ -89,7 +89,9 @@ def rows_of_runs(run_files: Iterable[RunFiles]) -> dict[str, pa.Table]:
         try:
             about = _about(files)
             runs.append(_Run(files.run, about, _tables(files)))
-        except (OSError, ValueError, KeyError, ArchiveUnusable) as trouble:  # ArrowInvalid is a ValueError
+        except RecursionError:
+            problem = problem or "a manifest is nested too deeply"
+        except (OSError, ValueError, KeyError, TypeError, ArchiveUnusable) as trouble:  # ArrowInvalid is a ValueError
             problem = problem or first_line(trouble)
         lines.append(_line(files, about, problem))
     kept = {"units": "grades", "coefficients": "coefficients", "figures": "figures"}

@@ -205,6 +205,8 @@ def _schema(done: CheckedFile, root: Any) -> None:
     except DocumentInvalid as problem:
         reason = str(problem).removeprefix("certificate: ").partition("; report")[0]
         done.add("schema", "bad", reason)
+    except SignatureBroken as problem:
+        done.add("schema", "bad", str(problem))
     else:
         done.add("schema", "good", f"the XML is valid against DCC {VERSION}")
 

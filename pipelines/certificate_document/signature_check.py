@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 ATTACHMENT = "certificate.xml"
 DSIG = "http://www.w3.org/2000/09/xmldsig#"
+NUMBERS = "{https://ptb.de/si}*"
+MOST_NAMES, LONGEST_NUMBER = 1000, 1000
 DEEPEST = 20  # levels of the tree of attachments
 
 
@@ -40,12 +42,35 @@ def parsed(data: bytes) -> Any:
         raise SignatureBroken(f"it is not well-formed XML ({problem})") from None
     if root.getroottree().docinfo.doctype:
         raise SignatureBroken("it has a document type declaration, which a certificate does not need")
+    _refuse_slow(data, root)
     return root
+
+
+def _refuse_slow(data: bytes, root: Any) -> None:
+    """Refuse what canonical form and schema take the square of its size for, and no certificate has."""
+    spaces = data.count(b"xmlns")
+    if spaces > MOST_NAMES:
+        raise SignatureBroken(f"it declares {spaces} namespaces, a certificate has at most {MOST_NAMES}")
+    for one in root.iter(NUMBERS):
+        if one.text is not None and len(one.text) > LONGEST_NUMBER:
+            name = one.tag.rpartition("}")[2]
+            raise SignatureBroken(f"{name} has {len(one.text)} characters, a number has at most {LONGEST_NUMBER}")
+    for one in root.iter():
+        if len(one.attrib) > MOST_NAMES:
+            raise SignatureBroken(
+                f"an element has {len(one.attrib)} attributes, one of a certificate at most {MOST_NAMES}"
+            )
 
 
 def canonical(root: Any) -> bytes:
     """An element in exclusive canonical form: equal for documents that say the same."""
-    return library("lxml.etree", "pdf", WHERE).tostring(root, method="c14n", exclusive=True)
+    etree = library("lxml.etree", "pdf", WHERE)
+    try:
+        return etree.tostring(root, method="c14n", exclusive=True)
+    except etree.C14NError as problem:
+        raise SignatureBroken(
+            f"it has no canonical form ({problem}): a namespace in it is not an absolute address"
+        ) from None
 
 
 def xml_signature(data: bytes) -> tuple[Signer, Any]:
@@ -78,6 +103,8 @@ def xml_signature(data: bytes) -> tuple[Signer, Any]:
     )
     try:
         good = signxml.XMLVerifier().verify(root, x509_cert=pem, expect_config=expected)
+    except MemoryError:  # of this machine: no verdict on the file
+        raise
     except Exception as problem:  # noqa: BLE001 - a file of others may break any part of the reader
         raise SignatureBroken(f"the signature does not hold: {_line(problem)}") from None
     inside = [] if good.signed_xml is None else list(good.signed_xml)
@@ -99,6 +126,8 @@ def attachments(data: bytes) -> list[bytes]:
         document = reader.PdfFileReader(BytesIO(data))
         names = document.root.get("/Names", {}).get("/EmbeddedFiles", {})
         return [spec["/EF"]["/F"].data for name, spec in _named(names, DEEPEST) if name == ATTACHMENT]
+    except MemoryError:  # of this machine: no verdict on the file
+        raise
     except Exception as problem:  # noqa: BLE001 - the same
         raise SignatureBroken(f"it cannot be read as a PDF ({_line(problem)})") from None
 
@@ -125,6 +154,8 @@ def pdf_signers(data: bytes) -> list[Signer]:
         embedded = reader.PdfFileReader(BytesIO(data)).embedded_regular_signatures
         return [_pdf_signer(one) for one in embedded]
     except SignatureBroken:
+        raise
+    except MemoryError:  # of this machine: no verdict on the file
         raise
     except Exception as problem:  # noqa: BLE001 - the same
         raise SignatureBroken(f"the signature of the PDF cannot be read ({_line(problem)})") from None

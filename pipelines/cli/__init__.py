@@ -188,19 +188,26 @@ def main() -> None:
             sys.exit(PIPE_CLOSED)  # status 1 is a verdict
         raise
     except Exception as problem:  # noqa: BLE001 - a defect: one line, details in a file, never exit status 1
-        if isinstance(problem, OSError) and problem.errno == errno.ENAMETOOLONG:
-            _leave(
-                f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",
-                UNUSABLE,
-            )
-        from schemas.installed import not_installed
+        _unexpected(problem)
 
-        missing = not_installed(problem)
-        if missing is not None:
-            _leave(missing, UNUSABLE)
-        from pipelines.cli.unexpected import write_report
 
-        _leave(write_report(problem), UNEXPECTED)
+def _unexpected(problem: Exception) -> None:
+    """End with what a person can do about an exception, or with a report for the developers."""
+    if isinstance(problem, MemoryError):
+        _leave("the command needs more memory than is available; give it less data at once", UNUSABLE)
+    if isinstance(problem, OSError) and problem.errno == errno.ENAMETOOLONG:
+        _leave(
+            f"'{shown(str(problem.filename))}': the file name is too long for this system; give a shorter one",
+            UNUSABLE,
+        )
+    from schemas.installed import not_installed
+
+    missing = not_installed(problem)
+    if missing is not None:
+        _leave(missing, UNUSABLE)
+    from pipelines.cli.unexpected import write_report
+
+    _leave(write_report(problem), UNEXPECTED)
 
 
 def _one_thread() -> None:

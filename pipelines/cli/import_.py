@@ -147,6 +147,9 @@ def command(
     Columns are named, or numbered from 1. Nothing is guessed: what neither the file nor its numbers show must be given. Exit
     status 1: the requested fit is not adequate, or cannot be judged.
     """
+    from pipelines.importers import limited
+
+    limited.start()
     if procedure and (columns or procedure != "sweep"):
         from pipelines.cli.waveform_import import import_and_print
 

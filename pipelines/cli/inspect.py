@@ -46,6 +46,9 @@ def command(
     dwells in the exchange format needs no import: the last line is then 'tumbleline diagnose FILE'. Exit status 1: values are
     missing, or the table cannot be used.
     """
+    from pipelines.importers import limited
+
+    limited.start()
     from pipelines.importers.inspection import inspect
 
     if join not in {"", "rows", "columns"}:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import stat
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.importers.readers import reader_of
-from pipelines.importers.unpacking import gunzipped
+from pipelines.importers.limited import in_reader, limits_for
+from pipelines.importers.unpacking import MOST_BYTES, gunzipped, refuse_cells
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import is_file as is_there
 from schemas.foreign import shown
@@ -56,7 +57,7 @@ def read(path: Path) -> tuple[pd.DataFrame, SourceFile]:
 
 
 def read_content(path: Path, group: str = "") -> tuple[Content, SourceFile]:
-    """The content of a file, and its source.
+    """The content of a file, and its source; read by the process of the reader.
 
     Parameters
     ----------
@@ -69,8 +70,23 @@ def read_content(path: Path, group: str = "") -> tuple[Content, SourceFile]:
     WrongUse
         There is no such file, a library is missing, or a group must be chosen.
     """
-    packed = _bytes(path)
+    try:
+        about = path.stat()
+        own = not stat.S_ISREG(about.st_mode) or path.is_relative_to("/dev") or path.is_relative_to("/proc")
+    except (OSError, ValueError):
+        return content_here(path, group)  # which says why it cannot be read
+    given = _bytes(path, MOST_BYTES) if own else None  # a pipe, or a file that only this process has open
+    limits = limits_for(about.st_size if given is None else len(given))
+    return in_reader(limits, path.name, content_here, path, group, given)
+
+
+def content_here(path: Path, group: str = "", given: bytes | None = None) -> tuple[Content, SourceFile]:
+    """The content of a file, and its source, read by this process."""
+    from pipelines.importers.readers import reader_of
+
+    packed = _bytes(path) if given is None else given
     data = gunzipped(packed, path.name) if packed.startswith(_GZIP) else packed
+    refuse_cells(data, len(packed), path.name)
     reader = reader_of(data)
     content = reader.read(path.name, data, group)
     if content.table.empty:
@@ -81,9 +97,13 @@ def read_content(path: Path, group: str = "") -> tuple[Content, SourceFile]:
     return replace(content, table=table), source
 
 
-def _bytes(path: Path) -> bytes:
+def _bytes(path: Path, most: int = -1) -> bytes:
     try:
-        return path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(most if most < 0 else most + 1)
+        if most < 0 or len(content) <= most:
+            return content
+        message = f"{path}: more than {most} bytes of a pipe, at most these are read; write them to a file"
     except IsADirectoryError:
         message = f"{path}: a folder, a file is needed; name the file"
     except (OSError, ValueError) as problem:  # a name with a zero byte is a ValueError

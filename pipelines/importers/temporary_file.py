@@ -10,10 +10,21 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Generator
 
+HANDLES = Path("/proc/self/fd")
+
 
 @contextmanager
 def as_file(data: bytes, suffix: str) -> Generator[Path]:
-    """The path of a temporary file with the bytes."""
+    """The path of a temporary file with the bytes.
+
+    Where the system gives open files a path, it has no other: nothing is left of it, also when the process is killed.
+    """
+    if HANDLES.is_dir():
+        with tempfile.TemporaryFile(prefix="tumbleline-") as file:
+            file.write(data)
+            file.flush()
+            yield HANDLES / str(file.fileno())
+        return
     with tempfile.TemporaryDirectory(prefix="tumbleline-") as folder:
         path = Path(folder) / f"recording{suffix}"
         path.write_bytes(data)

@@ -89,7 +89,7 @@ def is_number(word: str, decimal: str = ".") -> bool:
     return len(word) <= _LONGEST and (_POINT if decimal == "." else _COMMA).fullmatch(word) is not None
 
 
-def layout(lines: Sequence[str], filled: list[int]) -> Layout | None:
+def layout(lines: Sequence[str], filled: Sequence[int]) -> Layout | None:
     """The layout of a text's lines, those of ``filled_lines`` its rows; None if all lines are comments."""
     if not filled:
         return None
@@ -149,7 +149,7 @@ def _numeric_columns(sample: Sequence[str], divider: str, decimal: str, width: i
 
 
 def _first_row(
-    lines: Sequence[str], filled: list[int], divider: str, decimal: str, width: int, numeric: list[bool]
+    lines: Sequence[str], filled: Sequence[int], divider: str, decimal: str, width: int, numeric: list[bool]
 ) -> int:
     """The first line of the table: like the sampled ones, with the broken rows right above it, which are rows too."""
     if not any(numeric):

@@ -6,7 +6,8 @@ import io
 import re
 import warnings
 from bisect import bisect_left
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -24,6 +25,7 @@ _MORE = "\0more"
 MOST_COLUMNS = 10_000
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
 _OPEN = re.compile(r'(?:^|[,;\t|]) *"[^"]*$')
+_BLOCK = 100_000
 _FEW_BYTES, _MOSTLY = 16, 0.9
 _MOST_LINES = 10
 """Line breaks of a quoted field, at most: beyond them the quote is a sign such as that of inches."""
@@ -63,7 +65,9 @@ def _wide(data: bytes) -> tuple[str, ...]:
 def content(text: str, where: str, encoding: str = "UTF-8") -> Content:
     """The columns of a text, named as there ("1", "2", … without a header), and its detected layout."""
     lines, grouped = without_thousands(logical_lines(text))
-    filled = filled_lines(lines)
+    filled: Sequence[int] = filled_lines(lines)
+    if len(filled) == len(lines):
+        filled = range(len(lines))  # of a million rows 8 MB, and as much again on the way between processes
     detected = layout(lines, filled)
     if detected is None:
         raise DataRejected(f"{where}: no rows of data were found, at least one is needed; check the file")
@@ -123,16 +127,7 @@ def _parsed(body: Sequence[str], detected: Layout, labels: list[str], where: str
     extra = [*labels, *(["\0last"] if detected.trailing else []), _MORE]
     with foreign(wrong, "repair or remove the broken rows"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        table = pd.read_csv(
-            io.StringIO("\n".join(body)),
-            sep=detected.divider,
-            decimal=detected.decimal,
-            header=None,
-            names=extra,
-            index_col=False,
-            skipinitialspace=True,
-            low_memory=False,
-        )
+        table = _read(body, detected, extra)
     more = table.pop(_MORE).notna().to_numpy()
     if detected.trailing:
         more = more | table.pop("\0last").notna().to_numpy()
@@ -140,6 +135,31 @@ def _parsed(body: Sequence[str], detected: Layout, labels: list[str], where: str
         row = int(np.flatnonzero(more)[0])
         raise DataRejected(f"{wrong} (row {row} has more); repair or remove the broken rows")
     return _fortran(table)
+
+
+def _read(body: Sequence[str], detected: Layout, names: list[str]) -> pd.DataFrame:
+    """The rows by the parser: in blocks, as it takes ten times their size, unless a column is text in some blocks only."""
+    how: dict[str, Any] = {
+        "sep": detected.divider,
+        "decimal": detected.decimal,
+        "header": None,
+        "names": names,
+        "index_col": False,
+        "skipinitialspace": True,
+        "low_memory": False,
+    }
+    if len(body) > 2 * _BLOCK:
+        with suppress(ValueError):  # a broken row: the parser of the whole names it
+            parts = [
+                pd.read_csv(io.StringIO("\n".join(body[k : k + _BLOCK])), **how) for k in range(0, len(body), _BLOCK)
+            ]
+            if all(len(kinds) == 1 or kinds <= {"i", "u", "f"} for kinds in _kinds(parts)):
+                return pd.concat(parts, ignore_index=True)
+    return pd.read_csv(io.StringIO("\n".join(body)), **how)
+
+
+def _kinds(parts: Sequence[pd.DataFrame]) -> list[set[str]]:
+    return [{part.dtypes.iloc[k].kind for part in parts} for k in range(len(parts[0].columns))]
 
 
 def _fortran(table: pd.DataFrame) -> pd.DataFrame:

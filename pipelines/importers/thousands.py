@@ -26,13 +26,13 @@ _MANY = 20
 the same column whole numbers without it, all below a thousand."""
 
 
-def without_thousands(lines: Sequence[str]) -> tuple[list[str], str]:
+def without_thousands(lines: Sequence[str]) -> tuple[Sequence[str], str]:
     """Lines with their numbers without separators of thousands, and a remark; the lines as they are where there are none."""
     later = lines[len(lines) // 3 :]
     sample = [line for line in later[:: max(1, len(later) // _SAMPLE)] if not is_comment(line)]
     divider = _divider(sample)
     if not divider:
-        return list(lines), ""
+        return lines, ""
     rows = [fields_of(line, divider) for line in sample]
     for sign in (*_SURE, " ", ",", "."):
         if not _is_separator(sign, rows):
@@ -40,7 +40,7 @@ def without_thousands(lines: Sequence[str]) -> tuple[list[str], str]:
         grouped = _grouped(sign)
         cleaned = [_cleaned(line, divider, sign, grouped) for line in lines]
         return cleaned, f"numbers with {_NAMES.get(sign, 'a space')} between thousands"
-    return list(lines), ""
+    return lines, ""
 
 
 def _divider(sample: Sequence[str]) -> str:

@@ -24,6 +24,8 @@ MOST_TIMES = 100
 FREE_BYTES = 2**26
 """Size up to which any multiple is allowed: tables of constants are small."""
 PIECE = 2**20
+MOST_CELLS, FREE_CELLS, CELLS_PER_BYTE = 2**27, 2**22, 16
+"""Of a text: at most, at any size of its file, and of a packed byte. A cell takes 8 bytes or more, whatever its text takes."""
 
 
 def refuse_larger(size: int, packed: int, where: str) -> None:
@@ -40,6 +42,17 @@ def refuse_larger(size: int, packed: int, where: str) -> None:
         f"{where}: {packed} bytes unpack to {size} or more, at most {MOST_BYTES} and {MOST_TIMES} times the file are read; "
         "divide the recording into several files, or unpack and look at it"
     )
+
+
+def refuse_cells(data: bytes, packed: int, where: str) -> None:
+    """Refuse a text with too many cells; bytes of a binary format have few of the signs that divide cells."""
+    cells = data.count(b"\n") + max(data.count(sign) for sign in (b",", b";", b"\t", b"|", b" "))
+    most = min(MOST_CELLS, max(FREE_CELLS, CELLS_PER_BYTE * packed))
+    if cells > most:
+        raise DataRejected(
+            f"{where}: {packed} bytes hold about {cells} cells, at most {most} are read; divide the recording into several "
+            "files, or leave out columns"
+        )
 
 
 def gunzipped(data: bytes, where: str) -> bytes:

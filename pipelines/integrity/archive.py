@@ -144,6 +144,12 @@ def _verified(
     there = _below(archive.root / "captures")  # before the runs: each run is there before its capture
     chosen = [archive.run(name) for name in runs] or [Run(archive, one.name) for one in _below(archive.root / "runs")]
     captures = _captures(archive, chosen) if runs else there
+    check_links(archive, [run.path for run in chosen] + captures if runs else _below(archive.root), total)
+    if total.findings:
+        total.remarks.append(
+            "symbolic links are not followed: nothing else was checked until they are replaced or removed"
+        )
+        return Report(total, "", _trust(total), len(chosen), len(captures), time.perf_counter() - start)
     shards = [] if runs else _below(archive.root / "calibrations")
     tasks: list[Callable[[], VerifiedPart]] = [
         *(lambda run=run: check_run(run, total.blank(), tables.VERSION) for run in chosen),
@@ -168,8 +174,6 @@ def _verified(
         check_ledger_index(archive, total)
         for check in also:
             check(archive, total)
-    else:
-        check_links(archive, [run.path for run in chosen] + captures, total)
     _report_untrusted(total, demanded=demanded)
     total.findings = by_cause(total.findings, archive.root, chain.differing)
     return Report(total, chain.head, _trust(total), len(chosen), len(captures), time.perf_counter() - start)

@@ -46,14 +46,12 @@ def check_mark(archive: Archive, checked: VerifiedPart) -> None:
 
 
 def check_surroundings(archive: Archive, checked: VerifiedPart) -> None:
-    """Every file and link of a local archive that is not the archive's own."""
+    """Every file of a local archive that is not the archive's own."""
     if not isinstance(archive.root, Path):  # an object store has no links, and its listing is slow
         return
     strangers: list[str] = []
     for name, place in _all(archive.root):
-        if place.is_symlink():
-            _check_link(name, place, checked)
-        elif not OURS.fullmatch(name) and files.TEMPORARY not in name:
+        if not place.is_symlink() and not OURS.fullmatch(name) and files.TEMPORARY not in name:
             if _is_key(place):
                 checked.wrong(
                     SIGNATURE, place, "is a private key: who can edit the archive could sign with it; move it out"
@@ -65,27 +63,36 @@ def check_surroundings(archive: Archive, checked: VerifiedPart) -> None:
 
 
 def check_links(archive: Archive, folders: Iterable[Place], checked: VerifiedPart) -> None:
-    """Links in the given folders of a local archive: for checks of a part of the archive."""
+    """Links in the given folders of a local archive: nothing behind them is read, so this is the first of all checks."""
     for folder in folders:
-        if isinstance(folder, Path) and isinstance(archive.root, Path):
-            for place in (folder, *folder.rglob("*")):
-                if place.is_symlink():
-                    _check_link(place.relative_to(archive.root).as_posix(), place, checked)
+        if not isinstance(folder, Path):  # an object store has no links
+            continue
+        top = folder.parent == archive.root  # may be a link to another disk
+        for place in (str(folder),) if folder.is_symlink() and not top else _links(str(folder)):
+            # a link is no file of the archive: its target can be changed elsewhere
+            what = f"is a link to {os.readlink(place)}: replace it by the content"  # noqa: PTH115 - as it was written
+            checked.wrong(FOREIGN, Path(place), what)
+
+
+def _links(folder: str) -> Iterator[str]:
+    """Symbolic links below a folder; they are not followed."""
+    try:
+        inside = list(os.scandir(folder))
+    except OSError:  # a file, or told by the other checks
+        return
+    for one in inside:
+        if one.is_symlink():
+            yield one.path
+        elif one.is_dir(follow_symlinks=False):
+            yield from _links(one.path)
 
 
 def _all(root: Path) -> Iterator[tuple[str, Path]]:
-    """Files and links below a folder by name; folders that are links are not followed."""
-    for folder, below, names in os.walk(root):
-        for name in sorted((*names, *(one for one in below if (Path(folder) / one).is_symlink()))):
+    """Files below a folder by name."""
+    for folder, _, names in os.walk(root):
+        for name in sorted(names):
             place = Path(folder) / name
             yield place.relative_to(root).as_posix(), place
-
-
-def _check_link(name: str, place: Path, checked: VerifiedPart) -> None:
-    """A link is no file of the archive: its target can be changed elsewhere. Top folders may be links to another disk."""
-    if "/" in name:
-        what = f"is a link to {os.readlink(place)}: replace it by the content"  # noqa: PTH115 - as it was written
-        checked.wrong(FOREIGN, place, what)
 
 
 def _is_key(place: Path) -> bool:

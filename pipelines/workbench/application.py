@@ -14,6 +14,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from inertial.errors import InertialError
+from pipelines.workbench.bodies import SmallBodies
 from pipelines.workbench.pages import Workbench, page
 from pipelines.workbench.security import Guard
 from pipelines.workbench.services import lots
@@ -61,7 +62,7 @@ def create_app(settings: WorkbenchSettings, ending: Callable[[], bool] = lambda:
     app.add_exception_handler(HTTPException, _not_there)
     app.add_exception_handler(RequestValidationError, _not_readable)
     app.add_exception_handler(Exception, _defect)
-    return Guard(app, settings)
+    return Guard(SmallBodies(app), settings)
 
 
 def _problem(request: Request, problem: Exception) -> Response:

@@ -120,11 +120,11 @@ def test_a_copy_during_which_a_run_ends_is_sound(made: Path, tmp_path: Path, mon
     archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
     names, listed = backup._names, list[str]()
 
-    def ends_after_the_chain_is_listed(folder: Path, prefix: str) -> set[str]:
+    def ends_after_the_chain_is_listed(folder: Path, prefix: str, *links: list[str]) -> set[str]:
         if not prefix and not listed:
             listed.append("files")
             measure(tmp_path / "line", 2)  # the interrupted run is completed and sealed
-        return names(folder, prefix)
+        return names(folder, prefix, *links)
 
     monkeypatch.setattr(backup, "_names", ends_after_the_chain_is_listed)
     copy_archive(archive, copy)

@@ -229,13 +229,18 @@ def test_only_files_of_the_folder_are_sources(settings: WorkbenchSettings, tmp_p
 
 
 def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: WorkbenchSettings) -> None:
-    first = uploads.keep(settings, "../../etc/a<b>.csv", b"1")
+    def keep(name: str, content: bytes) -> str:
+        part = uploads.part_of(settings)
+        part.write_bytes(content)
+        return uploads.keep(settings, name, part)
+
+    first = keep("../../etc/a<b>.csv", b"1")
     assert Path(first).parent == settings.folder / "uploads"
-    assert uploads.keep(settings, "../../etc/a<b>.csv", b"1") == first
-    assert uploads.keep(settings, "a<b>.csv", b"2") != first
+    assert keep("../../etc/a<b>.csv", b"1") == first
+    assert keep("a<b>.csv", b"2") != first
     for name in ("a.exe", "", ".."):
         with pytest.raises(WrongUse):
-            uploads.keep(settings, name, b"1")
+            keep(name, b"1")
     with pytest.raises(WrongUse):
         uploads.resolve(settings, "/etc/passwd")
 

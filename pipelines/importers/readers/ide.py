@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import io
+import math
+import re
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, chosen
-from pipelines.importers.temporary_file import as_file
 from schemas.errors import DataRejected
-from schemas.foreign import foreign
+from schemas.foreign import foreign, shown
 from schemas.library import library
 
 NAME, TITLE, EXTRA, ORDER = "ide", "enDAQ IDE", "ide", 70
 MAGIC = b"\x1a\x45\xdf\xa3"  # EBML
 DOCTYPE = b"mide"
+_QUOTIENT = re.compile(
+    r"\s*([+-]?[0-9.]{1,20}(?:[eE][+-]?\d{1,3})?)\s*(?:/\s*([+-]?[0-9.]{1,20}(?:[eE][+-]?\d{1,3})?))?\s*"
+)
 REMEDY = "copy it again, or export the channel as CSV"
 
 
@@ -29,9 +35,11 @@ def read(name: str, data: bytes, group: str) -> Content:
     idelib = library("idelib", EXTRA, f"{name}: an IDE recording")
     broken = f"{name}: an IDE recording that cannot be read"
     # the library's importFile opens the file itself, and leaves it open where the file is broken
-    with as_file(data, ".ide") as path, path.open("rb") as stream:
+    with io.BytesIO(data) as stream:
         with foreign(broken, REMEDY):
-            dataset = idelib.importer.openFile(stream, quiet=True)
+            # the library evaluates these strings as Python: 9**99**99 never returns
+            idelib.parsers.valEval = partial(_number, where=name)
+            dataset = idelib.importer.openFile(stream, quiet=True, name=name)
             idelib.importer.readData(dataset)
             channels = {f"{key}": channel for key, channel in dataset.channels.items()}
             lengths = {key: len(channel.getSession()) for key, channel in channels.items()}
@@ -44,6 +52,22 @@ def read(name: str, data: bytes, group: str) -> Content:
         title = chosen([(t, filled[k]) for t, k in titles.items()], group, name)
         with foreign(broken, REMEDY):
             return _content(channels[titles[title]])
+
+
+def _number(text: str | bytes, where: str) -> float:
+    """A sample rate or a time scale, as the recorders write it: a number, or number/number such as 1.0/32768."""
+    plain = text.decode("utf-8", "replace") if isinstance(text, bytes | bytearray) else str(text)
+    match = _QUOTIENT.fullmatch(plain)
+    try:
+        value = float(match[1]) / float(match[2] or 1.0) if match else float("nan")
+    except (ValueError, ZeroDivisionError):
+        value = float("nan")
+    if not math.isfinite(value):
+        raise DataRejected(
+            f"{where}: an IDE recording with the rate or time scale '{shown(plain)}', a number or number/number is needed; "
+            f"{REMEDY}"
+        )
+    return value
 
 
 def _content(channel: Any) -> Content:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, Response
 
 from pipelines.importers.mapping import OUTPUT_UNITS, TEMPERATURE_UNITS, TIME_UNITS
@@ -33,7 +34,8 @@ def upload(request: Request) -> Response:
         except TumblelineError as problem:
             problems = [*problems, str(problem)]
     folder = bench.settings.folder / uploads.FOLDER
-    there = sorted(folder.iterdir(), key=lambda one: -one.stat().st_mtime)[:12] if folder.is_dir() else []
+    files = [one for one in folder.iterdir() if not one.name.startswith(uploads.PART)] if folder.is_dir() else []
+    there = sorted(files, key=lambda one: -one.stat().st_mtime)[:12]
     return page(
         request, "upload.html", state, problems, reading=reading, job=job, done=done, there=[str(one) for one in there],
         meanings=MEANINGS, mapped=dict(pair.split("=", 1) for pair in state.columns if "=" in pair),
@@ -44,18 +46,22 @@ def upload(request: Request) -> Response:
 @router.put("/upload/file")
 async def dropped(request: Request, name: str) -> JSONResponse:
     """Store a file; return the address of its page."""
-    parts: list[bytes] = []
-    size = 0
-    async for part in request.stream():
-        size += len(part)
-        if size > uploads.LARGEST:
-            raise WrongUse(
-                f"upload: more than {uploads.LARGEST // 10**6} MB; import it with 'tumbleline import {name[:80]}'"
-            )
-        parts.append(part)
-    if not size:
-        raise WrongUse(f"upload: '{name[:80]}' is empty; choose another file")
-    place = uploads.keep(workbench_of(request).settings, name, b"".join(parts))
+    settings, size = workbench_of(request).settings, 0
+    arrived = await run_in_threadpool(uploads.part_of, settings)
+    try:
+        with arrived.open("wb") as file:
+            async for part in request.stream():
+                size += len(part)
+                if size > uploads.LARGEST:
+                    raise WrongUse(
+                        f"upload: more than {uploads.LARGEST // 10**6} MB; import it with 'tumbleline import {name[:80]}'"
+                    )
+                await run_in_threadpool(file.write, part)
+        if not size:
+            raise WrongUse(f"upload: '{name[:80]}' is empty; choose another file")
+        place = await run_in_threadpool(uploads.keep, settings, name, arrived)
+    finally:
+        arrived.unlink(missing_ok=True)
     return JSONResponse({"address": UploadPage(file=place).address()})
 
 

@@ -6,9 +6,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipelines.importers.limited import in_reader
 from pipelines.workbench.services import models, sources, uploads
 from pipelines.workbench.state import AuditPage, MissingPage, ModelsPage, PageState, PlanPage, UploadPage
 from schemas.errors import WrongUse, did_you_mean
+from schemas.foreign import is_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -62,13 +64,20 @@ def settled(settings: WorkbenchSettings, page: MissingPage) -> MissingPage:
 
 @lru_cache(maxsize=64)
 def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
-    """The default model of a diagnosis of these dwells."""
+    """The default model of a diagnosis of these dwells; a file is read by the process of the reader, within its limits."""
+    del stamp  # other content gives another result
+    if is_file(name):
+        return in_reader(uploads.LOOK, Path(name).name, default_model_of, archive, name)
+    return default_model_of(archive, name)
+
+
+def default_model_of(archive: str, name: str) -> tuple[str, ...]:
+    """The default model of a diagnosis of dwells, by this process."""
     from inertial import effects
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.inputs import judged_effects
     from pipelines.importers.exchange import read_dwells
 
-    del stamp  # other content gives another result
     with effects.additions_forgotten():
         judged = judged_effects(name, archive, "", None, "diagnose")
     return tuple(judged or default_model(read_dwells(name, archive=archive)))

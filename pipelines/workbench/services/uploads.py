@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import filecmp
+import os
 import re
+import tempfile
+import threading
+from collections import OrderedDict
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipelines.importers.limited import ReadingEnded, ReadingLimits, in_reader
 from pipelines.tables.dwell_columns import is_exchange
 from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected, TumblelineError, WrongUse
@@ -20,6 +26,11 @@ if TYPE_CHECKING:
     from pipelines.workbench.state import UploadPage
 
 FOLDER = "uploads"
+PART = ".part-"
+LOOK = ReadingLimits(560 * 2**20, 60, 90)
+"""Of a look at an upload: with the server itself less than 1 GB. What takes more is imported by the command line."""
+KEPT_LOOKS = 32
+WAIT_S = 120.0
 LARGEST = 400_000_000
 NAME = re.compile(r"[^A-Za-z0-9._ -]+")
 ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".csv.gz", ".tsv.gz", ".txt.gz", ".parquet.gz")
@@ -59,8 +70,26 @@ class UploadReading:
     problem: str = ""
 
 
-def keep(settings: WorkbenchSettings, name: str, content: bytes) -> str:
-    """The path of a dropped file; another content under the same name gets a number.
+_looking = threading.Lock()
+_looks: OrderedDict[tuple[str, int, int], UploadReading | TumblelineError] = OrderedDict()
+
+
+def folder_of(settings: WorkbenchSettings) -> Path:
+    """The folder of the uploads."""
+    folder = settings.folder / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def part_of(settings: WorkbenchSettings) -> Path:
+    """A new file for an upload that arrives."""
+    handle, name = tempfile.mkstemp(prefix=PART, dir=folder_of(settings))
+    os.close(handle)
+    return Path(name)
+
+
+def keep(settings: WorkbenchSettings, name: str, part: Path) -> str:
+    """The path of a dropped file, renamed from where it arrived; another content under the same name gets a number.
 
     Raises
     ------
@@ -72,15 +101,14 @@ def keep(settings: WorkbenchSettings, name: str, content: bytes) -> str:
         raise WrongUse(
             f"upload: '{plain or 'a file without a name'}', one of {', '.join(ENDINGS)} is needed; save it as one of them"
         )
-    folder = settings.folder / FOLDER
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = folder_of(settings)
     stem, dot, ending = plain.partition(".")
     for number in range(1000):
         place = folder / (plain if number == 0 else f"{stem}-{number}{dot}{ending}")
-        if place.is_file() and place.read_bytes() == content:
+        if place.is_file() and filecmp.cmp(place, part, shallow=False):
             return str(place)
         if not place.exists():
-            place.write_bytes(content)
+            part.rename(place)
             return str(place)
     raise WrongUse(f"upload: {folder} holds a thousand files called '{plain}'; remove some")
 
@@ -95,10 +123,40 @@ def resolve(settings: WorkbenchSettings, name: str) -> Path:
 
 
 def reading(settings: WorkbenchSettings, page: UploadPage) -> UploadReading:
-    """The file of a page as it is read."""
+    """The file of a page as it is read: by the process of the reader, one at a time, and kept as long as the file is the same."""
+    place = resolve(settings, page.file)
+    about = place.stat()
+    key = (page.model_dump_json(), about.st_size, about.st_mtime_ns)
+    if not _looking.acquire(timeout=WAIT_S):
+        raise WrongUse("upload: the server reads other files; try again in some minutes")
+    try:
+        if key not in _looks:
+            _looks[key] = _limited(place, page)
+        _looks.move_to_end(key)
+        while len(_looks) > KEPT_LOOKS:
+            _looks.popitem(last=False)
+        found = _looks[key]
+    finally:
+        _looking.release()
+    if isinstance(found, TumblelineError):
+        raise type(found)(str(found))
+    return found
+
+
+def _limited(place: Path, page: UploadPage) -> UploadReading | TumblelineError:
+    """The reading, or why there is none, which is kept as well."""
+    try:
+        return in_reader(LOOK, place.name, look, place, page)
+    except ReadingEnded as problem:
+        return DataRejected(f"{problem}; or import it with 'tumbleline import {place}'")
+    except TumblelineError as problem:
+        return problem.with_traceback(None)
+
+
+def look(place: Path, page: UploadPage) -> UploadReading:
+    """The file of a page, read by this process."""
     from pipelines.importers import files
 
-    place = resolve(settings, page.file)
     table, _ = files.read(place)
     names = tuple(str(column) for column in table.columns)
     offered = _offered(names)

@@ -1,0 +1,130 @@
+"""The process that reads files of persons: it takes a function and its arguments, and sends the result or the error.
+
+The limit of memory is beyond what the process has when it begins: libraries take address space of their own.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import queue
+import resource
+import signal
+import struct
+import sys
+import threading
+import traceback
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from schemas.errors import TumblelineError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+KEPT_BYTES = 192 * 2**20
+"""A process that holds more after a reading ends, so that the memory is free again."""
+_here: list[bool] = []
+
+
+def is_reader() -> bool:
+    """Whether this is the process that reads."""
+    return bool(_here)
+
+
+def send(sink: Any, value: Any) -> None:
+    """A value to the other process; arrays are written from where they are."""
+    arrays: list[pickle.PickleBuffer] = []
+    head = pickle.dumps(value, 5, buffer_callback=arrays.append)
+    pieces: list[Any] = [head, *(one.raw() for one in arrays)]
+    sink.write(struct.pack(f">{len(pieces) + 1}Q", len(pieces), *(len(memoryview(one)) for one in pieces)))
+    for piece in pieces:
+        sink.write(piece)
+    sink.flush()
+
+
+def received(read: Callable[[int], bytes | bytearray]) -> Any:
+    """A value from the other process, by a function that gives so many bytes."""
+    (count,) = struct.unpack(">Q", read(8))
+    sizes = struct.unpack(f">{count}Q", read(8 * count))
+    head, *arrays = [read(size) for size in sizes]
+    return pickle.loads(head, buffers=arrays)  # noqa: S301 - from a process of this program
+
+
+def main() -> None:
+    """Read until the other process ends; its end also ends a reading."""
+    _here.append(True)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other process decides
+    source, sink = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is no answer
+    requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(source, requests), daemon=True).start()
+    import_module("pipelines.importers.readers")  # while the other process prepares its first request
+
+    while True:
+        request = requests.get()
+        kind, content = _done(*request)
+        gc.collect()
+        last = kind == "memory" or _pages(1) > KEPT_BYTES
+        try:
+            send(sink, (kind, content, last))
+        except MemoryError:
+            send(sink, ("memory", None, True))
+        del request, content
+        if last:
+            return
+
+
+def _listen(source: BinaryIO, requests: queue.SimpleQueue[Any]) -> None:
+    """Pass requests on; the process ends where there is nobody who asks."""
+
+    def exactly(count: int) -> bytes:
+        piece = source.read(count)
+        if len(piece) < count:
+            os._exit(0)
+        return piece
+
+    while True:
+        requests.put(received(exactly))
+
+
+def _done(
+    folder: str, memory: int, seconds: int, function: Callable[..., Any], given: Any, named: Any
+) -> tuple[str, Any]:
+    try:
+        os.chdir(folder)
+        _limit(memory, seconds)
+        return "done", function(*given, **named)
+    except MemoryError:
+        return "memory", None
+    except TumblelineError as problem:
+        return "problem", problem.with_traceback(None)
+    except Exception as problem:  # noqa: BLE001 - a defect: raised again in the process that asked, with its place
+        problem.add_note(traceback.format_exc())
+        with suppress(Exception):
+            pickle.loads(pickle.dumps(problem))  # noqa: S301 - whether it can be sent
+            return "problem", problem
+        return "problem", RuntimeError(f"{type(problem).__name__}: {problem}")
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def _limit(memory: int, seconds: int) -> None:
+    """Limits of the next reading, within those of the process."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    for kind, value in (
+        (resource.RLIMIT_AS, _pages(0) + memory),
+        (resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + seconds),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+
+def _pages(column: int) -> int:
+    """Bytes of this process: 0 of address space, 1 of memory; 0 where the system does not say."""
+    with suppress(OSError):
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[column]) * resource.getpagesize()
+    return 0

@@ -1,0 +1,187 @@
+"""Uploads from strangers: looks at a file take little of the server, bodies are small, and what arrives goes to the disk."""
+
+import asyncio
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from asgi_client import AsgiClient
+
+from pipelines.importers import limited
+from pipelines.workbench.application import create_app
+from pipelines.workbench.services import uploads
+from pipelines.workbench.settings import WorkbenchSettings
+from pipelines.workbench.state import UploadPage
+from schemas.errors import TumblelineError
+
+MB = 10**6
+GIGABYTE = 1000 * MB
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=tmp_path / "workbench")
+
+
+def uploaded(settings: WorkbenchSettings, name: str, content: bytes) -> UploadPage:
+    part = uploads.part_of(settings)
+    part.write_bytes(content)
+    return UploadPage(file=uploads.keep(settings, name, part))
+
+
+class Memory(threading.Thread):
+    """The largest memory of this process and its readers together, bytes, less that of this process before."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self.most, self.before, self.ended = 0, 0, threading.Event()
+
+    def run(self) -> None:
+        process = psutil.Process(os.getpid())
+        self.before = process.memory_info().rss
+        while not self.ended.wait(0.02):
+            total = process.memory_info().rss - self.before
+            for child in process.children():
+                try:
+                    total += child.memory_info().rss
+                except psutil.Error:
+                    continue
+            self.most = max(self.most, total)
+
+
+def looks(settings: WorkbenchSettings, page: UploadPage, count: int) -> tuple[set[str], int]:
+    """What looks at once say, and the memory that they take."""
+    told: set[str] = set()
+
+    def look() -> None:
+        try:
+            told.add(f"{uploads.reading(settings, page).rows} rows")
+        except TumblelineError as problem:
+            told.add(str(problem))
+
+    memory = Memory()
+    memory.start()
+    threads = [threading.Thread(target=look) for _ in range(count)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    memory.ended.set()
+    memory.join()
+    return told, memory.most
+
+
+def text_of(size: int) -> bytes:
+    rng = np.random.default_rng(1)
+    rows = "".join(
+        f"{k / 100:.3f},{x:.6f},{y:.6f},{z:.6f}\n" for k, (x, y, z) in enumerate(rng.normal(size=(20_000, 3)))
+    )
+    return b"time_s,ax,ay,az\n" + (rows.encode() * (size // len(rows) + 1))[:size].rpartition(b"\n")[0]
+
+
+def gzip_of(line: bytes, size: int) -> bytes:
+    import gzip
+
+    return gzip.compress(line * (size // len(line)), 9)
+
+
+FILES = {
+    "a.csv": text_of,
+    "b.csv": lambda size: b",,,,\n" * (size // 5),
+    "c.csv": lambda size: b"1,2,3,4\n" * (size // 8),
+    "d.csv": lambda size: b"1\n" * (size // 2),
+    "e.csv": lambda size: b"\n" * size,
+    "f.csv": lambda size: b'"a,b",c\n' * (size // 8),
+    "g.csv": lambda size: (b"1," * 4999 + b"1\n") * (size // 10_000),
+    "h.csv.gz": lambda size: gzip_of(b"\n", size),
+    "i.csv.gz": lambda size: gzip_of(b"1,2\n", size),
+    "j.csv": lambda size: b'a"\n' * (size // 3),
+}
+
+
+@pytest.mark.parametrize("name", ["b.csv", "h.csv.gz", "i.csv.gz"])
+def test_looks_at_once_at_a_small_file_take_less_than_a_gigabyte(settings: WorkbenchSettings, name: str) -> None:
+    told, memory = looks(settings, uploaded(settings, name, FILES[name](12 * MB if name == "b.csv" else 60 * MB)), 20)
+    assert len(told) == 1
+    assert memory < GIGABYTE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_twenty_looks_at_once_at_64_mb_take_less_than_a_gigabyte(settings: WorkbenchSettings, name: str) -> None:
+    told, memory = looks(settings, uploaded(settings, name, FILES[name](64 * MB)), 20)
+    print(name, memory / MB, told)  # noqa: T201 - the figure of the run
+    assert memory < GIGABYTE
+    if name == "a.csv":  # a measured record is read
+        assert told != set()
+        assert all(text.endswith(" rows") for text in told)
+
+
+def test_a_look_is_kept_until_the_file_changes(settings: WorkbenchSettings, monkeypatch) -> None:
+    page, read = uploaded(settings, "a.csv", text_of(20_000)), list[Path]()
+    limited_reader = uploads.in_reader
+    monkeypatch.setattr(uploads, "in_reader", lambda *given: (read.append(given[3]), limited_reader(*given))[1])
+    first = uploads.reading(settings, page)
+    assert uploads.reading(settings, page) is first
+    assert len(read) == 1
+    Path(page.file).write_bytes(text_of(40_000))
+    assert uploads.reading(settings, page).rows > first.rows
+    assert len(read) == 2
+
+
+def test_a_look_that_reaches_a_limit_says_how_to_import_the_file(settings: WorkbenchSettings, monkeypatch) -> None:
+    page = uploaded(settings, "a.csv", text_of(20 * MB))
+    limited.end()  # a process that has read before may have room left
+    monkeypatch.setattr(uploads, "LOOK", limited.ReadingLimits(32 * limited.MIB, 60, 60))
+    with pytest.raises(TumblelineError, match=r"a\.csv: .*memory.*tumbleline import .*a\.csv"):
+        uploads.reading(settings, page)
+
+
+def bench(settings: WorkbenchSettings) -> tuple[AsgiClient, dict[str, str]]:
+    app = create_app(settings)
+    return AsgiClient(app, settings.address), {"authorization": f"Bearer {settings.token}"}
+
+
+def test_a_body_of_more_than_a_megabyte_is_refused(settings: WorkbenchSettings) -> None:
+    client, headers = bench(settings)
+    answer = client.post("/jobs", content=b'{"a": "' + b"x" * 2 * MB + b'"}', headers=headers)
+    assert answer.status_code == 413
+    assert "more than 1000000 bytes" in answer.json()["problem"]
+    assert client.post("/jobs", json={"a": "x" * 1000}, headers=headers).status_code == 422
+
+
+def test_an_endless_body_is_refused_where_it_becomes_too_large(settings: WorkbenchSettings) -> None:
+    sent, told = [], []
+    host = settings.address.partition("//")[2]
+    scope = {"type": "http", "method": "POST", "path": "/jobs", "raw_path": b"/jobs", "query_string": b"", "scheme": "http",
+             "headers": [(b"host", host.encode()), (b"authorization", f"Bearer {settings.token}".encode())],
+             "http_version": "1.1", "server": None, "client": None, "root_path": ""}  # fmt: skip
+
+    async def receive() -> dict:
+        sent.append(1)
+        return {"type": "http.request", "body": bytes(MB // 4), "more_body": True}
+
+    async def send(message) -> None:
+        told.append(message)
+
+    asyncio.run(create_app(settings)(scope, receive, send))
+    assert told[0]["status"] == 413
+    assert len(sent) == 5
+
+
+def test_an_upload_goes_to_the_disk_as_it_arrives_and_one_that_fails_leaves_nothing(
+    settings: WorkbenchSettings,
+) -> None:
+    client, headers = bench(settings)
+    answer = client.request("PUT", "/upload/file?name=a.csv", content=text_of(3 * MB), headers=headers)
+    assert answer.status_code == 200
+    folder = settings.folder / "uploads"
+    assert [one.name for one in folder.iterdir()] == ["a.csv"]
+    assert (folder / "a.csv").stat().st_size > 2 * MB
+    for name, content in (("a.exe", b"x"), ("b.csv", b"")):
+        assert client.request("PUT", f"/upload/file?name={name}", content=content, headers=headers).status_code == 422
+    assert [one.name for one in folder.iterdir()] == ["a.csv"]
+    assert "a.csv" in client.get("/upload", headers=headers).text

@@ -1,0 +1,150 @@
+"""Certificates and archives from strangers: no XML, JSON or link keeps a command busy, ends it, or leads elsewhere."""
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+from asgi_client import AsgiClient
+from capture_double import finished_run
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive
+from pipelines.archive.backup import copy_archive
+from pipelines.certificate_document.signature_check import SignatureBroken, canonical, parsed
+from pipelines.certificate_document.xml_facts import facts_of
+from pipelines.cli import app, main
+from pipelines.workbench.application import create_app
+from pipelines.workbench.settings import WorkbenchSettings
+from schemas.errors import ArchiveUnusable
+
+DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
+REAL = "<si:real><si:value>1</si:value><si:unit>\\one</si:unit></si:real>"
+SECRET = "root:x:0:0: a file of the system"
+
+
+def document(inside: str, more: str = "") -> bytes:
+    head = f'<dcc:digitalCalibrationCertificate xmlns:dcc="{DCC}" xmlns:si="{SI}" schemaVersion="3.0.0"{more}>'
+    return f"{head}{inside}</dcc:digitalCalibrationCertificate>".encode()
+
+
+def result(inside: str, name: str = "a") -> str:
+    return f"<dcc:result><dcc:name><dcc:content>{name}</dcc:content></dcc:name>{inside}</dcc:result>"
+
+
+def nested(count: int, inside: str) -> str:
+    return "<dcc:result>" * count + inside + "</dcc:result>" * count
+
+
+SLOW = {
+    "one name for all numbers": document(result("<si:real/>" * 28_000)),
+    "numbers beside one another": document(result("<dcc:name/>" + REAL * 4400)),
+    "results in one another": document(nested(200, REAL * 4200)),
+    "digits": document(result(f"<si:real><si:value>{'1' * 290_000}x</si:value></si:real>")),
+    "namespaces": document("", "".join(f' xmlns:n{k}="u:{k}" n{k}:a=""' for k in range(9000))),
+    "attributes": document("", "".join(f' a{k}=""' for k in range(30_000))),
+}
+
+
+@pytest.mark.parametrize("name", SLOW)
+def test_300_kb_of_xml_keep_verify_busy_for_seconds_at_most(name: str, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.xml").write_bytes(SLOW[name])
+    before = time.process_time()
+    done = CliRunner().invoke(app, ["verify", "a.xml", "--json"])
+    assert time.process_time() - before < 6.0
+    assert done.exit_code == 1, done.output
+    assert not json.loads(done.stdout)["accepted"]
+
+
+def test_numbers_of_one_name_are_counted_as_before() -> None:
+    facts = facts_of(parsed(document(result(REAL * 3) + result(REAL, "b") + result(REAL))))
+    assert list(facts.numbers) == ["a; a", "a; a (2)", "a; a (3)", "b; b", "a; a (4)"]
+
+
+def test_a_damaged_namespace_is_a_sentence_and_a_verdict(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    damaged = document("", ' xmlns:n="relative"')
+    with pytest.raises(
+        SignatureBroken, match=r"it has no canonical form .* a namespace in it is not an absolute address"
+    ):
+        canonical(parsed(damaged))
+    (tmp_path / "a.xml").write_bytes(damaged)
+    done = CliRunner().invoke(app, ["verify", "a.xml"])
+    assert done.exit_code == 1
+    assert "no canonical form" in done.stdout
+
+
+def test_too_little_memory_is_no_verdict(tmp_path: Path, monkeypatch, capsys) -> None:
+    def full(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.pdf").write_bytes(b"%PDF-1.7")
+    monkeypatch.setattr("pyhanko.pdf_utils.reader.PdfFileReader", full)
+    monkeypatch.setattr("sys.argv", ["tumbleline", "verify", "a.pdf"])
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert left.value.code == 2
+    assert "needs more memory than is available" in capsys.readouterr().err
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Archive:
+    run = finished_run(tmp_path)
+    run.seal()
+    return run.archive
+
+
+@pytest.fixture
+def secret(tmp_path: Path) -> Path:
+    (tmp_path / "system").mkdir()
+    (tmp_path / "system" / "passwd").write_text(SECRET, encoding="utf-8")
+    return tmp_path / "system"
+
+
+def test_audit_names_a_run_whose_manifest_is_nested_deeply(archive: Archive) -> None:
+    deep = b'{"sha256": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
+    (archive.root / "runs" / archive.runs()[0].id / "grades.json").write_bytes(deep)
+    done = CliRunner().invoke(app, ["audit", "--archive", str(archive.root), "--json"])
+    assert done.exception is None or isinstance(done.exception, SystemExit | ArchiveUnusable), done.exception
+    assert "nested too deeply" in done.output or "nested too deeply" in str(done.exception)
+
+
+def test_the_workbench_serves_no_file_behind_a_link(archive: Archive, secret: Path, tmp_path: Path) -> None:
+    run = archive.run("latest")
+    Path(run.report).unlink()
+    Path(run.report).symlink_to(secret / "passwd")
+    settings = WorkbenchSettings(archive=str(archive.root), folder=tmp_path / "bench")
+    client = AsgiClient(create_app(settings), settings.address)
+    answer = client.get(f"/run/report.html?run={run.id}")
+    assert answer.status_code == 422
+    assert "is a symbolic link to" in answer.json()["problem"]
+    assert SECRET not in answer.text
+
+
+def test_a_backup_copies_nothing_behind_a_link_and_tells_it(archive: Archive, secret: Path, tmp_path: Path) -> None:
+    run = archive.run("latest").id
+    (archive.root / "runs" / "foreign").symlink_to(secret)
+    (archive.root / "runs" / run / "notes.txt").symlink_to(secret / "passwd")
+    with pytest.raises(
+        ArchiveUnusable, match=r"backup: 2 symbolic links .* were not followed: runs/foreign, runs/.*/notes.txt"
+    ):
+        copy_archive(archive, Archive(tmp_path / "copy"))
+    copied = {one.relative_to(tmp_path / "copy").as_posix() for one in (tmp_path / "copy").rglob("*") if one.is_file()}
+    assert not any("passwd" in name or "notes" in name for name in copied)
+    assert f"runs/{run}/grades.parquet" in copied  # all other files
+
+
+@pytest.mark.parametrize("place", ["grades.parquet", "grades.json", "run.json", ""])
+def test_every_reader_of_an_archive_refuses_what_is_behind_a_link(archive: Archive, tmp_path: Path, place: str) -> None:
+    run = archive.run("latest")
+    path = Path(run.path) / place if place else Path(run.path)
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(ArchiveUnusable, match=r"symbolic link|there is no run|not a file"):
+        run.about if place == "run.json" or not place else run.table("grades")
+    for words in (["audit"], ["verify", run.id]):
+        done = CliRunner().invoke(app, [*words, "--archive", str(archive.root)])
+        assert done.exit_code != 0
+        assert "link" in done.output or "link" in str(done.exception)
