@@ -12,7 +12,7 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 from pipelines.doctor.check import Check
-from schemas.locks import pins
+from schemas.locks import UNUSED, pins
 from schemas.shipped import PRODUCT, shipped
 
 if TYPE_CHECKING:
@@ -93,6 +93,8 @@ def _closure() -> Iterator[Needed]:
         except metadata.PackageNotFoundError:
             continue
         for requirement in _that_hold(declared, extras):
+            if canonicalize_name(requirement.name) in UNUSED.get(name, ()):
+                continue
             yield Needed(name, requirement)
             left.append((canonicalize_name(requirement.name), frozenset(requirement.extras)))
 
