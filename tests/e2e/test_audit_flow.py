@@ -4,6 +4,7 @@ import json
 import os
 import sqlite3
 import sys
+from contextlib import closing
 
 import pytest
 from root_process import ROOT, python
@@ -28,7 +29,7 @@ def test_the_weekly_audit_leaves_its_findings_as_artifacts(tmp_path):
         schedules = python(environment, "-m", "prefect", "deployment", "schedule", "ls", "audit_archive/weekly-audit")
     assert "audit_archive/weekly-audit" in names
     assert "0 5 * * 1" in schedules
-    with sqlite3.connect(f"file:{home / 'prefect.db'}?mode=ro", uri=True) as database:
+    with closing(sqlite3.connect(f"file:{home / 'prefect.db'}?mode=ro", uri=True)) as database:
         artifacts = dict(database.execute("select key, data from artifact where key is not null").fetchall())
         states = database.execute("select state_type from flow_run where state_type != 'SCHEDULED'").fetchall()
     database.close()

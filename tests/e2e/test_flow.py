@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ def history(home: Path, query: str) -> list[tuple[str, ...]]:
     """Rows of the orchestrator's own database, read after its server has gone."""
     import sqlite3
 
-    with sqlite3.connect(f"file:{home / 'prefect.db'}?mode=ro", uri=True) as database:
+    with closing(sqlite3.connect(f"file:{home / 'prefect.db'}?mode=ro", uri=True)) as database:
         rows = database.execute(query).fetchall()
     database.close()
     return rows

@@ -2,6 +2,7 @@
 
 import sqlite3
 import stat
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -30,7 +31,7 @@ def test_a_database_is_made_once_with_the_revision_and_in_write_ahead_mode(tmp_p
     assert make_database(tmp_path)
     assert not make_database(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [NAME]
-    with sqlite3.connect(tmp_path / NAME) as database:
+    with closing(sqlite3.connect(tmp_path / NAME)) as database:
         assert len(database.execute("select version_num from alembic_version").fetchall()) == 1
         assert database.execute("select count(*) from flow_run").fetchone() == (0,)
         assert database.execute("pragma journal_mode").fetchone() == ("wal",)
@@ -51,8 +52,9 @@ def test_none_is_made_where_prefect_makes_its_own(why: str, tmp_path: Path, monk
 
 def test_entries_that_migrations_would_make_are_no_schema(tmp_path: Path) -> None:
     make_database(tmp_path)
-    with sqlite3.connect(tmp_path / NAME) as database:
+    with closing(sqlite3.connect(tmp_path / NAME)) as database:
         database.execute("insert into configuration (key, value) values ('own', '1')")
+        database.commit()
     with pytest.raises(ValueError, match="make entries"):
         schema_of(tmp_path / NAME)
 
