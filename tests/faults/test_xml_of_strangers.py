@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive
 from pipelines.archive.backup import copy_archive
 from pipelines.certificate_document.signature_check import SignatureBroken, canonical, parsed
-from pipelines.certificate_document.xml_facts import facts_of
 from pipelines.cli import app, main
 from pipelines.workbench.application import create_app
 from pipelines.workbench.settings import WorkbenchSettings
@@ -55,11 +54,6 @@ def test_300_kb_of_xml_keep_verify_busy_for_seconds_at_most(name: str, tmp_path:
     assert time.process_time() - before < 6.0
     assert done.exit_code == 1, done.output
     assert not json.loads(done.stdout)["accepted"]
-
-
-def test_numbers_of_one_name_are_counted_as_before() -> None:
-    facts = facts_of(parsed(document(result(REAL * 3) + result(REAL, "b") + result(REAL))))
-    assert list(facts.numbers) == ["a; a", "a; a (2)", "a; a (3)", "b; b", "a; a (4)"]
 
 
 def test_a_damaged_namespace_is_a_sentence_and_a_verdict(tmp_path: Path, monkeypatch) -> None:
