@@ -27,6 +27,12 @@ READY = """() => Boolean(document.body.dataset.ready) && !document.querySelector
         return !e.checkVisibility() || r.top > innerHeight + 150
             || e.dataset.drawn === e.dataset.figure || e.querySelector('p.note'); })"""
 
+WAITING = """() => JSON.stringify({state: document.readyState, ready: document.body.dataset.ready ?? null,
+    progress: document.querySelector('.work progress')?.closest('.work').innerText ?? null,
+    undrawn: [...document.querySelectorAll('[data-figure]')].filter((e) => e.dataset.drawn !== e.dataset.figure)
+        .map((e) => e.dataset.figure)})"""
+"""What a page that is not ready waits for."""
+
 
 @dataclass
 class Served:
@@ -113,7 +119,11 @@ class Tab:
         self.ready()
 
     def ready(self) -> None:
-        until(lambda: self.page.evaluate(READY), f"{self.page.url} is drawn")
+        try:
+            until(lambda: self.page.evaluate(READY), f"{self.page.url} is drawn")
+        except AssertionError as late:
+            late.add_note(f"{self.page.evaluate(WAITING)}; errors: {self.errors}")
+            raise
 
     @property
     def href(self) -> str:
