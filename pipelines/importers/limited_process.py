@@ -6,6 +6,7 @@ The limit of memory is beyond what the process has when it begins: libraries tak
 from __future__ import annotations
 
 import gc
+import math
 import os
 import pickle
 import queue
@@ -109,7 +110,9 @@ def _done(
             return "problem", problem
         return "problem", RuntimeError(f"{type(problem).__name__}: {problem}")
     finally:
-        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+        for kind in (resource.RLIMIT_AS, resource.RLIMIT_CPU):
+            hard = resource.getrlimit(kind)[1]
+            resource.setrlimit(kind, (hard, hard))
 
 
 def _limit(memory: int, seconds: int) -> None:
@@ -117,7 +120,8 @@ def _limit(memory: int, seconds: int) -> None:
     used = resource.getrusage(resource.RUSAGE_SELF)
     for kind, value in (
         (resource.RLIMIT_AS, _pages(0) + memory),
-        (resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime) + seconds),
+        # the system counts whole seconds: a limit rounded down would leave a reading of one second no time at all
+        (resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime) + seconds),
     ):
         hard = resource.getrlimit(kind)[1]
         resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
