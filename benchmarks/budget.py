@@ -24,9 +24,9 @@ import pandas as pd  # noqa: E402
 
 from benchmarks.budget_lots import BASE, DWELL_S, LOT, RECIPES, Plan, measured, plan_of, true_coefficients  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
-from pipelines.stages.budget import budget  # noqa: E402
-from pipelines.stages.budget_terms import BudgetTables, BudgetTerms  # noqa: E402
 from pipelines.stages.fit import fit  # noqa: E402
+from pipelines.stages.uncertainty.budget import budget  # noqa: E402
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms  # noqa: E402
 from pipelines.stages.verify import verify  # noqa: E402
 from schemas.decisions import outside  # noqa: E402
 from schemas.uncertainty import Uncertainty  # noqa: E402

@@ -1,6 +1,6 @@
 """The operating characteristic of every number that decides a diagnosis: `python benchmarks/characteristics.py --only COMMON`.
 
-`HOW` says for each number of `inertial/criticism/decisions.py` where its characteristic comes from, and a test holds that none is
+`HOW` says for each number of `inertial/decisions.py` where its characteristic comes from, and a test holds that none is
 missing. A derived number has its derivation beside it; here its false rate is checked by a simulation of the decision alone. The
 others are measured: at half, at their value and at twice as much, in the part of a diagnosis that decides (`decision_parts.py`,
 `search_parts.py`; whole diagnoses: `benchmarks/decisions.py`); by the rates of the decisions about the noise
@@ -32,7 +32,7 @@ from search_parts import SEARCH_PARTS  # noqa: E402
 from tables import NULLS  # noqa: E402
 from world import World  # noqa: E402
 
-from inertial.criticism import decisions  # noqa: E402
+from inertial import decisions  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -61,7 +61,7 @@ def _walk(world: World, seed: int) -> float:
 
 def prior_grid(runs: int, first: int) -> Iterator[str]:
     """What is lost in the likelihood if the prior degrees of freedom lie between two of the grid."""
-    from inertial.criticism import variance
+    from inertial.estimation import variance
 
     rng, fine = np.random.default_rng(SEED + first), np.geomspace(2.0, 256.0, 57)
     lost = []
@@ -107,8 +107,8 @@ def looks(runs: int, first: int) -> Iterator[str]:
     """The most telling of all looks of a diagnosis in noise of a known covariance, charged with their number."""
     from inertial.criticism.examination import candidates_of
     from inertial.criticism.field import Candidates
-    from inertial.criticism.penalty import log_p_value
-    from inertial.criticism.space import Space
+    from inertial.estimation.penalty import log_p_value
+    from inertial.estimation.space import Space
 
     rng, charged = np.random.default_rng(SEED + first), []
     for name in ("B30", "K4", "one_unit"):
@@ -189,8 +189,8 @@ def rises(runs: int, first: int) -> Iterator[str]:
     from inertial import effects as catalogue
     from inertial.criticism.examination import worst
     from inertial.criticism.left_out import left_out
-    from inertial.criticism.model import Model
-    from inertial.criticism.refinement import terms_of
+    from inertial.estimation.model import Model
+    from inertial.estimation.refinement import terms_of
 
     ratios: dict[str, list[float]] = {"true": [], "wrong": []}
     for seed in range(first, first + runs):

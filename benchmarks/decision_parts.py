@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from inertial.criticism.examination import ExaminedRun
-    from inertial.criticism.readings import Readings
+    from inertial.data_errors.readings import Readings
 
 Counts = tuple[int, int]
 """Decisions taken, of so many."""
@@ -41,8 +41,8 @@ def rate(hits: int, runs: int) -> str:
 
 def run_of(world: World, seed: int) -> ExaminedRun:
     """A lot with its model, bad dwells left out."""
-    from inertial.criticism.bad_dwells import bad_dwells
     from inertial.criticism.examination import ExaminedRun
+    from inertial.data_errors.bad_dwells import bad_dwells
     from pipelines.tables.condense import condense
     from pipelines.tables.dwells import lot_of, measured
 
@@ -64,7 +64,7 @@ def readings_of(world: World, seed: int) -> Readings:
 
 def coarse_steps(world: World, seed: int) -> Counts:
     """Units whose converter is called coarser than the noise of a sample."""
-    from inertial.criticism.faults import find_faults
+    from inertial.data_errors.faults import find_faults
 
     found = find_faults(readings_of(world, seed))
     return sum(f.name == "quantised" for f in found), world.units
@@ -73,9 +73,9 @@ def coarse_steps(world: World, seed: int) -> Counts:
 def together(world: World, seed: int) -> Counts:
     """Lots whose units are taken to share noise where two rivals are compared."""
     from inertial import effects as catalogue
-    from inertial.criticism.model import Model
-    from inertial.criticism.shared_noise import shared_factor
-    from inertial.criticism.term import Term
+    from inertial.estimation.model import Model
+    from inertial.estimation.shared_noise import shared_factor
+    from inertial.estimation.term import Term
 
     model = run_of(world, seed).model()
     terms = [*model.terms, Term(catalogue.get("second_order"))]
@@ -86,8 +86,8 @@ def folds(world: World, seed: int) -> Counts:
     """Soaks left out in turn that can judge a model with a square of the temperature."""
     from inertial import effects as catalogue
     from inertial.criticism.left_out import left_out
-    from inertial.criticism.model import Model
-    from inertial.criticism.refinement import terms_of
+    from inertial.estimation.model import Model
+    from inertial.estimation.refinement import terms_of
 
     model = run_of(world, seed).model()
     terms = terms_of(catalogue.get_all([*BASE, "bias_temperature_quadratic"]), model.problem)
@@ -97,9 +97,9 @@ def folds(world: World, seed: int) -> Counts:
 def axes(world: World, seed: int) -> Counts:
     """Effects with one value of their parameter for all axes that get one for each axis."""
     from inertial import effects as catalogue
-    from inertial.criticism.refinement import refine
-    from inertial.criticism.term import Term
     from inertial.design import grid_of
+    from inertial.estimation.refinement import refine
+    from inertial.estimation.term import Term
 
     model = run_of(world, seed).model()
     split = 0
@@ -116,7 +116,7 @@ def axes(world: World, seed: int) -> Counts:
 
 def drivers(world: World, seed: int) -> Counts:
     """Recorded quantities that the residual follows by chance or not, large enough to be called unexplained."""
-    from inertial.criticism import decisions
+    from inertial import decisions
     from inertial.criticism.drivers import drivers_of
 
     model = run_of(world, seed).model()

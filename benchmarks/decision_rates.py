@@ -1,6 +1,6 @@
 """How often each decision about the noise is right: `python benchmarks/decision_rates.py --runs 40`.
 
-The decisions before any search for effects, each at its value in `inertial/criticism/decisions.py`, on lots of
+The decisions before any search for effects, each at its value in `inertial/decisions.py`, on lots of
 `benchmarks/worlds` with seeds of their own: dwells left out and named, variances of units taken as different, tails of the
 residuals taken as heavy, noise common to all units. Every rate with its 95 % Clopper-Pearson interval; `benchmarks/decisions.py`
 varies the values of those that decide in the search.
@@ -49,10 +49,10 @@ WORLDS: dict[str, World] = {**PLAIN, **TAILED, **DWELLS}
 
 def decided(world: World, seed: int) -> dict[str, bool]:
     """The decisions about the noise of one lot."""
-    from inertial.criticism.bad_dwells import bad_dwells
     from inertial.criticism.examination import ExaminedRun
-    from inertial.criticism.likelihood import scatter_of_poses, shared_noise
-    from inertial.criticism.tails import heavy, with_tails
+    from inertial.data_errors.bad_dwells import bad_dwells
+    from inertial.data_errors.tails import heavy, with_tails
+    from inertial.estimation.likelihood import scatter_of_poses, shared_noise
     from pipelines.tables.condense import condense
     from pipelines.tables.dwells import lot_of, measured
 

@@ -1,6 +1,6 @@
 """What each number that decides the search of a diagnosis does: `python benchmarks/decisions.py --runs 5`.
 
-Every number of `inertial/criticism/decisions.py` that is listed here is set to half, to its value, and to twice as much, and the
+Every number of `inertial/decisions.py` that is listed here is set to half, to its value, and to twice as much, and the
 worlds that it matters in are diagnosed. Printed are the runs whose verdict is right, with 95 % Clopper-Pearson intervals: nothing
 named and adequate where nothing is hidden, the truth in its class and nothing beside it otherwise; a driver called unexplained
 where the physics is in no catalogue. Seeds of their own, apart from those of `benchmarks/worlds --seeds judging`.
@@ -93,7 +93,7 @@ MATTERS: dict[str, tuple[str, ...]] = {
 def changed(name: str, factor: float) -> Generator[None, None, None]:
     """A number of the decisions at another value, wherever it was imported to."""
     import inertial.criticism.diagnosis  # noqa: F401  # everything that imports one
-    from inertial.criticism import decisions
+    from inertial import decisions
 
     value = getattr(decisions, name)
     other = {k: v * factor for k, v in value.items()} if isinstance(value, dict) else value * factor

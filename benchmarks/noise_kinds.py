@@ -33,7 +33,7 @@ def own_shares(runs: int, first: int) -> Iterator[str]:
 
 def louder(runs: int, first: int) -> Iterator[str]:
     """Lots with a noise for each soak."""
-    from inertial.criticism.loudness import loudness_of
+    from inertial.estimation.loudness import loudness_of
 
     for names, told in (
         (EQUAL, "lots with equal soaks"),

@@ -35,7 +35,7 @@ def upper(response: Floats) -> Floats:
 
 def pulls(what: recordings.Recording, seed: int) -> tuple[Floats, ...]:
     """(estimate - truth) over the stated standard error, of the bias of the record, its coefficient, scales, angles."""
-    from pipelines.stages.norm_fit import bias_uncertainty, norms_fitted
+    from pipelines.stages.unknown_poses.fit import bias_uncertainty, norms_fitted
 
     made = recordings.make(what, seed)
     done = norms_fitted(made.dwells, None, EFFECTS)

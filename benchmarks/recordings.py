@@ -99,7 +99,7 @@ def searched(made: Made) -> set[int]:
 
     No test that has to search finds more single dwells at this probability.
     """
-    from inertial.criticism.bad_norms import BAD_NORM
+    from inertial.data_errors.bad_norms import BAD_NORM
 
     if made.known is None:
         return set()

@@ -1,6 +1,6 @@
 """What effects leave over that handling would explain, and real handling beside effects: `python benchmarks/remainders.py`.
 
-Sets `REMAINDER` of `inertial/criticism/decisions.py`. Printed is, for every alternative of handling that is convincing beside an
+Sets `REMAINDER` of `inertial/decisions.py`. Printed is, for every alternative of handling that is convincing beside an
 effect found before, its size over the largest effect, and whether such a fault was made. Seeds of their own.
 """
 
@@ -43,7 +43,7 @@ WORLDS: dict[str, World] = {
 def beside(world: World, seed: int) -> list[tuple[str, float, bool]]:
     """Alternatives found beside effects: name, size over that of the largest effect, whether such a fault was made."""
     from inertial.criticism import search
-    from inertial.criticism.handling.base import Handling
+    from inertial.estimation.alternative import Handling
     from pipelines.diagnosis.diagnose import diagnose
 
     made, alternatives = make(world, seed), []

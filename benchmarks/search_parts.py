@@ -16,8 +16,8 @@ from world import World
 if TYPE_CHECKING:
     from inertial.criticism.field import Candidates
     from inertial.criticism.lot_part import LotPart
-    from inertial.criticism.model import Model
     from inertial.criticism.search import Rival, SearchResult
+    from inertial.estimation.model import Model
 
 
 @lru_cache(maxsize=32)
@@ -25,7 +25,7 @@ def candidates(world: World, seed: int) -> tuple[Candidates, Model]:
     """The candidates of a lot, and its model."""
     from inertial.criticism.examination import candidates_of
     from inertial.criticism.field import Candidates
-    from inertial.criticism.handling import alternatives
+    from inertial.data_errors.handling import alternatives
 
     run = run_of(world, seed)
     model = run.model()
@@ -99,7 +99,7 @@ def _named(world: World, found: list[Any]) -> Counts:
 
 def tails(world: World, seed: int) -> Counts:
     """Dwells left out that are named as faults, of those left out."""
-    from inertial.criticism.tails import with_tails
+    from inertial.data_errors.tails import with_tails
 
     run = run_of(world, seed)
     listed = with_tails(run.model(), run.removed)

@@ -19,7 +19,7 @@ from typing import Any
 
 from root_process import ROOT
 
-from pipelines.flows.settings import CLIENT_KEY, SERVER_KEY, new_key
+from pipelines.orchestrator.settings import CLIENT_KEY, SERVER_KEY, new_key
 
 PATIENCE_S = 120.0
 BUSY_TIMES = 20
@@ -118,7 +118,7 @@ def served(home: Path, *, faultless: bool = True, log_name: str = LOG, **setting
         **os.environ, "PREFECT_HOME": str(home), "PREFECT_LOGGING_COLORS": "false", "PYTHONPATH": str(ROOT),
         "PREFECT_SERVER_ALLOW_EPHEMERAL_MODE": "false", **settings,
     }  # fmt: skip
-    command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(port)]
+    command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(port)]
     with (home / log_name).open("ab") as log:
         process = subprocess.Popen(command, cwd=ROOT, env={**common, SERVER_KEY: key}, stdout=log, stderr=log)
     client = {**common, "PREFECT_API_URL": f"http://127.0.0.1:{port}/api", CLIENT_KEY: key}

@@ -8,7 +8,7 @@ from cryptography.hazmat.primitives.asymmetric.types import CertificateIssuerPri
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import NameOID
 
-from pipelines.certificate_document.signing import SigningKey
+from pipelines.certificates.document.signing import SigningKey
 
 
 def made_key(key: CertificateIssuerPrivateKeyTypes) -> SigningKey:

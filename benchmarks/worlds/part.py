@@ -47,7 +47,7 @@ def followed(task: tuple[str, int]) -> tuple[str, dict[str, Any]]:
 def _followed(blind: Blind, seed: int) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
-    from inertial.criticism.proposals import Circumstances
+    from inertial.next_measurement.proposals import Circumstances
     from inertial.planning.sequences import StationPace
     from pipelines.diagnosis.diagnose import examined
     from pipelines.diagnosis.next_measurement import proposed
@@ -114,11 +114,11 @@ def separation(diagnosis: Any, truth: str, wrong: str, instead: Any = None, *, o
     """
     whose = of or diagnosis
     from inertial import effects as catalogue
-    from inertial.criticism.model import Model
-    from inertial.criticism.problem import Problem
-    from inertial.criticism.refinement import refine
-    from inertial.criticism.term import Term
     from inertial.design import grid_of
+    from inertial.estimation.model import Model
+    from inertial.estimation.problem import Problem
+    from inertial.estimation.refinement import refine
+    from inertial.estimation.term import Term
     from pipelines.tables.dwells import lot_of, measured
 
     problem, rest, noise = diagnosis.problem, diagnosis.base.terms, whose.final.noise

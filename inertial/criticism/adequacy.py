@@ -6,16 +6,16 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from inertial.criticism.candidate import Candidate
-from inertial.criticism.covariance import LARGE
-from inertial.criticism.decisions import CERTAIN_BELOW, DRAWS, ENOUGH
 from inertial.criticism.drivers import Driver
 from inertial.criticism.field import Candidates
-from inertial.criticism.likelihood import scatter_of_poses, shared_noise
-from inertial.criticism.model import Model
 from inertial.criticism.noise_draws import NoiseDraws
-from inertial.criticism.penalty import log_p_value
-from inertial.criticism.space import Space
+from inertial.decisions import CERTAIN_BELOW, DRAWS, ENOUGH
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.covariance import LARGE
+from inertial.estimation.likelihood import scatter_of_poses, shared_noise
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import log_p_value
+from inertial.estimation.space import Space
 
 Array = NDArray[np.float64]
 

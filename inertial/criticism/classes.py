@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from inertial.criticism import decisions
-from inertial.criticism.decisions import CLASS_WIDTH
+from inertial import decisions
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import Handling
 from inertial.criticism.jumps import Jumps, jumps_instead
-from inertial.criticism.model import Model
 from inertial.criticism.search import Rival, judge, judge_refined, ranked, scanned, size_of
-from inertial.criticism.term import Term
+from inertial.decisions import CLASS_WIDTH
+from inertial.estimation.alternative import Handling
+from inertial.estimation.model import Model
+from inertial.estimation.term import Term
 
 __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 

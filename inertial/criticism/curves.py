@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.candidate import Candidate
 from inertial.criticism.drivers import Part
-from inertial.criticism.model import Model
-from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model
-from inertial.criticism.space import Space
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model
+from inertial.estimation.space import Space
 
 Array = NDArray[np.float64]
 

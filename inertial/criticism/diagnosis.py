@@ -8,27 +8,27 @@ from numpy.random import Generator
 
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
-from inertial.criticism.bad_dwells import BadDwell
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.comparison import estimate, residuals_of
-from inertial.criticism.comparison import rms as rms_of
-from inertial.criticism.decisions import ADEQUATE_ABOVE
 from inertial.criticism.drivers import Misfit, looks_of, places
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import Handling
-from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by, influence
 from inertial.criticism.left_out import left_out
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import Rival
 from inertial.criticism.smallest import Smallest, smallest_named
-from inertial.criticism.term import Term
 from inertial.criticism.unseen import unseen
 from inertial.criticism.verdict import Unexplained, judged
+from inertial.data_errors.bad_dwells import BadDwell
+from inertial.decisions import ADEQUATE_ABOVE
 from inertial.effects.covariate import Covariate
+from inertial.estimation.alternative import Handling
+from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.comparison import rms as rms_of
+from inertial.estimation.heldout import fit_rms
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.term import Term
 from inertial.planning.ranges import UnseenRange
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from inertial.criticism.drivers import Part
 from inertial.criticism.lot_part import LotPart
-from inertial.criticism.model import Model
-from inertial.criticism.term import Term
 from inertial.criticism.unknown import better_curve, log_p_of_curve
+from inertial.estimation.model import Model
+from inertial.estimation.term import Term
 
 _TOGETHER = 2  # smallest number of changes and effects that may be one drift
 

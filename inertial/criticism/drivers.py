@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.candidate import Candidate
-from inertial.criticism.penalty import log_p_value
-from inertial.criticism.problem import Problem
-from inertial.criticism.space import Space
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.penalty import log_p_value
+from inertial.estimation.problem import Problem
+from inertial.estimation.space import Space
 from inertial.quantities import attribute_drivers, is_clock
 from inertial.state import State
 

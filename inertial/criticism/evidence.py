@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from inertial import effects as catalogue
 from inertial.counts import degrees_of_freedom, number_of
-from inertial.criticism.bases import SEEN
 from inertial.criticism.field import Candidates
-from inertial.criticism.model import Model
-from inertial.criticism.term import Term
 from inertial.distributions import f_upper, noncentral_f_tail
+from inertial.estimation.bases import SEEN
+from inertial.estimation.model import Model
+from inertial.estimation.term import Term
 from inertial.roots import root
 
 Array = NDArray[np.float64]

@@ -7,31 +7,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import effects as catalogue
-from inertial.criticism.bad_dwells import BadDwell, bad_dwells, without
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.decisions import CLASS_WIDTH, RISES
 from inertial.criticism.drift import Drift, one_drift
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
-from inertial.criticism.freedom import refuse_without_freedom
-from inertial.criticism.handling import alternatives
-from inertial.criticism.handling.base import Exchangeable, Handling, Misfit, soaks
-from inertial.criticism.heldout import fit_rms
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.jumps import jumps_instead
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.lot_part import LotPart, part_of
-from inertial.criticism.loudness import loudness_of
-from inertial.criticism.model import Model
-from inertial.criticism.penalty import cost_of_model
-from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import better_placed, replaced, terms_of
 from inertial.criticism.search import Rival, SearchResult, judge, search
-from inertial.criticism.slope import slope_of
-from inertial.criticism.term import Term
-from inertial.criticism.turn_on import with_turn_on
+from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
+from inertial.data_errors.handling import alternatives
+from inertial.decisions import CLASS_WIDTH, RISES
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
+from inertial.estimation.freedom import refuse_without_freedom
+from inertial.estimation.heldout import fit_rms
+from inertial.estimation.loudness import loudness_of
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import cost_of_model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.refinement import better_placed, replaced, terms_of
+from inertial.estimation.slope import slope_of
+from inertial.estimation.term import Term
+from inertial.estimation.turn_on import with_turn_on
 
 Array = NDArray[np.float64]
 

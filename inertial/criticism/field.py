@@ -5,13 +5,13 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.candidate import Candidate
-from inertial.criticism.handling.base import Handling, OfOneDwell, by_block
-from inertial.criticism.problem import Problem
-from inertial.criticism.space import Gain, Space
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect
 from inertial.errors import MissingInput
+from inertial.estimation.alternative import Handling, OfOneDwell, by_block
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.problem import Problem
+from inertial.estimation.space import Gain, Space
 
 Array = NDArray[np.float64]
 

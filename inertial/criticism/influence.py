@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
-from inertial.criticism.model import Model
-from inertial.criticism.penalty import fall, freedom
-from inertial.criticism.problem import Problem
-from inertial.criticism.term import Term
+from inertial.estimation.likelihood import along_mean, of_station, scatter_of_poses, shared_noise, weighed
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import fall, freedom
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
 
 Array = NDArray[np.float64]
 

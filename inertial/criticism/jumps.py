@@ -11,18 +11,18 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.bases import SEEN
-from inertial.criticism.candidate import Candidate
-from inertial.criticism.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import Handling
-from inertial.criticism.handling.bias_jump import BiasJump
-from inertial.criticism.model import Model
-from inertial.criticism.penalty import freedom, price
 from inertial.criticism.search import Rival
-from inertial.criticism.space import Space
-from inertial.criticism.tail_areas import log_f_tail
-from inertial.criticism.term import Term
+from inertial.data_errors.handling.bias_jump import BiasJump
+from inertial.decisions import CLASS_WIDTH, JUMPS_RARE
+from inertial.estimation.alternative import Handling
+from inertial.estimation.bases import SEEN
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import freedom, price
+from inertial.estimation.space import Space
+from inertial.estimation.term import Term
+from inertial.probability import log_f_tail
 
 Array = NDArray[np.float64]
 

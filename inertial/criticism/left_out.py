@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from inertial.criticism import decisions
-from inertial.criticism.bases import orthonormal
-from inertial.criticism.decisions import BLOCKS
-from inertial.criticism.handling.base import Handling, soaks
-from inertial.criticism.heldout import Fitting
-from inertial.criticism.model import Model
-from inertial.criticism.noise import LONGEST
-from inertial.criticism.problem import Problem
-from inertial.criticism.term import Term
+from inertial import decisions
+from inertial.decisions import BLOCKS
+from inertial.estimation.alternative import Handling, soaks
+from inertial.estimation.bases import orthonormal
+from inertial.estimation.heldout import Fitting
+from inertial.estimation.model import Model
+from inertial.estimation.noise import LONGEST
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
 
 Array = NDArray[np.float64]
 Kind = Literal["poses", "soaks", "blocks of time"]

@@ -6,16 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from inertial.criticism import decisions
+from inertial import decisions
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import Handling
-from inertial.criticism.model import Model
-from inertial.criticism.penalty import cost_of_model
-from inertial.criticism.problem import Problem
 from inertial.criticism.search import anything
-from inertial.criticism.term import Term
 from inertial.criticism.unknown import Suspect, better_curve, suspects
 from inertial.criticism.wide_suspects import wide_suspects
+from inertial.estimation.alternative import Handling
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import cost_of_model
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
 
 _MANY = 32  # largest number of units of a lot that is searched completely
 _MANY_EFFECTS = 3  # chosen effects from which on curves of every kind are suspected

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from inertial.criticism.bases import SEEN, eigen
-from inertial.criticism.candidate import Candidate, times_rows
-from inertial.criticism.decisions import LEAST_SHARE
-from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.shares import place_of, shares_at
-from inertial.criticism.space import Space
-from inertial.criticism.tail_areas import log_f_tail
-from inertial.criticism.tails import heavy
+from inertial.data_errors.tails import heavy
+from inertial.decisions import LEAST_SHARE
+from inertial.estimation.bases import SEEN, eigen
+from inertial.estimation.candidate import Candidate, times_rows
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise, Shares
+from inertial.estimation.shares import place_of, shares_at
+from inertial.estimation.space import Space
+from inertial.probability import log_f_tail
 
 Array = NDArray[np.float64]
 

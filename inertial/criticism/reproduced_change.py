@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.bad_dwells import bad_dwells, without
-from inertial.criticism.comparison import Estimate, residuals_of
-from inertial.criticism.decisions import BLOCKS, CONFIRMED, REFUTED
-from inertial.criticism.likelihood import shared_noise
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.space import Space
-from inertial.criticism.term import Term
+from inertial.data_errors.bad_dwells import bad_dwells, without
+from inertial.decisions import BLOCKS, CONFIRMED, REFUTED
+from inertial.estimation.comparison import Estimate, residuals_of
+from inertial.estimation.likelihood import shared_noise
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.space import Space
+from inertial.estimation.term import Term
 
 Array = NDArray[np.float64]
 

@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism import decisions
-from inertial.criticism.decisions import MATERIAL, NAMED_BELOW, REMAINDER
+from inertial import decisions
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import Handling, OfOneDwell
-from inertial.criticism.likelihood import Ratio, likelihood_ratio, weighed
-from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Noise
-from inertial.criticism.penalty import cost_of_model, fall
-from inertial.criticism.refinement import refine
-from inertial.criticism.space import Gain, Space
-from inertial.criticism.term import Term
 from inertial.criticism.whole_dwell import only_tilted
+from inertial.decisions import MATERIAL, NAMED_BELOW, REMAINDER
+from inertial.estimation.alternative import Handling, OfOneDwell
+from inertial.estimation.likelihood import Ratio, likelihood_ratio, weighed
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
+from inertial.estimation.penalty import cost_of_model, fall
+from inertial.estimation.refinement import refine
+from inertial.estimation.space import Gain, Space
+from inertial.estimation.term import Term
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.bases import SEEN
-from inertial.criticism.candidate import Candidate
-from inertial.criticism.decisions import MATERIAL, NAMED_BELOW
 from inertial.criticism.field import Candidates
-from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.penalty import price
-from inertial.criticism.space import Space
+from inertial.decisions import MATERIAL, NAMED_BELOW
 from inertial.distributions import chi2_upper
+from inertial.estimation.bases import SEEN
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise, Shares
+from inertial.estimation.penalty import price
+from inertial.estimation.space import Space
 
 Array = NDArray[np.float64]
 

@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial import frames
-from inertial.criticism import decisions
-from inertial.criticism.candidate import Candidate
+from inertial import decisions, frames
 from inertial.criticism.curves import CurveFit, fit_curve
 from inertial.criticism.drivers import Part, curve, forces_along, quantities, varies
-from inertial.criticism.model import Model
-from inertial.criticism.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
-from inertial.criticism.problem import Problem
-from inertial.criticism.term import Term
 from inertial.effects.covariate import COVARIATE_PREFIX
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import PER_COEFFICIENT, cost_of_model, log_p_value
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
 from inertial.quantities import is_clock
 
 Array = NDArray[np.float64]

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.base import soaks
-from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Noise
-from inertial.criticism.problem import Problem
-from inertial.criticism.term import Term
 from inertial.design import grid_of
 from inertial.effects.base import AnyEffect, SensorEffect
+from inertial.estimation.alternative import soaks
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
 from inertial.planning.ranges import UnseenRange, unseen_ranges
 from inertial.state import History, State
 

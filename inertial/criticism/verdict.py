@@ -6,24 +6,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from inertial.criticism import decisions
+from inertial import decisions
 from inertial.criticism.adequacy import adequacy
-from inertial.criticism.bad_dwells import BadDwell
-from inertial.criticism.comparison import estimate, residuals_of
-from inertial.criticism.comparison import rms as rms_of
-from inertial.criticism.decisions import ADEQUATE_ABOVE, NAMED_BELOW
 from inertial.criticism.drivers import Driver, Part, looks_of
 from inertial.criticism.evidence import GROSS, not_judged
 from inertial.criticism.examination import EffectSearch, ExaminedRun, examined
-from inertial.criticism.heldout import fit_rms
-from inertial.criticism.likelihood import shared_noise
 from inertial.criticism.lot_part import LotPart
-from inertial.criticism.model import Model
-from inertial.criticism.penalty import PER_COEFFICIENT, log_p_value
-from inertial.criticism.problem import Lot
 from inertial.criticism.search import SearchResult
-from inertial.criticism.tails import with_tails
 from inertial.criticism.unknown import Suspect, better_curve, log_p_of_curve
+from inertial.data_errors.bad_dwells import BadDwell
+from inertial.data_errors.tails import with_tails
+from inertial.decisions import ADEQUATE_ABOVE, NAMED_BELOW
+from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.comparison import rms as rms_of
+from inertial.estimation.heldout import fit_rms
+from inertial.estimation.likelihood import shared_noise
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import PER_COEFFICIENT, log_p_value
+from inertial.estimation.problem import Lot
 from inertial.probability import passes
 
 

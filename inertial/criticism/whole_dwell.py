@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from inertial.criticism.candidate import Candidate
-from inertial.criticism.decisions import CERTAIN_BELOW
-from inertial.criticism.model import Model
-from inertial.criticism.tail_areas import log_chi2_tail
-from inertial.criticism.term import Term
+from inertial.decisions import CERTAIN_BELOW
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.model import Model
+from inertial.estimation.term import Term
+from inertial.probability import log_chi2_tail
 
 _FEWEST = 3  # units
 _INEXACT = 0.01

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.candidate import Candidate
 from inertial.criticism.drivers import across, curve, forces_along, quantities, transfer, varies
-from inertial.criticism.handling.base import by_block, rotated_force
-from inertial.criticism.problem import Problem
 from inertial.criticism.unknown import Suspect, alike
+from inertial.estimation.alternative import by_block, rotated_force
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.problem import Problem
 from inertial.quantities import is_clock
 
 Array = NDArray[np.float64]

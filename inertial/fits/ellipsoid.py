@@ -6,8 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inertial.criticism.noise import LONGEST
 from inertial.errors import NotIdentified
+from inertial.estimation.noise import LONGEST
 from inertial.fits.norm_wander import WALK_ABOUT_MEAN, NormNoise, norm_noise
 from inertial.fits.wander import student
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from inertial.criticism.decisions import ADEQUATE_ABOVE
+from inertial.decisions import ADEQUATE_ABOVE
 from inertial.probability import passes
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from inertial.uncertainty.rounding import equal
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     from pipelines.certificates.ledger import Ledger
-    from pipelines.stages.budget_terms import BudgetTerms
+    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 
 NEEDED_OF_TABLE = ("gravity", "level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose", "reader")
 """Entries of [uncertainty] without which nothing is certified that a table turned."""

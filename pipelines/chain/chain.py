@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipelines.jobs.terms import budget_terms
-from pipelines.stages.budget import budget
-from pipelines.stages.budget_terms import BudgetTables
 from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.noise import noise
 from pipelines.stages.procedures import procedures
 from pipelines.stages.reduce import reduced_summaries
+from pipelines.stages.uncertainty.budget import budget
+from pipelines.stages.uncertainty.budget_terms import BudgetTables
 from pipelines.stages.validate import verdicts
 from pipelines.stages.verify import verify_tables
 from pipelines.tables.dwells import LotTables
@@ -225,7 +225,7 @@ STAGES: tuple[Stage, ...] = (
         outputs=("budget", "uncertainties", "budget_covariance"),
         parameters=lambda job: budget_terms(job).document(),
         call=_budget,
-        modules=("pipelines.stages.budget", _TABLES),
+        modules=("pipelines.stages.uncertainty.budget", _TABLES),
     ),
     Stage(
         name="procedures",

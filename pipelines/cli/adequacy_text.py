@@ -22,7 +22,7 @@ def print_adequacy(verdict: AdequacyDocument | None) -> None:
     """Print whether the model of a run is adequate; nothing where there is no multi-position test."""
     if verdict is None:
         return
-    from pipelines.cli.verdict_text import STYLE_OF, plain_verdict
+    from pipelines.cli.text.verdict_text import STYLE_OF, plain_verdict
 
     faulty = f"; left out because of a data fault: {', '.join(verdict['faulty'])}" if verdict["faulty"] else ""
     text = f"model   {plain_verdict(verdict)}{faulty}"

@@ -145,7 +145,7 @@ def backup(
     """
     from pipelines.archive import Archive
     from pipelines.archive.backup import copy_archive
-    from pipelines.flows.database import copy_into
+    from pipelines.orchestrator.database import copy_into
 
     source, copy = Archive(archive), Archive(target)
     made = copy_into(database, keep) if database is not None else None
@@ -224,8 +224,8 @@ def restore(
     from pipelines.archive import Archive
     from pipelines.archive.backup import copy_archive
     from pipelines.archive.signatures import public_keys
-    from pipelines.flows.database import default_database, restore_database
     from pipelines.integrity.archive import verify
+    from pipelines.orchestrator.database import default_database, restore_database
     from schemas.errors import DONE, PART_FAILED
 
     copy, target = Archive(source), Archive(archive)

@@ -10,7 +10,7 @@ import typer
 from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
 
 if TYPE_CHECKING:
-    from pipelines.certificate_document.issue import Issued
+    from pipelines.certificates.document.issue import Issued
 
 PART = "Certificates, trace, audit"
 ORDER = 415
@@ -54,9 +54,9 @@ def command(
     certificate gives the same bytes, unless it is signed. Exit status 1: some units of a run have no certificate.
     """
     from pipelines.archive import Archive
-    from pipelines.certificate_document.issue import issue
-    from pipelines.certificate_document.laboratory import read_laboratory
-    from pipelines.certificate_document.signing import read_key
+    from pipelines.certificates.document.issue import issue
+    from pipelines.certificates.document.laboratory import read_laboratory
+    from pipelines.certificates.document.signing import read_key
     from pipelines.cli.standard_output import refuse_standard_output
     from schemas.errors import DONE, PART_FAILED
 

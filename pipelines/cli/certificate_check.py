@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pipelines.archive import Archive
-    from pipelines.certificate_document.file_check import CheckedFile
+    from pipelines.certificates.document.file_check import CheckedFile
 
 ENDINGS = (".pdf", ".xml", ".sig")
 STYLES = {"good": None, "bad": "bold red", "not checked": "yellow"}
@@ -45,9 +45,9 @@ def check_certificates(
     files: Sequence[Path], trust: Sequence[Path], archive: str | None, laboratory: Path | None, *, as_json: bool
 ) -> bool:
     """Check files of certificates and print the result; whether all are accepted."""
-    from pipelines.certificate_document.file_check import Against, check_file
-    from pipelines.certificate_document.laboratory import read_laboratory
-    from pipelines.certificate_document.signers import read_trusted
+    from pipelines.certificates.document.file_check import Against, check_file
+    from pipelines.certificates.document.laboratory import read_laboratory
+    from pipelines.certificates.document.signers import read_trusted
 
     who = None if laboratory is None else read_laboratory(laboratory)
     against = Against(read_trusted(trust), _archive(archive), archive is not None, who)

@@ -161,7 +161,7 @@ class _Game:
 
     def _diagnose(self) -> dict[str, Any]:
         from pipelines.cli.diagnose import diagnosed, write_report
-        from pipelines.cli.diagnosis_text import print_diagnosis
+        from pipelines.cli.text.diagnosis_text import print_diagnosis
 
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")

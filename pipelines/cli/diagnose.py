@@ -102,8 +102,8 @@ def command(
     if as_json:
         print_json(document)
     else:
-        from pipelines.cli.diagnosis_text import print_diagnosis
         from pipelines.cli.next_commands import judged_data
+        from pipelines.cli.text.diagnosis_text import print_diagnosis
 
         print_diagnosis(document, data=partial(judged_data, dwells, beside, archive), model=model)
     raise typer.Exit(DONE if document["adequate"] else PART_FAILED)

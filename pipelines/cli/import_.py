@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from pipelines.cli.import_document import import_document
-from pipelines.cli.import_text import print_import, print_transfers
 from pipelines.cli.options import (
     ArchiveOption,
     GroupOption,
@@ -16,6 +15,7 @@ from pipelines.cli.options import (
     JsonOption,
     print_json,
 )
+from pipelines.cli.text.import_text import print_import, print_transfers
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 from schemas.foreign import shown
 

@@ -25,7 +25,7 @@ def make_imported_report(run: Run) -> bool:
     from pipelines.cli.diagnose import diagnosed
     from pipelines.jobs.model_files import use_formulas_of
     from pipelines.report.imported import certificates_of, decisions
-    from pipelines.stages.norm_fit import fitted_dwells
+    from pipelines.stages.unknown_poses.fit import fitted_dwells
     from pipelines.tables.frames import rows_of
 
     effects = list((run.about.get("recipe") or {}).get("effects", ()))

@@ -96,7 +96,7 @@ def command(
     if as_json:
         print_json(document)
     else:
-        from pipelines.cli.improve_text import print_improvement
+        from pipelines.cli.text.improve_text import print_improvement
 
         print_improvement(document)
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)

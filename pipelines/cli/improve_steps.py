@@ -50,8 +50,8 @@ class Improvement:
 
     def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> dict[str, Any]:
         """The document of the command; the model file is written last, after all checks."""
-        from pipelines.cli.improve_text import next_lines, print_heading
         from pipelines.cli.next_commands import judged_data
+        from pipelines.cli.text.improve_text import next_lines, print_heading
         from pipelines.jobs.model_files import publish_model
 
         before = self._diagnosis(judged, full=True)
@@ -101,8 +101,8 @@ class Improvement:
     def _diagnosis(self, effects: list[str] | None, *, full: bool) -> dict[str, Any]:
         """The diagnosis of a model, printed with all its tables or as its verdict alone."""
         from pipelines.cli.diagnose import diagnosed
-        from pipelines.cli.diagnosis_text import print_diagnosis
-        from pipelines.cli.improve_text import print_verdict
+        from pipelines.cli.text.diagnosis_text import print_diagnosis
+        from pipelines.cli.text.improve_text import print_verdict
 
         tables = self.tables
         document, _ = diagnosed(tables.dwells, tables.history, effects, self.data, with_report=False)

@@ -175,7 +175,7 @@ def _run(
 
 def _print_diagnosis(joint: JointDiagnosis) -> None:
     """Print one line about a joint diagnosis."""
-    from pipelines.cli.verdict_text import verdict
+    from pipelines.cli.text.verdict_text import verdict
 
     runs = len(joint.lineage.runs)
     text = f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}"
@@ -192,10 +192,10 @@ def _continue_command() -> str:
 
 def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
     """Print an inquiry; ``archive`` as it was given, for the commands to give next."""
-    from pipelines.cli.diagnosis_text import print_findings
     from pipelines.cli.measurements_text import measurements_table
     from pipelines.cli.next_commands import judged_data, print_extension, print_next
-    from pipelines.cli.verdict_text import verdict
+    from pipelines.cli.text.diagnosis_text import print_findings
+    from pipelines.cli.text.verdict_text import verdict
 
     out = console()
     good = document["ended"] in {"adequate", "told_apart"}

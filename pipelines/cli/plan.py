@@ -19,7 +19,7 @@ from pipelines.cli.options import (
 )
 from pipelines.cli.plan_files import save, write_page, write_pictures
 from pipelines.cli.plan_options import DeviceOption, EffectsOption, NoiseOption, PageOption, WanderOption, with_model
-from pipelines.cli.plan_text import print_plan, print_procedures
+from pipelines.cli.text.plan_text import print_plan, print_procedures
 from schemas.errors import PART_FAILED
 
 if TYPE_CHECKING:

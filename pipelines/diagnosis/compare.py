@@ -8,15 +8,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
-from inertial.criticism.comparison import estimate, residuals_of, rms
-from inertial.criticism.freedom import refuse_without_freedom
-from inertial.criticism.handling.base import Handling
 from inertial.criticism.left_out import left_out
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Problem
-from inertial.criticism.refinement import intervals, settled, terms_of
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
+from inertial.estimation.alternative import Handling
+from inertial.estimation.comparison import estimate, residuals_of, rms
+from inertial.estimation.freedom import refuse_without_freedom
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.refinement import intervals, settled, terms_of
 from inertial.planning.reasons import drivers_of
 from pipelines.diagnosis.confirmation import progress
 from pipelines.diagnosis.doubts import doubt_of_run
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from inertial.criticism.comparison import Estimate
-    from inertial.criticism.term import Term
+    from inertial.estimation.comparison import Estimate
+    from inertial.estimation.term import Term
 
     Array = NDArray[np.float64]
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.criticism.comparison import estimate, residuals_of, rms
-from inertial.criticism.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
 from inertial.criticism.left_out import left_out
-from inertial.criticism.problem import Problem
 from inertial.criticism.reproduced_change import reproduced_change, without_own_bias
+from inertial.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
+from inertial.estimation.comparison import estimate, residuals_of, rms
+from inertial.estimation.problem import Problem
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from inertial.criticism.left_out import Kind, LeftOut
-    from inertial.criticism.model import Model
-    from inertial.criticism.problem import Lot
     from inertial.criticism.reproduced_change import ReproducedChange
+    from inertial.estimation.model import Model
+    from inertial.estimation.problem import Lot
 
     Array = NDArray[np.float64]
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from inertial.criticism.diagnosis import Diagnosis
-    from inertial.criticism.faults import Fault
+    from inertial.data_errors.faults import Fault
     from pipelines.diagnosis.next_measurement import Proposed
     from pipelines.tables.dwells import Measured
 

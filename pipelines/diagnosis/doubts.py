@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from inertial.criticism.diagnosis import diagnose
-from inertial.criticism.faults import find_faults
 from inertial.criticism.verdict import judged
+from inertial.data_errors.faults import find_faults
 from inertial.errors import InertialError
 from pipelines.diagnosis.result_rows import BAD_DWELL
 from pipelines.tables.sound_lot import generator
@@ -14,8 +14,8 @@ from pipelines.tables.sound_lot import generator
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from inertial.criticism.bad_dwells import BadDwell
-    from inertial.criticism.problem import Lot
+    from inertial.data_errors.bad_dwells import BadDwell
+    from inertial.estimation.problem import Lot
     from pipelines.tables.dwells import Measured
 
 

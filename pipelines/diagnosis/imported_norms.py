@@ -13,7 +13,7 @@ from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
-from pipelines.stages.norm_fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
+from pipelines.stages.unknown_poses.fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
 from pipelines.tables.condense import MOST
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from inertial.criticism.decisions import CONFIRMED, LEFT_OUT
+from inertial.decisions import CONFIRMED, LEFT_OUT
 from pipelines.diagnosis.confirmation import fall_of
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects as catalogue
-from inertial.criticism.proposals import Circumstances, Proposal, proposal, sighting, twins
 from inertial.errors import MissingInput
+from inertial.next_measurement.proposals import Circumstances, Proposal, proposal, sighting, twins
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

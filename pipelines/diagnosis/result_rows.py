@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects as catalogue
-from inertial.criticism.model import Model
-from inertial.criticism.refinement import intervals, settled, terms_of
+from inertial.estimation.model import Model
+from inertial.estimation.refinement import intervals, settled, terms_of
 from pipelines.tables.sound_lot import probability
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
-    from inertial.criticism.bad_dwells import BadDwell
     from inertial.criticism.diagnosis import Diagnosis, Named
     from inertial.criticism.influence import CarriedEvidence
+    from inertial.data_errors.bad_dwells import BadDwell
 
 BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""

@@ -16,8 +16,8 @@ from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from pipelines.doctor.check import Check, clock_check, of_error, offset
-from pipelines.flows.credentials import without_credentials
-from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, LOOPBACK, use_key
+from pipelines.orchestrator.credentials import without_credentials
+from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, LOOPBACK, use_key
 from schemas.errors import TumblelineError
 
 PART = "orchestrator"

@@ -20,8 +20,8 @@ from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
 from pipelines.certificates.days import today
-from pipelines.flows.archive_address import archive_of
 from pipelines.flows.dask_cluster import on_dask
+from pipelines.orchestrator.archive_address import archive_of
 from pipelines.tables.json_values import json_value
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def audit_archive(
 
     Parameters
     ----------
-    archive : without credentials, see :func:`pipelines.flows.archive_address.archive_of`
+    archive : without credentials, see :func:`pipelines.orchestrator.archive_address.archive_of`
     pages : folder for the page and the document of every audit
     since, until : dates; everything up to today where empty
     dask, workers : where runs are read, see :func:`pipelines.flows.dask_cluster.on_dask`

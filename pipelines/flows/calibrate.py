@@ -21,11 +21,11 @@ from pipelines.audit.index_growth import add_runs
 from pipelines.chain.attendance import JUDGED, Attendance
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
-from pipelines.flows.archive_address import archive_of
 from pipelines.flows.operator import Paused
-from pipelines.flows.policy import policy_of_tags
-from pipelines.flows.queue_rules import newer_run
 from pipelines.jobs.job import Request
+from pipelines.orchestrator.archive_address import archive_of
+from pipelines.orchestrator.policy import policy_of_tags
+from pipelines.orchestrator.queue_rules import newer_run
 from schemas.errors import LinkLost, NotReached, StationTimeout
 from schemas.progress import silent
 
@@ -101,7 +101,7 @@ def calibrate_lot(  # noqa: PLR0913 - the parameters of a flow are the form on t
 
     Without ``repeat`` every flow run measures the lot again, and a retry of the same flow run continues it. With
     ``prompts`` the flow run pauses for the operator: to load, to correct a fault, to unload. ``archive`` has no
-    credentials, see :func:`pipelines.flows.archive_address.archive_of`.
+    credentials, see :func:`pipelines.orchestrator.archive_address.archive_of`.
     """
     if too_late := late_start():
         return Cancelled(message=too_late)
@@ -138,8 +138,9 @@ def requested(
 def late_start() -> str:
     """Reason why a scheduled run may no longer start; empty where it may.
 
-    The worker cancels such runs (:mod:`pipelines.flows.queue_rules`). One that started in between, for instance when a suspended
-    computer resumed, ends here, before anything moves; with ``missed=latest`` where a newer run of its deployment is due.
+    The worker cancels such runs (:mod:`pipelines.orchestrator.queue_rules`). One that started in between, for instance when a
+    suspended computer resumed, ends here, before anything moves; with ``missed=latest`` where a newer run of its deployment
+    is due.
     """
     tags: list[str] = list(flow_run.tags or ())
     if AUTO not in tags or int(flow_run.run_count or 1) > 1:

@@ -9,7 +9,7 @@ from prefect import flow, task
 from prefect.cache_policies import NO_CACHE
 from prefect_dask.task_runners import DaskTaskRunner
 
-from pipelines.flows.settings import LOCAL
+from pipelines.orchestrator.settings import LOCAL
 from pipelines.parallel import in_one_thread, one_thread_each
 from schemas.errors import LinkLost
 

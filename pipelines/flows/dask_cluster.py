@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from pipelines.flows.local import own_server, reach_named
-from pipelines.flows.settings import LOCAL
+from pipelines.orchestrator.settings import LOCAL
 from schemas.errors import WrongUse
 from schemas.library import require
 

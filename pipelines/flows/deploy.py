@@ -2,7 +2,7 @@
 
 A work queue is a station (or another resource with one run at a time): its limit of one run is set here, as ``prefect.yaml``
 has no key for it. The limit of a deployment does not separate two deployments of one station. The policy of a deployment
-(:mod:`pipelines.flows.policy`) becomes its tags; an automation closes runs whose heartbeat stopped.
+(:mod:`pipelines.orchestrator.policy`) becomes its tags; an automation closes runs whose heartbeat stopped.
 
 The command of Prefect 3.8 ends with error 422 with FastAPI 0.151 and later: after each deployment it requests the workers of
 the pool with null for two numbers, and FastAPI now reads null as a value and not as a missing one.
@@ -17,10 +17,10 @@ from typing import Any
 
 import yaml
 
-from pipelines.flows.credentials import refuse_credentials
-from pipelines.flows.policy import policy_of
-from pipelines.flows.server_check import check_server
-from pipelines.flows.settings import CLIENT_KEY, use_key
+from pipelines.orchestrator.credentials import refuse_credentials
+from pipelines.orchestrator.policy import policy_of
+from pipelines.orchestrator.server_check import check_server
+from pipelines.orchestrator.settings import CLIENT_KEY, use_key
 from schemas.errors import TumblelineError
 
 NOT_HERE = "deployments are registered from code that is not asynchronous"
@@ -48,7 +48,7 @@ def register(path: Path) -> list[str]:
     for item in content["deployments"]:
         _have_queue(item["work_pool"]["name"], item["work_pool"]["work_queue_name"])
     names = [_register(item) for item in content["deployments"]]
-    from pipelines.flows.heartbeat import have_automation
+    from pipelines.orchestrator.heartbeat import have_automation
 
     have_automation()
     return names

@@ -14,11 +14,11 @@ from prefect import flow
 
 from pipelines.chain.attendance import Prompt
 from pipelines.chain.chain import ORDER
-from pipelines.flows.archive_address import archive_of
 from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
 from pipelines.inquiry.loop import Consent, InquirySettings, Participants, always, run_inquiry
+from pipelines.orchestrator.archive_address import archive_of
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -98,9 +98,9 @@ def investigate_locally(
     job = request.job(archive)
     name = f"investigate {job.recipe.name} {job.capture_id}"
     with reached(archive):
-        from pipelines.flows.archive_address import named
         from pipelines.flows.calibrate import settle_history
-        from pipelines.flows.dead_runs import close_dead_runs
+        from pipelines.orchestrator.archive_address import named
+        from pipelines.orchestrator.dead_runs import close_dead_runs
 
         close_dead_runs(name)
         with seated(participants), named(archive) as address:

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import code_hash
 from pipelines.chain.chain import BY_NAME, ORDER
-from pipelines.flows.credentials import without_credentials
-from pipelines.flows.quick_imports import quick_imports
-from pipelines.flows.server import ADDRESS, CLIENTS, START_LOCK, private_folder
-from pipelines.flows.server_check import check_server
-from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
+from pipelines.orchestrator.credentials import without_credentials
+from pipelines.orchestrator.quick_imports import quick_imports
+from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder
+from pipelines.orchestrator.server_check import check_server
+from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
 from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
 from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
@@ -43,7 +43,7 @@ POLL_S = 0.1
 PRIVATE = 0o600
 NEEDED = (
     "pipelines.flows.calibrate",
-    "pipelines.flows.dead_runs",
+    "pipelines.orchestrator.dead_runs",
     "prefect.flow_engine",
     "pipelines.capture.capture",
     "pipelines.jobs.adequacy",
@@ -134,9 +134,9 @@ def _run(
     report: Callable[[Done], None],
     operator: Operator | None,
 ) -> Run:
-    from pipelines.flows.archive_address import named
     from pipelines.flows.calibrate import calibrate_lot, listening, settle_history
-    from pipelines.flows.dead_runs import close_dead_runs
+    from pipelines.orchestrator.archive_address import named
+    from pipelines.orchestrator.dead_runs import close_dead_runs
 
     name = f"{job.recipe.name} {job.capture_id}"
     close_dead_runs(name)
@@ -197,7 +197,7 @@ def _start(home: Path, meanwhile: Callable[[], None]) -> tuple[int, str]:
     before = log_path.stat().st_size if log_path.exists() else 0
     with os.fdopen(_private_file(log_path, os.O_APPEND), "ab") as log:
         process = subprocess.Popen(  # noqa: S603 - our own module, by our own interpreter
-            [sys.executable, "-m", "pipelines.flows.server", "--port", str(port), "--until-unused", str(home)],
+            [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(port), "--until-unused", str(home)],
             # the key in the environment: the arguments of a process are there for everybody to read
             env={
                 **os.environ,

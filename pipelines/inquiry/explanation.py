@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial import frames
-from inertial.criticism.menus import Kind
+from inertial.next_measurement.menus import Kind
 from inertial.planning.reasons import begins_again, confounding_feature, constant_feature, reason
 from inertial.planning.remedies import Driver
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from inertial.criticism.proposals import Proposal
+    from inertial.next_measurement.proposals import Proposal
     from inertial.planning.sequences import SequenceStep
     from inertial.state import State
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from inertial.criticism.menus import TableReach
-from inertial.criticism.proposals import Circumstances
+from inertial.next_measurement.menus import TableReach
+from inertial.next_measurement.proposals import Circumstances
 from inertial.planning.sequences import SequenceStep, StationPace
 from pipelines.jobs.job import Job
 from pipelines.schedule.steps import Step, steps

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from inertial.criticism.diagnosis import Diagnosis
-    from inertial.criticism.proposals import Proposal
+    from inertial.next_measurement.proposals import Proposal
     from inertial.planning.sequences import SequenceStep
     from pipelines.archive import Archive, Records, Run
     from pipelines.tables.dwells import Measured

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from pipelines.schedule.planned_dwells import planned_dwells
-from pipelines.stages.budget_terms import BudgetTerms, terms_of
-from pipelines.stages.contributions import merged
-from pipelines.stages.reachable import PlannedDwells, reachable, unreachable
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
+from pipelines.stages.uncertainty.contributions import merged
+from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
 from schemas.errors import RecipeInvalid
 from schemas.limits import VALIDITY_MONTHS
 from schemas.reference import Reference

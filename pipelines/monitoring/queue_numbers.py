@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from typing import Any, cast
 
-from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, use_key
+from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, use_key
 from schemas.errors import LinkLost
 
 ADDRESS = "PREFECT_API_URL"
@@ -20,7 +20,7 @@ TIMEOUT_S = 10.0
 PAGE_SIZE = 200  # largest that the server allows
 OPEN = ("SCHEDULED", "PENDING", "RUNNING", "PAUSED", "CANCELLING")
 FAILED = ("CRASHED", "FAILED")
-MISSED = ("missed:", "skipped:")  # beginnings of the messages of pipelines.flows.queue_rules
+MISSED = ("missed:", "skipped:")  # beginnings of the messages of pipelines.orchestrator.queue_rules
 LATE = timedelta(minutes=5)
 """A run that has been due for longer is late; a worker requests work every ten seconds."""
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from inertial.planning.visibility import Visibility
     from inertial.state import State
     from pipelines.schedule.timing import Activity
-    from pipelines.stages.budget_terms import BudgetTerms
+    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
     from schemas.limits import Limits
     from schemas.recipe import Recipe
     from schemas.station import StationConfig
@@ -155,7 +155,7 @@ def _bias(
 ) -> dict[str, float | str | None] | None:
     """Standard uncertainty of the bias by measurand, of the worst axis, as the fit will state it; None for a model without one.
 
-    See :func:`pipelines.stages.bias_measurands.bias_measurands`.
+    See :func:`pipelines.stages.uncertainty.bias_measurands.bias_measurands`.
     """
     places = [
         (axis, k)

@@ -9,8 +9,8 @@ import numpy as np
 
 from inertial.uncertainty.period import Windows, flicker_within
 from pipelines.schedule.planned_dwells import planned_dwells
-from pipelines.stages.budget_rows import LABELS
-from pipelines.stages.reachable import PlannedDwells, reachable, unreachable
+from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
+from pipelines.stages.uncertainty.tables import LABELS
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from inertial.noise.dwells import DwellNoise
     from pipelines.schedule.timing import Activity
-    from pipelines.stages.budget_terms import BudgetTerms
+    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
     from schemas.limits import Limits
     from schemas.recipe import Recipe
     from schemas.station import StationConfig

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects
-from inertial.criticism.handling import named as handled
+from inertial.data_errors.handling import named as handled
 from inertial.uncertainty.rounding import chance, equal
-from pipelines.report.diagnosis_charts import driver_chart, model_chart, pose_chart
+from pipelines.report.diagnosis_pictures import driver_chart, model_chart, pose_chart
 from pipelines.report.interactive import figure_of, interactive
 from pipelines.report.numbers import significant
 from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals

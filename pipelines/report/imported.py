@@ -10,7 +10,7 @@ from pipelines.report.context import OPTIONAL, TABLES, ReportContext
 from pipelines.report.panels import budget, certificates
 from pipelines.report.templates import fill
 from pipelines.report.unit_panels import figures
-from pipelines.stages.norm_budget import OF_POSES
+from pipelines.stages.unknown_poses.budget import OF_POSES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

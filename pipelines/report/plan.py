@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pipelines.drawing import svg_text
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant
-from pipelines.report.plan_charts import alias_chart, sight_chart, sphere_chart, temperature_chart
+from pipelines.report.plan_pictures import alias_chart, sight_chart, sphere_chart, temperature_chart
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import effects as catalogue
-from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.drivers import drivers_of
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Problem
-from inertial.criticism.refinement import terms_of
 from inertial.errors import InertialError
+from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.refinement import terms_of
 from inertial.quantities import shown_factor
 from pipelines.report.residuals import LABELS, direction
 from pipelines.tables.dwells import lot_of, measured

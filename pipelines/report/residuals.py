@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.criticism.comparison import estimate, residuals_of
 from inertial.criticism.drivers import curve, drivers_of
+from inertial.estimation.comparison import estimate, residuals_of
 from inertial.quantities import axis_labels, shown_factor
 from schemas.units import MICRO
 

@@ -10,17 +10,17 @@ import pandas as pd
 from pipelines.archive import code_hash
 from pipelines.chain.chain import BY_NAME, Tables
 from pipelines.importers.plane import plane_answer
-from pipelines.stages.budget import budget
-from pipelines.stages.budget_terms import BudgetTables
-from pipelines.stages.norm_budget import norm_budget
-from pipelines.stages.norm_verify import verify_norms
+from pipelines.stages.uncertainty.budget import budget
+from pipelines.stages.uncertainty.budget_terms import BudgetTables
+from pipelines.stages.unknown_poses.budget import norm_budget
+from pipelines.stages.unknown_poses.verify import verify_norms
 from pipelines.tables.frames import empty_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pipelines.archive import Run
-    from pipelines.stages.budget_terms import BudgetTerms
+    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def verify_norms_step(gravity: float, *, history: bool) -> StageCall:
             dwells, run.table("history") if history else None, coefficients, covariance, wander, gravity
         )
 
-    code = code_hash(("pipelines.stages.norm_verify", "schemas.tables"))
+    code = code_hash(("pipelines.stages.unknown_poses.verify", "schemas.tables"))
     inputs = (*names, "history") if history else names
     return StageCall("verify", inputs, stage.outputs, {"gravity_g": gravity}, code, call)
 
@@ -95,6 +95,6 @@ def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
         )
         return budget(whole, terms) if known else norm_budget(whole, terms)
 
-    module = "pipelines.stages.budget" if known else "pipelines.stages.norm_budget"
+    module = "pipelines.stages.uncertainty.budget" if known else "pipelines.stages.unknown_poses.budget"
     inputs = ("dwells", *(("history",) if history else ()), *names)
     return StageCall("budget", inputs, stage.outputs, terms.document(), code_hash((module, "schemas.tables")), call)

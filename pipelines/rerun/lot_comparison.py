@@ -14,10 +14,10 @@ from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.buffered_run import BufferedRun
 from pipelines.rerun.selection import entry_of
-from pipelines.stages.budget_terms import BudgetTables
-from pipelines.stages.decision_budget import decision_budget
 from pipelines.stages.fit import fit_in_memory
 from pipelines.stages.grade import GradeEvidence, grade
+from pipelines.stages.uncertainty.budget_terms import BudgetTables
+from pipelines.stages.uncertainty.decision_budget import decision_budget
 from pipelines.stages.verify import verify_tables
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import KINDS, LotTables, lot_arrays

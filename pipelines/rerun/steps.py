@@ -28,7 +28,7 @@ from pipelines.rerun.import_steps import (
 from pipelines.stages.figures import UNITS
 from pipelines.stages.fit import fit
 from pipelines.stages.grade import GradeEvidence, grade
-from pipelines.stages.norm_fit import fit_of_norms
+from pipelines.stages.unknown_poses.fit import fit_of_norms
 from pipelines.stages.verify import verify
 from pipelines.tables.leave_out import Dwells, leave_out
 from schemas.errors import DataRejected, WrongUse
@@ -238,7 +238,7 @@ def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> St
             past = run.table("history") if history else None
             return fit_of_norms(run.table("dwells"), past, model["effects"], gravity)
 
-        code = code_hash(("pipelines.stages.norm_fit", "schemas.tables"))
+        code = code_hash(("pipelines.stages.unknown_poses.fit", "schemas.tables"))
         return StageCall("fit", inputs, stage.outputs, {**parameters, "gravity_g": gravity}, code, of_norms)
 
     def call(run: Run) -> Tables:

@@ -9,8 +9,8 @@ import pandas as pd
 
 from inertial.errors import InertialError
 from inertial.fits.wander import student
-from pipelines.stages.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.stages.noisy_fit import NoisyFit, fitted_with_noise
+from pipelines.stages.uncertainty.bias_measurands import COLUMNS, BiasNoise, bias_measurands
 from pipelines.tables.calibration import Calibration, calibration_of, coefficient_rows, covariance_rows, symmetric
 from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked

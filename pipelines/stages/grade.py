@@ -11,7 +11,7 @@ import pandas as pd
 from pipelines.procedures import PROCEDURES, figures_of_recipe
 from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
 from pipelines.stages.figures.base import BudgetRow
-from pipelines.stages.lot_risks import lot_risks
+from pipelines.stages.uncertainty.lot_risks import lot_risks
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import ByUnit, empty_table
 from schemas.decisions import GRADE_FIGURE, GRADES, PERIOD_FIGURE, Decision, decide, describe_rule, grade_with
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from pipelines.stages.decision_budget import DecisionBudget
+    from pipelines.stages.uncertainty.decision_budget import DecisionBudget
     from schemas.recipe import Recipe
 
 NO_GRADE = "none"

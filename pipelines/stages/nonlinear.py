@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial import effects as catalogue
-from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.refinement import terms_of
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.refinement import terms_of
 from inertial.fits.linear import fit_lot
 
 if TYPE_CHECKING:

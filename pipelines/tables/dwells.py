@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from inertial.criticism.problem import Lot
-from inertial.criticism.readings import Readings, robust_fit
+from inertial.data_errors.readings import Readings, robust_fit
+from inertial.estimation.problem import Lot
 from inertial.fits.linear import force_along_axes
 from inertial.quantities import OUTPUT_COLUMNS, SPREAD_COLUMNS
 from inertial.state import State

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inertial.criticism.problem import Lot
 from inertial.errors import NotIdentified
+from inertial.estimation.problem import Lot
 from inertial.fits.ellipsoid import EllipsoidFit, fit_ellipsoid
 from inertial.fits.plane import quiet_axis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from inertial.criticism.readings import Readings
+    from inertial.data_errors.readings import Readings
     from inertial.fits.ellipsoid import Shape
     from inertial.state import State
 

@@ -8,8 +8,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from inertial.counts import number_of
-from inertial.criticism.decisions import ADEQUATE_ABOVE
-from inertial.criticism.faults import find_faults, missing_dwells
+from inertial.data_errors.faults import find_faults, missing_dwells
+from inertial.decisions import ADEQUATE_ABOVE
 from inertial.errors import InertialError
 from pipelines.tables.condense import condense
 from pipelines.tables.dwells import lot_of, measured
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from inertial.criticism.faults import Fault
-    from inertial.criticism.problem import Lot
+    from inertial.data_errors.faults import Fault
+    from inertial.estimation.problem import Lot
     from pipelines.tables.dwells import Measured
 
 MISSING = frozenset({"dropped_samples", "truncated_file"})

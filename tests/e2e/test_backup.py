@@ -18,8 +18,8 @@ from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.cli.documents.archive import ArchiveRestoreDocument
-from pipelines.flows.database import copy_database, restore_database
 from pipelines.integrity.archive import verify
+from pipelines.orchestrator.database import copy_database, restore_database
 from schemas.errors import ArchiveUnusable, WrongUse
 
 

@@ -22,8 +22,8 @@ from typer.testing import CliRunner
 
 from pipelines.cli import app
 from pipelines.doctor.orchestrator import orchestrator_checks
-from pipelines.flows.credentials import REFUSED
-from pipelines.flows.server_check import check_server
+from pipelines.orchestrator.credentials import REFUSED
+from pipelines.orchestrator.server_check import check_server
 from pipelines.serving.connections import MOST
 from schemas.errors import LinkLost, WrongUse
 
@@ -148,8 +148,8 @@ def test_flows_are_found_by_their_module_so_that_their_folder_hides_no_module_of
 
 CLOSING = """
 import json
-from pipelines.flows.dead_runs import close_dead_runs_of_queue
-from pipelines.flows.queue_rules import apply_rules
+from pipelines.orchestrator.dead_runs import close_dead_runs_of_queue
+from pipelines.orchestrator.queue_rules import apply_rules
 print(json.dumps([close_dead_runs_of_queue("line", "line-1", "line-1 on here"), apply_rules("line", "line-1")]))
 """
 
@@ -249,7 +249,7 @@ def resident_mb(line: Orchestrator) -> float:
     (found,) = [
         int(path.parent.name)
         for path in Path("/proc").glob("[0-9]*/cmdline")
-        if f"pipelines.flows.server\0--port\0{line.port}\0".encode() in path.read_bytes()
+        if f"pipelines.orchestrator.server\0--port\0{line.port}\0".encode() in path.read_bytes()
     ]
     text = Path(f"/proc/{found}/status").read_text()
     return int(re.search(r"VmHWM:\s+(\d+) kB", text)[1]) / 1e3
@@ -293,7 +293,7 @@ def test_idle_connections_do_not_shut_the_line_out(line: Orchestrator) -> None:
 
 def test_a_server_without_a_key_does_not_start() -> None:
     environment = {key: value for key, value in os.environ.items() if not key.endswith("AUTH_STRING")}
-    command = [sys.executable, "-m", "pipelines.flows.server", "--port", "1"]
+    command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", "1"]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     assert "orchestrator: no key was found" in done.stderr
@@ -301,7 +301,7 @@ def test_a_server_without_a_key_does_not_start() -> None:
 
 
 def test_a_port_in_use_is_told_in_one_sentence(line: Orchestrator) -> None:
-    command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(line.port)]
+    command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(line.port)]
     environment = line.environment | {"PREFECT_SERVER_API_AUTH_STRING": line.key}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2

@@ -14,8 +14,8 @@ from root_process import ROOT, python
 from s3_server import CREDENTIALS, s3_bucket
 
 from pipelines.archive import Archive
-from pipelines.flows.database import copy_database, restore_database
 from pipelines.integrity.archive import verify
+from pipelines.orchestrator.database import copy_database, restore_database
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 

@@ -13,11 +13,11 @@ import yaml
 from orchestrator import Orchestrator, served
 from root_process import ROOT
 
-from pipelines.flows.dead_runs import LOST_S, WORKER, LostRuns
 from pipelines.flows.deploy import register
-from pipelines.flows.heartbeat import have_automation
-from pipelines.flows.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules, newer_run
 from pipelines.monitoring.queue_numbers import read_queues
+from pipelines.orchestrator.dead_runs import LOST_S, WORKER, LostRuns
+from pipelines.orchestrator.heartbeat import have_automation
+from pipelines.orchestrator.queue_rules import CONTINUED_WITHIN, SETTLED, apply_rules, newer_run
 
 QUEUE, DAILY_QUEUE = "line-7", "line-8"
 MOST_SCHEDULED = 40

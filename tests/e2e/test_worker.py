@@ -20,7 +20,7 @@ from served_station import served as station_served
 from small_station import lot_of
 
 from pipelines.archive import Archive
-from pipelines.flows.settings import CLIENT_KEY
+from pipelines.orchestrator.settings import CLIENT_KEY
 from stations.opening import open_devices
 from stations.safety.folder import read_log as log
 
@@ -67,7 +67,7 @@ def worker(line: Orchestrator, folder: Path, *options: str) -> Iterator[subproce
     key.write_text(line.key)
     environment = {name: value for name, value in line.environment.items() if name != CLIENT_KEY}
     environment |= {"CREDENTIALS_DIRECTORY": str(folder), "PREFECT_WORKER_QUERY_SECONDS": "2"}
-    command = [sys.executable, "-m", "pipelines.flows.worker", "start", "--station", "line-1", *options]
+    command = [sys.executable, "-m", "pipelines.orchestrator.worker", "start", "--station", "line-1", *options]
     with (
         (folder / "worker.log").open("ab") as out,
         subprocess.Popen(command, cwd=ROOT, env=environment, stdout=out, stderr=out) as process,
@@ -80,7 +80,7 @@ def worker(line: Orchestrator, folder: Path, *options: str) -> Iterator[subproce
 
 
 def stop(line: Orchestrator, *options: str) -> tuple[int, str]:
-    command = [sys.executable, "-m", "pipelines.flows.worker", "stop", "--station", "line-1", *options]
+    command = [sys.executable, "-m", "pipelines.orchestrator.worker", "stop", "--station", "line-1", *options]
     done = subprocess.run(command, cwd=ROOT, env=line.environment, capture_output=True, text=True, check=False)
     return done.returncode, done.stderr
 
@@ -154,7 +154,7 @@ def refused_beside_it(line: Orchestrator, folder: Path, recipe: str, station: Pa
 
 
 def second_worker(line: Orchestrator) -> tuple[int, str]:
-    command = [sys.executable, "-m", "pipelines.flows.worker", "start", "--station", "line-1", "--once"]
+    command = [sys.executable, "-m", "pipelines.orchestrator.worker", "start", "--station", "line-1", "--once"]
     done = subprocess.run(command, cwd=ROOT, env=line.environment, capture_output=True, text=True, check=False)
     return done.returncode, done.stderr
 

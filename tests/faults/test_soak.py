@@ -32,9 +32,9 @@ from small_station import lot_of
 from wrong_clock import WrongClocks
 
 from pipelines.archive import Archive
-from pipelines.flows.queue_rules import ATTEMPTS
-from pipelines.flows.settings import CLIENT_KEY, SERVER_KEY, new_key
 from pipelines.integrity.archive import verify
+from pipelines.orchestrator.queue_rules import ATTEMPTS
+from pipelines.orchestrator.settings import CLIENT_KEY, SERVER_KEY, new_key
 from stations.opening import open_devices
 from stations.safety.folder import read_log
 
@@ -92,7 +92,7 @@ class Server:
         return {"TUMBLELINE_ORCHESTRATOR_DATABASE": str(address)}
 
     def start(self) -> None:
-        command = [sys.executable, "-m", "pipelines.flows.server", "--port", str(self.port)]
+        command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(self.port)]
         with (self.home / "killed-server.log").open("ab") as log:
             environment = {**self.line.environment, SERVER_KEY: self.key}
             self.process = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)

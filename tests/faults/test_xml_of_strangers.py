@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.archive.backup import copy_archive
-from pipelines.certificate_document.signature_check import SignatureBroken, canonical, parsed
+from pipelines.certificates.document.signature_check import SignatureBroken, canonical, parsed
 from pipelines.cli import app, main
 from pipelines.workbench.application import create_app
 from pipelines.workbench.settings import WorkbenchSettings

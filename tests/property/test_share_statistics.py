@@ -10,17 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inertial import effects as catalogue
-from inertial.criticism.candidate import Candidate
 from inertial.criticism.examination import ExaminedRun
-from inertial.criticism.handling.gain_step import GainStep
-from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Shares
-from inertial.criticism.own_shares import _deviance, own_shares
-from inertial.criticism.products import products_with, spanned
-from inertial.criticism.share_statistics import ShareStatistics
-from inertial.criticism.shares import shares_at
-from inertial.criticism.term import Term
 from inertial.criticism.unknown import suspects
+from inertial.data_errors.handling.gain_step import GainStep
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Shares
+from inertial.estimation.own_shares import _deviance, own_shares
+from inertial.estimation.products import products_with, spanned
+from inertial.estimation.share_statistics import ShareStatistics
+from inertial.estimation.shares import shares_at
+from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))

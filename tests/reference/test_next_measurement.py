@@ -10,11 +10,11 @@ import pytest
 
 from inertial import effects, frames, poses
 from inertial.criticism.classes import EffectClass, Member
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Lot, Problem
-from inertial.criticism.proposals import Circumstances, proposal, rivals_in
-from inertial.criticism.separation import separations, smallest
-from inertial.criticism.term import Term
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.term import Term
+from inertial.next_measurement.proposals import Circumstances, proposal, rivals_in
+from inertial.next_measurement.separation import separations, smallest
 from inertial.planning.sequences import SequenceStep, StationPace
 from inertial.state import State
 

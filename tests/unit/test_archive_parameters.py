@@ -3,8 +3,8 @@
 import pytest
 
 from pipelines.archive import Archive
-from pipelines.flows.archive_address import archive_of, named
-from pipelines.flows.credentials import credentials_in, refuse_credentials, without_credentials
+from pipelines.orchestrator.archive_address import archive_of, named
+from pipelines.orchestrator.credentials import credentials_in, refuse_credentials, without_credentials
 from schemas.errors import WrongUse
 
 KEPT = [

@@ -24,16 +24,16 @@ from signing_keys import made_key, pem
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
-from pipelines.certificate_document import archive_comparison
-from pipelines.certificate_document.compose import compose
-from pipelines.certificate_document.content import CertificateContent
-from pipelines.certificate_document.documents import CertificateCheckDocument
-from pipelines.certificate_document.file_check import Against, check_file
-from pipelines.certificate_document.issue import issue
-from pipelines.certificate_document.laboratory import LaboratoryFile, read_laboratory
-from pipelines.certificate_document.signature_check import canonical, parsed, xml_signature
-from pipelines.certificate_document.signing import SigningKey, sign_pdf, sign_xml
 from pipelines.certificates import Calibration, Ledger
+from pipelines.certificates.document import archive_comparison
+from pipelines.certificates.document.compose import compose
+from pipelines.certificates.document.content import CertificateContent
+from pipelines.certificates.document.documents import CertificateCheckDocument
+from pipelines.certificates.document.file_check import Against, check_file
+from pipelines.certificates.document.issue import issue
+from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
+from pipelines.certificates.document.signature_check import canonical, parsed, xml_signature
+from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
 from pipelines.certificates.documents import CertifyDocument
 from pipelines.chain.certify import certify
 from pipelines.cli import app
@@ -158,7 +158,7 @@ def own_implementation_accepts(signature: bytes, key: SigningKey) -> bool:
 def schema_accepts(document: bytes) -> bool:
     from importlib.resources import files
 
-    folder = files("pipelines.certificate_document") / "schemas"
+    folder = files("pipelines.certificates.document") / "schemas"
     rules = xmlschema.XMLSchema(str(folder / "dcc.xsd"), locations={"https://ptb.de/si": str(folder / "SI_Format.xsd")},
                                 allow="local")  # fmt: skip
     return rules.is_valid(BytesIO(document))
@@ -519,7 +519,7 @@ def test_a_certificate_superseded_by_a_later_run_is_told_by_the_archive(
         with_it = checked(issued.folder / name, *words, status=0)  # until that day it is valid
         assert told in [one["message"] for one in with_it["files"][0]["checks"] if one["check"] == "state"]
         with monkeypatch.context() as later_day:
-            later_day.setattr("pipelines.certificate_document.archive_comparison.today", lambda: begins)
+            later_day.setattr("pipelines.certificates.document.archive_comparison.today", lambda: begins)
             assert wrong(checked(issued.folder / name, *words, status=1)) == {"state": told}
     assert checked(issued.folder / "A2_1.xml", *words)["accepted"]  # the other unit's certificate stands
 

@@ -17,15 +17,15 @@ from typer.testing import CliRunner, Result
 
 from inertial.uncertainty.rounding import rounded
 from pipelines.archive import Archive, Run
-from pipelines.certificate_document.compose import compose
-from pipelines.certificate_document.content import CertificateContent, Coefficient, ReferenceStandard
-from pipelines.certificate_document.dcc import DCC, SI, dcc
-from pipelines.certificate_document.laboratory import LaboratoryFile, read_laboratory
-from pipelines.certificate_document.numbers import si_unit, with_uncertainty
-from pipelines.certificate_document.pages import page_content
-from pipelines.certificate_document.pdf import pdf
-from pipelines.certificate_document.schema_files import DocumentInvalid, validate
 from pipelines.certificates import Ledger
+from pipelines.certificates.document.compose import compose
+from pipelines.certificates.document.content import CertificateContent, Coefficient, ReferenceStandard
+from pipelines.certificates.document.dcc import DCC, SI, dcc
+from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
+from pipelines.certificates.document.numbers import si_unit, with_uncertainty
+from pipelines.certificates.document.pages import page_content
+from pipelines.certificates.document.pdf import pdf
+from pipelines.certificates.document.schema_files import DocumentInvalid, validate
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.cli.documents.certificates import CertificateDocument
@@ -230,7 +230,7 @@ def test_nothing_says_accredited_without_an_accreditation_in_the_file(run: Run, 
 
 
 def test_an_interval_is_printed_only_where_the_customer_agreed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    from pipelines.certificate_document import compose as composing
+    from pipelines.certificates.document import compose as composing
 
     due = Ledger(run.archive).calibrations("A1")[-1].until
     assert due not in " ".join(text_of(pdf(content(run), b"<a/>")))
@@ -319,7 +319,7 @@ def test_a_second_program_finds_the_xml_valid_and_a_wrong_one_invalid(run: Run) 
     xmlschema = pytest.importorskip("xmlschema")
     from importlib.resources import files
 
-    folder = files("pipelines.certificate_document") / "schemas"
+    folder = files("pipelines.certificates.document") / "schemas"
     rules = xmlschema.XMLSchema(
         str(folder / "dcc.xsd"), locations={SI: str(folder / "SI_Format.xsd")}, allow="local", validation="strict"
     )
@@ -391,7 +391,7 @@ def test_certificates_are_signed_on_request_and_stay_valid(run: Run, typed: Type
 
 
 def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
-    from pipelines.certificate_document.compose import _traceability
+    from pipelines.certificates.document.compose import _traceability
 
     entries = {"grade_source": "certificates", "gravity": {"u_ppm": 1.0, "reference": "G-1"}, "seat": {"u_urad": 9.0}}
     text = _traceability({"references": [{"id": "G-1"}], "grade_source": "certificates"}, entries)

@@ -13,7 +13,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from signing_keys import made_key, pem
 
-from pipelines.certificate_document.signing import SigningKey, read_key, sign_pdf, sign_xml
+from pipelines.certificates.document.signing import SigningKey, read_key, sign_pdf, sign_xml
 from schemas.errors import WrongUse
 
 etree = pytest.importorskip("lxml.etree")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from inertial.criticism import decisions
+from inertial import decisions
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from prefect.client.schemas.objects import StateType
 
-from pipelines.flows import dead_runs, queue_rules
+from pipelines.orchestrator import dead_runs, queue_rules
 
 NOW = datetime(2026, 6, 1, 12, tzinfo=UTC)
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inertial.criticism.bases import SEEN, eigen
-from inertial.criticism.candidate import Candidate, times_rows
-from inertial.criticism.covariance import Covariance
 from inertial.criticism.noise_draws import Directions
-from inertial.criticism.noise_shares import Noise, Shares
-from inertial.criticism.space import Space
-from inertial.criticism.tail_areas import log_chi2_tail, log_f_tail
+from inertial.estimation.bases import SEEN, eigen
+from inertial.estimation.candidate import Candidate, times_rows
+from inertial.estimation.covariance import Covariance
+from inertial.estimation.noise_shares import Noise, Shares
+from inertial.estimation.space import Space
 from inertial.noise.flicker import flicker_kernel, summed, time_constants
+from inertial.probability import log_chi2_tail, log_f_tail
 
 BLOCKS, N = 6, 40
 SHARES = Shares(10.0 ** (4 / 8), 10.0 ** (8 / 8))

@@ -13,7 +13,7 @@ import yaml
 from typer.main import get_command
 
 from pipelines.cli import app
-from pipelines.flows import server, worker
+from pipelines.orchestrator import server, worker
 from pipelines.serving.connections import MOST
 from schemas.safety import SAFE_WITHIN_S
 from schemas.station import load_station

@@ -4,10 +4,10 @@ import independent_lots as lots
 import numpy as np
 import pytest
 
-from inertial.criticism import problem as problems
 from inertial.criticism.examination import ExaminedRun, candidates_of
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling import alternatives
+from inertial.data_errors.handling import alternatives
+from inertial.estimation import problem as problems
 from pipelines.tables.condense import condense
 from pipelines.tables.dwells import lot_of, measured
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from inertial import effects as catalogue
-from inertial.criticism.bad_dwells import BadDwell, without
-from inertial.criticism.handling.table_slip import TableSlip
-from inertial.criticism.handling.unit_moved import UnitMoved
 from inertial.criticism.left_out import left_out
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Problem
-from inertial.criticism.refinement import terms_of
-from inertial.criticism.term import Term
+from inertial.data_errors.bad_dwells import BadDwell, without
+from inertial.data_errors.handling.table_slip import TableSlip
+from inertial.data_errors.handling.unit_moved import UnitMoved
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.refinement import terms_of
+from inertial.estimation.term import Term
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 

@@ -16,13 +16,13 @@ from pipelines.archive import Archive, Run
 from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.archived_job import ArchivedJob, archived_job
-from pipelines.stages.budget import budget
-from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
-from pipelines.stages.decision_budget import DecisionBudget, decision_budget
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.fit import fit_in_memory, fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
-from pipelines.stages.quantities import PARTS
+from pipelines.stages.uncertainty.budget import budget
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+from pipelines.stages.uncertainty.decision_budget import DecisionBudget, decision_budget
+from pipelines.stages.uncertainty.measurands import PARTS
 from pipelines.stages.verify import verify_tables
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotTables

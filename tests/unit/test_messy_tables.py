@@ -16,7 +16,7 @@ from pipelines.importers.inspection import inspect
 from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
 from pipelines.importers.unit_check import unsigned_bits
-from pipelines.stages.norm_fit import norms_fitted
+from pipelines.stages.unknown_poses.fit import norms_fitted
 from pipelines.tables.norms import refuse_one_pose
 from schemas.errors import DataRejected
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.flows import new_database
-from pipelines.flows.new_database import NAME, SCHEMA, make_database, migrated, schema_of
-from pipelines.flows.settings import DATABASE
+from pipelines.orchestrator import new_database
+from pipelines.orchestrator.new_database import NAME, SCHEMA, make_database, migrated, schema_of
+from pipelines.orchestrator.settings import DATABASE
 
 
 @pytest.fixture(autouse=True)
@@ -19,7 +19,9 @@ def no_address(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_schema_is_what_the_migrations_of_the_installed_prefect_make(tmp_path: Path) -> None:
     _, _, kept = SCHEMA.read_text(encoding="utf-8").partition("\n")
-    assert parts(kept) == parts(schema_of(migrated(tmp_path))), "write it anew: python -m pipelines.flows.new_database"
+    assert parts(kept) == parts(schema_of(migrated(tmp_path))), (
+        "write it anew: python -m pipelines.orchestrator.new_database"
+    )
 
 
 def parts(schema: str) -> list[list[str]]:

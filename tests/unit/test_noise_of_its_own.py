@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from inertial.criticism.examination import ExaminedRun
-from inertial.criticism.loudness import loudness_of
-from inertial.criticism.noise_shares import Shares
+from inertial.estimation.loudness import loudness_of
+from inertial.estimation.noise_shares import Shares
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 

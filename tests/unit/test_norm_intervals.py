@@ -5,10 +5,10 @@ import pytest
 
 from benchmarks.made_recordings import Recording, make
 from benchmarks.recording_intervals import pulls
-from inertial.criticism.noise_shares import Shares
-from inertial.criticism.shares import plausible_shares
+from inertial.estimation.noise_shares import Shares
+from inertial.estimation.shares import plausible_shares
 from inertial.norm_noise import SolvedNorms
-from pipelines.stages.norm_fit import bias_uncertainty, norms_fitted
+from pipelines.stages.unknown_poses.fit import bias_uncertainty, norms_fitted
 
 PLAIN = ("bias", "scale", "misalignment")
 

@@ -9,11 +9,11 @@ from benchmarks.made_recordings import NOISES, Recording, make
 from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.norm_fit import fit_norms
 from inertial.probability import passes
-from pipelines.cli.diagnosis_text import _parameters_of
-from pipelines.cli.verdict_text import verdict
+from pipelines.cli.text.diagnosis_text import _parameters_of
+from pipelines.cli.text.verdict_text import verdict
 from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.stages.norm_fit import norms_fitted
+from pipelines.stages.unknown_poses.fit import norms_fitted
 from pipelines.tables.dwells import measured
 from pipelines.tables.leave_out import leave_out, named_dwells
 from schemas.errors import DataRejected, WrongUse

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from pipelines.flows.local import _private_file, local_server
-from pipelines.flows.server import private_folder
-from pipelines.flows.settings import CLIENT_KEY, KEY_FILE, SERVER_KEY, new_key, settings, use_key
+from pipelines.orchestrator.server import private_folder
+from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, SERVER_KEY, new_key, settings, use_key
 from schemas.errors import ArchiveUnusable, WrongUse
 
 

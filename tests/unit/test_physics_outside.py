@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from inertial import effects
-from inertial.criticism.comparison import estimate
 from inertial.criticism.curves import fit_curve
 from inertial.criticism.drivers import across, curve, forces_along, transfer
 from inertial.criticism.examination import ExaminedRun
-from inertial.criticism.term import Term
 from inertial.criticism.wide_suspects import wide_suspects
+from inertial.estimation.comparison import estimate
+from inertial.estimation.term import Term
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from inertial import effects as catalogue
-from inertial.criticism.handling import named
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Problem
-from inertial.criticism.refinement import better_placed, terms_of
-from inertial.criticism.term import Term
+from inertial.data_errors.handling import named
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.refinement import better_placed, terms_of
+from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))

@@ -8,15 +8,16 @@ import pytest
 
 from inertial import effects as catalogue
 from inertial import operators
-from inertial.criticism import adequacy, covariance, model, noise_draws, problem, products, share_statistics, space
+from inertial.criticism import adequacy, noise_draws
 from inertial.criticism.drivers import drivers_of
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.wrong_pose import WrongPose
-from inertial.criticism.lot import Lot
-from inertial.criticism.model import Model
 from inertial.criticism.noise_draws import NoiseDraws
-from inertial.criticism.problem import Problem
-from inertial.criticism.term import Term
+from inertial.data_errors.handling.wrong_pose import WrongPose
+from inertial.estimation import covariance, model, problem, products, share_statistics, space
+from inertial.estimation.lot import Lot
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))

@@ -7,7 +7,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipelines.flows.policy import CHOICES, Policy, policy_of, policy_of_tags
+from pipelines.orchestrator.policy import CHOICES, Policy, policy_of, policy_of_tags
 from schemas.errors import WrongUse
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"

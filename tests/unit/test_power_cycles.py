@@ -10,10 +10,10 @@ from inquiries import job_of
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import diagnose
-from inertial.criticism.menus import TableReach, courses
-from inertial.criticism.problem import Lot
-from inertial.criticism.proposals import Proposal
+from inertial.estimation.problem import Lot
 from inertial.frames import force_from_angles
+from inertial.next_measurement.menus import TableReach, courses
+from inertial.next_measurement.proposals import Proposal
 from inertial.planning.drivers import drivers_of
 from inertial.planning.reasons import begins_again
 from inertial.planning.sequences import SequenceStep, StationPace, extended

@@ -15,8 +15,8 @@ from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Request
 from pipelines.jobs.terms import planned_terms, without_noise
 from pipelines.planning.preset_noise import noise_of
-from pipelines.stages.reachable import reachable
 from pipelines.stages.reduce import FollowedSupply, at_nominal_supply
+from pipelines.stages.uncertainty.reachable import reachable
 from schemas.decisions import decide
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.station import load_station

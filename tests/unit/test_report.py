@@ -12,7 +12,7 @@ from pipelines.archive import Run
 from pipelines.drawing import svg_text
 from pipelines.report import make_report, render
 from pipelines.report.numbers import significant, with_uncertainty
-from pipelines.report.run_charts import lot_chart
+from pipelines.report.run_pictures import lot_chart
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import pytest
 from inertial import effects as catalogue
 from inertial import poses
 from inertial.criticism.field import Candidates
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Lot, Problem
 from inertial.criticism.search import judge, ranked
-from inertial.criticism.term import Term
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.term import Term
 from inertial.frames import force_from_angles
 from inertial.state import State
 

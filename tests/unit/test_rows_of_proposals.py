@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from inertial.criticism.proposals import Proposal
+from inertial.next_measurement.proposals import Proposal
 from inertial.planning.sequences import SequenceStep
 from pipelines.diagnosis.next_measurement import rows_of
 

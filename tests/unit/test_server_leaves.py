@@ -6,7 +6,7 @@ import fcntl
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from pipelines.flows import server
+from pipelines.orchestrator import server
 
 if TYPE_CHECKING:
     from pathlib import Path

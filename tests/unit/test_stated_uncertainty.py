@@ -18,8 +18,8 @@ from pipelines.jobs.recipe_text import recipe_text
 from pipelines.jobs.recipes import load_recipe, resolved
 from pipelines.jobs.terms import budget_terms, refuse_contradictions
 from pipelines.schedule.steps import steps
-from pipelines.stages.contributions import merged, sources
 from pipelines.stages.figures import UNITS
+from pipelines.stages.uncertainty.contributions import merged, sources
 from schemas.decisions import decide
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.limits import parse_limits

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from inertial import effects as catalogue
-from inertial.criticism.problem import Problem
-from inertial.criticism.refinement import terms_of
+from inertial.estimation.problem import Problem
+from inertial.estimation.refinement import terms_of
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inertial.criticism.handling.units_swapped import UnitsSwapped
+from inertial.data_errors.handling.units_swapped import UnitsSwapped
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from inertial.criticism import tails
-from inertial.criticism.bad_dwells import BadDwell
-from inertial.criticism.tails import with_tails
+from inertial.data_errors import tails
+from inertial.data_errors.bad_dwells import BadDwell
+from inertial.data_errors.tails import with_tails
 
 GATE = 5.4
 """Standard deviations from which a dwell of a small lot is left out."""

@@ -8,10 +8,10 @@ import pytest
 
 from inertial import effects as catalogue
 from inertial.criticism.examination import ExaminedRun
-from inertial.criticism.handling.gain_step import GainStep
-from inertial.criticism.model import Model
-from inertial.criticism.noise_shares import Shares
-from inertial.criticism.term import Term
+from inertial.data_errors.handling.gain_step import GainStep
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Shares
+from inertial.estimation.term import Term
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from inertial.counts import size_text
 from inertial.planning.ranges import UnseenRange
-from pipelines.certificate_document.file_check import Check, CheckedFile
+from pipelines.certificates.document.file_check import Check, CheckedFile
 from pipelines.cli import app, flowing
 from pipelines.cli.certificate_check import _needed  # pyright: ignore[reportPrivateUsage]
 from pipelines.cli.console import WordConsole

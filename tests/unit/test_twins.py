@@ -8,12 +8,12 @@ import pytest
 
 from inertial import effects
 from inertial.criticism.classes import EffectClass, Member
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Problem
-from inertial.criticism.proposals import proposal, rivals_in, twins
-from inertial.criticism.separation import predictions, residual_squares, separations, widened
-from inertial.criticism.term import Term
 from inertial.design import grid_of
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
+from inertial.next_measurement.proposals import proposal, rivals_in, twins
+from inertial.next_measurement.separation import predictions, residual_squares, separations, widened
 from inertial.planning.sequences import SequenceStep
 from pipelines.diagnosis.next_measurement import Proposed
 from pipelines.tables.dwells import lot_of, measured

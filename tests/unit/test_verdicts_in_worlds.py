@@ -9,13 +9,13 @@ import pytest
 
 from inertial import effects as catalogue
 from inertial.criticism.field import Candidates
-from inertial.criticism.handling.wrong_pose import WrongPose
-from inertial.criticism.likelihood import scatter_of_poses
-from inertial.criticism.model import Model
-from inertial.criticism.problem import Problem
-from inertial.criticism.refinement import terms_of
-from inertial.criticism.space import Gain
 from inertial.criticism.unseen import unseen
+from inertial.data_errors.handling.wrong_pose import WrongPose
+from inertial.estimation.likelihood import scatter_of_poses
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.refinement import terms_of
+from inertial.estimation.space import Gain
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.tables.dwells import lot_of, measured
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from root_process import ROOT
 
-from pipelines.flows.worker_health import Silence
+from pipelines.orchestrator.worker_health import Silence
 
 BEAT, LONGEST, STARTUP = 30.0, 120.0, 180.0
 
@@ -62,8 +62,8 @@ time.sleep(600.0)
 """
 ATTEND = """
 import itertools, os, sys
-from pipelines.flows.child_reaper import run_until_orphans_end
-from pipelines.flows.worker_health import watched
+from pipelines.orchestrator.child_reaper import run_until_orphans_end
+from pipelines.orchestrator.worker_health import watched
 beats, child = itertools.count(), []
 def ask():
     return "the last" if os.path.exists(sys.argv[-1] + ".begun") else str(next(beats))
@@ -84,7 +84,7 @@ def test_the_worker_is_ended_and_its_run_goes_on(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", "soon", "0"])
 def test_an_unusable_period_is_replaced(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
-    from pipelines.flows.worker_health import period_s
+    from pipelines.orchestrator.worker_health import period_s
 
     monkeypatch.setenv("PREFECT_WORKER_HEARTBEAT_SECONDS", text)
     assert period_s() >= 1.0

@@ -10,8 +10,8 @@ import pandas as pd
 from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
-from pipelines.stages.budget_rows import LABELS
 from pipelines.stages.figures import FIGURES
+from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.report.interactive import figure_of
-from pipelines.report.run_charts import lot_chart
+from pipelines.report.run_pictures import lot_chart
 from pipelines.report.templates import fill
 
 if TYPE_CHECKING:

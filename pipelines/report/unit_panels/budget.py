@@ -10,7 +10,7 @@ import numpy as np
 from inertial.uncertainty.rounding import rounded
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
-from pipelines.stages.budget_rows import LABELS
+from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
 
 if TYPE_CHECKING:

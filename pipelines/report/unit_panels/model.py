@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pipelines.report.interactive import figure_of
-from pipelines.report.run_charts import check_chart, model_chart
+from pipelines.report.run_pictures import check_chart, model_chart
 from pipelines.report.templates import fill
 
 if TYPE_CHECKING:

@@ -47,7 +47,7 @@ def planned(request: Mapping[str, Any]) -> dict[str, Any]:
     """``document``, ``charts`` and ``poses`` of a plan; ``before``: the effects of the recipe by name, where poses are moved."""
     from pipelines.planning.plan import plan, plan_context
     from pipelines.planning.preset_noise import noise_of
-    from pipelines.report.plan_charts import sphere_chart, temperature_chart
+    from pipelines.report.plan_pictures import sphere_chart, temperature_chart
 
     as_it_stands, recipe, config = recipe_of(request)
     noise = noise_of(recipe, recipe.device, None, None)

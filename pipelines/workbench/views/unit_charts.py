@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
 from pipelines.report.residuals import band
-from pipelines.report.run_charts import allan_plot
+from pipelines.report.run_pictures import allan_plot
 from schemas.units import AXES
 
 if TYPE_CHECKING:

@@ -1,0 +1,205 @@
+"""Single bad dwells, by the residuals after each is deleted.
+
+With P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ a dwell deleted from its series deviates by (Py)_i/P_ii, and (Py)_i²/P_ii over its variance is
+chi-square: no further fit is needed. Deletion identifies the dwell; robust weights would change all dwells and identify none.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.data_errors.bad_norms import bad_norms
+from inertial.decisions import BAD_DWELL, COMMON, MOST_BAD
+from inertial.distributions import chi2_upper, f_tail
+from inertial.estimation.alternative import poses
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.space import Space
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 8
+_ALIKE = 0.6
+"""Of the largest deviation: dwells with smaller deviations are tested again after the noise is estimated without the largest."""
+
+_AT_LEAST = 2
+"""Dwells that may be left out of a record, however short it is."""
+
+_SEVERAL = 3
+"""Units from which the median over the units tells a wrong pose from a bad dwell; with fewer the dwells of one pose do."""
+
+_EVERY_TIME = 0.7
+"""Share of the mean deviation of all dwells of a pose that each of them has along it if the pose is off every time.
+
+One bad dwell of three gives a third of its deviation to the mean, and less than a tenth, of the opposite sign, to each other
+one: it stays a bad dwell.
+"""
+
+_LEAST_DOF = 6
+"""Degrees of freedom of a unit below which none of its dwells can be identified as bad."""
+
+
+@dataclass(frozen=True)
+class BadDwell:
+    """A dwell of one unit: its deviation from its neighbours in time and the model.
+
+    off : (axes,), g; by_axis : (axes,), the same in standard deviations; tail : whether the noise of the run reaches as far
+    """
+
+    unit: int
+    dwell: int
+    off: Array
+    by_axis: Array
+    tail: bool = False
+
+    @property
+    def deviations(self) -> float:
+        """Length of the deviation, standard deviations."""
+        return float(np.linalg.norm(self.by_axis))
+
+
+def without(lot: Lot, bad: list[BadDwell]) -> Lot:
+    """The lot without some dwells of some units."""
+    error = lot.error.copy()
+    for one in bad:
+        error[one.unit, one.dwell] = np.inf
+    return replace(lot, error=error)
+
+
+def bad_dwells(model: Model) -> list[BadDwell]:
+    """The dwells that disagree with a model and its noise; the noise is estimated again without them."""
+    if model.problem.lot.radial:
+        return [
+            BadDwell(one.unit, dwell, np.array([off]), np.array([deviations]))
+            for one in bad_norms(model)
+            for dwell, off, deviations in zip(one.dwells, one.off, one.deviations, strict=True)
+        ]
+    bad: list[BadDwell] = []
+    lot = model.problem.lot
+    for _ in range(_ROUNDS):
+        more = _round(model, max(int(MOST_BAD * lot.state.time.size) + 1, _AT_LEAST) - len(bad))
+        if not more:
+            break
+        bad += more
+        problem = Problem(without(lot, bad), slope=model.problem.slope)
+        model = Model(problem, model.terms, near=model.noise)
+    return bad
+
+
+def _round(model: Model, most: int) -> list[BadDwell]:
+    """Dwells that stand out at one noise, the largest first, each deleted before the next."""
+    space = model.space
+    axes = 1 if model.problem.lot.radial else 3
+    looked = _Deletion(space, axes)
+    if not model.problem.lot.radial and looked.units < _SEVERAL:
+        looked.leave(looked.off_every_time(poses(model.problem.lot)))
+    bad: list[BadDwell] = []
+    while len(bad) < most:
+        best = looked.worst()
+        if best is None:
+            break
+        unit, dwell, by_axis = best
+        if bad and float(np.linalg.norm(by_axis)) < _ALIKE * bad[0].deviations:
+            break
+        bad.append(BadDwell(unit, dwell, looked.delete(unit, dwell), by_axis))
+    return bad
+
+
+class _Deletion:
+    """Deletion statistics of every dwell of every unit, dwells deleted one by one."""
+
+    def __init__(self, space: Space, axes: int) -> None:
+        self.space, self.axes = space, axes
+        blocks, n = space.residual.shape
+        self.there = space.covariance.there.copy()
+        self.units, self.n = blocks // axes, n
+        scaled = space.noise.scale[:, None]
+        # in units of the white variance of each block: its own variance is estimated again after each deletion
+        self.left, self.size = (each * scaled**2 for each in space.deleted)
+        self.squares, self.dof = space.squares.copy(), space.by_block.copy()
+        if np.isfinite(space.noise.prior):
+            # the prior's part of each block's variance
+            self.centre = np.maximum(space.noise.scale**2 * (self.dof + space.noise.prior) - self.squares, 0.0)
+        self.prior, self.looks = space.noise.prior, max(int(self.there.sum()) // axes, 1)
+        self.left_to_poses = np.zeros(self.n, dtype=bool)
+
+    def leave(self, dwells: NDArray[np.bool_]) -> None:
+        """Leave some dwells (n,) to the alternatives that concern a pose."""
+        self.left_to_poses = dwells
+
+    def off_every_time(self, pose: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Dwells (n,) of poses (n,) all of whose dwells, two at least, are off by about the same."""
+        known = self.there & (self.size > 1e-9 * self.size.max())
+        size = np.where(known, self.size, 1.0)
+        there = known.reshape(self.units, self.axes, self.n).all(axis=1)
+        off = np.where(known, self.left / size, 0.0).reshape(self.units, self.axes, self.n) * there[:, None]
+        squares = self._studentised(np.where(known, self.left**2 / size, 0.0)).sum(axis=1)
+        of_pose = (pose == np.arange(int(pose.max()) + 1)[:, None]).astype(np.float64)
+        count = of_pose @ there.sum(axis=0)
+        mean = of_pose @ off.sum(axis=0).T / np.maximum(count, 1.0)[:, None]
+        along = np.einsum("uan,na->un", off, mean[pose])
+        alike = (along > _EVERY_TIME * np.sum(mean[pose] ** 2, axis=1)) & (
+            squares > float(chi2_upper(COMMON, self.axes))
+        )
+        every = of_pose @ np.any(there & ~alike, axis=0) == 0.0
+        several = of_pose @ there.any(axis=0) > 1.0
+        return (every & several)[pose]
+
+    def worst(self) -> tuple[int, int, Array] | None:
+        """Unit and dwell that stand out most, with their deviations (axes,); None where none does by more than chance."""
+        known = self.there & (self.size > 1e-9 * self.size.max())
+        drop = np.where(known, self.left**2 / np.where(known, self.size, 1.0), 0.0)
+        squares = self._studentised(drop)
+        statistic = squares.sum(axis=1)
+        if self.units >= _SEVERAL:
+            together = np.median(statistic, axis=0) > float(chi2_upper(COMMON, self.axes))
+            statistic = np.where(together, 0.0, statistic)
+        statistic = np.where(self.left_to_poses, 0.0, statistic)
+        unit, dwell = np.unravel_index(int(np.argmax(statistic)), statistic.shape)
+        dof = float(self.dof.reshape(self.units, -1).min(axis=1)[unit])
+        freedom = self.axes * (dof - 1.0 + min(self.prior, 1e6)) if np.isfinite(self.prior) else float(self.dof.sum())
+        chance = float(f_tail(statistic[unit, dwell] / self.axes, self.axes, max(freedom, 1.0))) * self.looks
+        outlier = int(unit), int(dwell), np.sqrt(squares[unit, :, dwell])
+        return outlier if chance < BAD_DWELL and dof >= _LEAST_DOF else None
+
+    def _studentised(self, drop: Array) -> Array:
+        """Squares of each dwell over a variance without it, (units, axes, n)."""
+        if np.isfinite(self.prior):
+            squares, dof = self.squares[:, None], self.dof[:, None]
+            variance = np.maximum(squares - drop, 0.0) + self.centre[:, None]
+            variance = variance / np.maximum(dof - 1.0 + self.prior, 1.0)
+        else:
+            every = drop.reshape(self.units, self.axes, self.n).sum(axis=1)
+            total, count = float(self.squares.sum()), float(self.dof.sum())
+            variance = np.repeat((total - every) / max(count - self.axes, 1.0), self.axes, axis=0)
+        return (drop / np.maximum(variance, 1e-300)).reshape(self.units, self.axes, self.n)
+
+    def delete(self, unit: int, dwell: int) -> Array:
+        """Take one dwell out; its deviation, (axes,), g."""
+        blocks = range(unit * self.axes, (unit + 1) * self.axes)
+        off = np.array([self.left[b, dwell] / self.size[b, dwell] for b in blocks])
+        for place, b in enumerate(blocks):
+            self.squares[b] -= self.left[b, dwell] ** 2 / self.size[b, dwell]
+            self.dof[b] -= 1.0
+            column = self.space.projector_at(b, dwell) * self.space.noise.scale[b] ** 2
+            for other in np.flatnonzero(~self.there[b] & self.space.covariance.there[b]):
+                column = column - self._held(b, int(other), dwell)
+            self.left[b] -= column * off[place]
+            self.size[b] = np.maximum(self.size[b] - column**2 / max(float(column[dwell]), 1e-300), 0.0)
+            self.there[b, dwell] = False
+        return off
+
+    def _held(self, block: int, gone: int, dwell: int) -> Array:
+        """The change of a column of P by earlier deletions."""
+        first = self.space.projector_at(block, gone) * self.space.noise.scale[block] ** 2
+        return first * float(first[dwell] / max(first[gone], 1e-300))
+
+
+def deletion_residuals(model: Model) -> Array:
+    """Deviation of each dwell when it is deleted, axis by axis, in standard deviations, (m,); without those left out."""
+    space = model.space
+    looked = _Deletion(space, 1 if model.problem.lot.radial else 3)
+    known = looked.there & (looked.size > 1e-9 * looked.size.max())
+    scaled = looked.left / np.sqrt(np.where(known, looked.size, 1.0)) / space.noise.scale[:, None]
+    return scaled[known]

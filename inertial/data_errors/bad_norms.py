@@ -1,0 +1,170 @@
+"""Bad dwells where only the norm of gravity is known: one or two at a time, with the noise estimated again without them.
+
+Few dwells and many coefficients: two bad dwells hide each other, and either looks like wander. So pairs are deleted together, and
+every suspicion is judged with the noise of the other dwells: with P = V⁻¹ − V⁻¹H(HᵀV⁻¹H)⁻¹HᵀV⁻¹ the dwells B deviate by
+(P_BB)⁻¹(Py)_B, and (Py)_Bᵀ(P_BB)⁻¹(Py)_B over the variance is F with |B| and ν − |B| degrees of freedom.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from inertial.distributions import chi2_quantile
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
+from inertial.estimation.problem import Lot, Problem
+from inertial.probability import log_f_tail
+
+Array = NDArray[np.float64]
+
+FEWEST_DOF = 8
+"""Degrees of freedom below which no dwell can be identified as bad."""
+
+MOST = 0.1
+"""Largest share of a unit's dwells that is left out; two are always allowed."""
+
+BAD_NORM = 0.005
+"""Probability over all dwells of a recording below which a dwell is called bad."""
+
+SECOND = 0.05
+"""Probability over the dwells of a recording below which each dwell of a pair must be bad beside the other.
+
+At one half a sound dwell was named beside a single bad one of 5 to 8 standard deviations in a quarter of the recordings.
+"""
+
+RECORDED_DOF = 30
+"""Degrees of freedom that the noise of the samples counts for, where what the dwells leave agrees with it."""
+
+AGREES = 0.05
+"""Probability of the residuals' variance beyond which it does not."""
+
+_TRIED = 3  # suspicions of each size and noise for which the noise is estimated again
+_LONG = 220  # largest number of dwells for the test of pairs: they hide each other in short records only
+_HANGING = 1e-6  # of its weight: the part of a dwell beyond the model if it alone determines a coefficient
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """Bad dwells of one unit: deviation in g and in standard deviations, and the charged log probability."""
+
+    unit: int
+    dwells: tuple[int, ...]
+    off: tuple[float, ...]
+    deviations: tuple[float, ...]
+    log_p: float
+
+
+def bad_norms(model: Model) -> list[Suspicion]:
+    """The dwells that disagree with a model and its noise, the most certain first."""
+    suspicions: list[Suspicion] = []
+    while True:
+        tried = [_judged(model, unit, dwells) for unit, dwells in _suspicions(model)]
+        known = [one for one in tried if one is not None and one.log_p < np.log(BAD_NORM)]
+        count = sum(len(one.dwells) for one in suspicions)
+        known = [one for one in known if count + len(one.dwells) <= max(2, int(MOST * model.problem.n))]
+        if not known:
+            return suspicions
+        # of nested sets the smaller one, unless the larger is far more probable
+        best = min(known, key=lambda one: one.log_p + 4.0 * len(one.dwells))
+        suspicions.append(best)
+        model = _without(model, best.unit, best.dwells)
+
+
+def _without(model: Model, unit: int, dwells: Sequence[int]) -> Model:
+    """The model in the lot without some dwells of a unit."""
+    lot: Lot = model.problem.lot
+    error = lot.error.copy()
+    error[unit, list(dwells)] = np.inf
+    return Model(Problem(replace(lot, error=error), slope=model.problem.slope), model.terms, near=model.noise)
+
+
+def _suspicions(model: Model) -> list[tuple[int, tuple[int, ...]]]:
+    """Units with one or two dwells that stand out at the fitted noise or at white noise."""
+    if model.space.dof < FEWEST_DOF:
+        return []
+    chosen: dict[tuple[int, tuple[int, ...]], None] = {}
+    for noise in dict.fromkeys([model.noise.shares, model.problem.covariance.white_noise().shares]):
+        space = model.at(Noise(noise, model.noise.scale, model.noise.prior))
+        for unit in range(model.problem.lot.state.time.shape[0]):
+            p, py = _projector(model, Noise(noise, model.noise.scale, model.noise.prior), unit)
+            for size, drop, places in _drops(p, py):
+                left = np.maximum(space.rss - drop, 1e-300) / max(space.dof - size, 1)
+                log_p = log_f_tail(drop / size / left, size, max(space.dof - size, 1))
+                order = np.argsort(log_p)[:_TRIED]
+                for k in order.tolist():
+                    if log_p[k] + _looks(model, size) < 0.0:
+                        chosen[unit, places[k]] = None
+    return list(chosen)
+
+
+def _looks(model: Model, size: int) -> float:
+    """Logarithm of the number of sets of so many dwells of one unit, over all units."""
+    count = model.problem.covariance.count.astype(np.float64)
+    sets = gammaln(count + 1) - gammaln(size + 1.0) - gammaln(np.maximum(count - size, 0) + 1)
+    return float(np.logaddexp.reduce(sets))
+
+
+def _projector(model: Model, noise: Noise, unit: int) -> tuple[Array, Array]:
+    """P (n, n) of a unit's block at a noise, and P·y (n,)."""
+    space = model.at(noise)
+    eye = space.covariance.whiten(np.eye(model.problem.n)[None], noise.shares, np.array([unit])) / noise.scale[unit]
+    roots = space.project(eye, np.array([unit]))[0]
+    return roots.T @ roots, roots.T @ space.residual[unit]
+
+
+def _drops(p: Array, py: Array) -> list[tuple[int, Array, list[tuple[int, ...]]]]:
+    """Reduction of the sum of squares by deleting every single dwell, and every pair; with their places."""
+    own = np.diagonal(p)
+    sound = np.flatnonzero(own > _HANGING * max(float(own.max()), 1e-300))
+    singles = py[sound] ** 2 / own[sound]
+    drops: list[tuple[int, Array, list[tuple[int, ...]]]] = [(1, singles, [(int(k),) for k in sound])]
+    if not 2 <= sound.size <= _LONG:
+        return drops
+    i, j = (sound[k] for k in np.triu_indices(sound.size, 1))
+    area = own[i] * own[j] - p[i, j] ** 2
+    fair = area > 1e-3 * own[i] * own[j]
+    i, j, area = i[fair], j[fair], area[fair]
+    pairs = (own[j] * py[i] ** 2 - 2.0 * p[i, j] * py[i] * py[j] + own[i] * py[j] ** 2) / area
+    best = np.argsort(pairs)[::-1][: 4 * _TRIED]
+    return [*drops, (2, pairs[best], [(int(i[k]), int(j[k])) for k in best])]
+
+
+def _variance(rest: Model, unit: int) -> tuple[float, int]:
+    """Variance of the whitened residuals of the other dwells, and its degrees of freedom.
+
+    Fifteen degrees of freedom know a variance to a third. Where the white noise is recorded in the samples of each dwell, and
+    what the others leave agrees with it, the record counts as further degrees of freedom.
+    """
+    own, dof = max(rest.space.variance, 1e-300), rest.space.dof
+    if not rest.problem.lot.recorded:
+        return own, dof
+    scale = float(rest.noise.scale[unit]) ** 2
+    low, high = chi2_quantile([0.5 * AGREES, 1.0 - 0.5 * AGREES], dof) / dof
+    if not low < own * scale < high:
+        return own, dof
+    return (dof * own + RECORDED_DOF / scale) / (dof + RECORDED_DOF), dof + RECORDED_DOF
+
+
+def _judged(model: Model, unit: int, dwells: tuple[int, ...]) -> Suspicion | None:
+    """A suspicion at the noise of the other dwells; None if these do not determine the model."""
+    rest = _without(model, unit, dwells)
+    if rest.space.dof < FEWEST_DOF - len(dwells) or rest.space.local_rank < model.space.local_rank:
+        return None
+    noise = model.problem.covariance.rescaled(rest.noise, rest.problem.covariance)
+    p, py = _projector(model, noise, unit)
+    own = p[np.ix_(dwells, dwells)]
+    off = np.linalg.solve(own, py[list(dwells)])
+    size = len(dwells)
+    variance, dof = _variance(rest, unit)
+    statistic = float(py[list(dwells)] @ off) / variance
+    log_p = float(log_f_tail(statistic / size, size, dof)) + _looks(model, size)
+    error = np.sqrt(np.diagonal(np.linalg.inv(own)) * variance)
+    if size > 1:
+        # each must be bad by itself beside the other
+        each = log_f_tail((off / error) ** 2, 1, dof) + _looks(model, 1)
+        if not bool(np.all(each < np.log(SECOND))):
+            return None
+    return Suspicion(unit, dwells, tuple(off.tolist()), tuple(np.abs(off / error).tolist()), log_p)

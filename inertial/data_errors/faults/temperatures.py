@@ -1,0 +1,62 @@
+"""Faults of thermometers: a unit other than °C, and constant readings."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.readings import Array, Readings
+
+
+def temperature_units(readings: Readings) -> Iterator[Fault]:
+    """Temperatures that cannot be °C."""
+    for unit, row in enumerate(readings.temperature if readings.temperature is not None else ()):
+        typical = float(np.nanmedian(row))
+        if typical > 200.0 or typical < -100.0:
+            yield Fault("wrong_units", unit, (), f"temperature about {typical:.0f}, not °C")
+
+
+def stale(readings: Readings) -> Iterator[Fault]:
+    """A thermometer that repeats itself to the last digit while the temperature moves, or while it had noise before."""
+    if readings.temperature is None:
+        return
+    for unit, row in enumerate(readings.temperature):
+        start, length = _longest_repeat(row)
+        if length < 6:
+            continue
+        moved = _moved_elsewhere(readings, unit, slice(start, start + length))
+        outside: Array = np.delete(row, np.arange(start, start + length)).astype(np.float64)
+        steps = np.diff(outside)
+        fine = np.abs(steps[steps != 0.0])
+        resolution = float(np.min(fine)) if fine.size else np.inf
+        if moved > max(1.0, 3.0 * min(resolution, 1e9)) or (length > 0.15 * row.size and _noisy_steps(steps)):
+            evidence = f"temperature stays at {row[start]:.3f} °C for {length} dwells"
+            yield Fault("stale_temperature", unit, places_of(np.arange(start, start + length)), evidence)
+
+
+def _noisy_steps(steps: Array) -> bool:
+    """Whether readings go up and down at random: steps of noise reverse two times in three, those of a drift rarely."""
+    if steps.size < 6 or np.mean(steps == 0.0) > 0.1:
+        return False
+    return bool(np.mean(np.sign(steps[1:]) != np.sign(steps[:-1])) > 0.45)
+
+
+def _moved_elsewhere(readings: Readings, unit: int, stretch: slice) -> float:
+    """Change of the chamber, or of the other units, in the meantime, K."""
+    moves = [0.0]
+    if readings.chamber is not None:
+        moves.append(float(np.ptp(readings.chamber[unit, stretch])))
+    if readings.temperature is not None and len(readings.temperature) > 2:
+        others = np.delete(readings.temperature, unit, axis=0)[:, stretch]
+        moves.append(float(np.nanmedian(np.ptp(others, axis=1))))
+    return max(moves)
+
+
+def _longest_repeat(row: Array) -> tuple[int, int]:
+    best, start = (0, 0), 0
+    for place in range(1, row.size + 1):
+        if place == row.size or row[place] != row[start]:
+            if place - start > best[1]:
+                best = (start, place - start)
+            start = place
+    return best

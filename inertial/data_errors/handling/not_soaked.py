@@ -1,0 +1,117 @@
+"""The devices were behind the temperature that was read: they had not soaked, and the reading is the chamber's."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from inertial import operators
+from inertial.estimation.alternative import Array, Handling, Misfit
+from inertial.state import History, State
+
+if TYPE_CHECKING:
+    from inertial.estimation.lot import Lot
+
+_FASTEST, _SLOWEST, _GRID = 30.0, 3000.0, 12  # s, s, values of the time constant
+_BETWEEN = 9  # values between two of the grid
+_SPREAD = 3.0  # factor within which each unit's own time constant is looked for
+_EXACT = 1e-3  # of the logarithm of a time constant
+_OF_ONE = 3.0  # factor within which the coefficient must be one: the output follows by the coefficients that it has
+
+
+class NotSoaked(Handling):
+    """Temperatures of the devices that relax to what was read with one time constant, for all units.
+
+    What was read is the air, or a plate: the output follows the device, T_d' = (T − T_d)/τ, by the coefficients that it has.
+    """
+
+    id: ClassVar[str] = "device_not_soaked"
+    symbol: ClassVar[str] = "τ"
+    equation: ClassVar[str] = "E(T_d) − E(T), T_d′ = (T − T_d)/τ, all units"
+    breaker: ClassVar[str] = "soaks until the outputs stand still, or the devices' own thermometers"
+    hides_behind: ClassVar[tuple[str, ...]] = ("thermal_lag",)
+    fewest_units: ClassVar[int] = 1
+    in_part: ClassVar[bool] = False
+
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """Time constants, where the temperature changes."""
+        state = lot.state
+        if state.temperature is None or float(np.ptp(state.temperature)) < 1.0:
+            return []
+        return [{"tau": float(tau)} for tau in np.geomspace(_FASTEST, _SLOWEST, _GRID)]
+
+    def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """Time constants up to the neighbours in :meth:`places`."""
+        del lot
+        step = (_SLOWEST / _FASTEST) ** (1.0 / (_GRID - 1))
+        return [{**place, "tau": place["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
+
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """What being behind adds, by each unit's own coefficients: one where they are known exactly."""
+        units, n = lot.state.time.shape
+        if slope is None:
+            return np.zeros((units, n, 3, 1))
+        behind = _temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0)
+        return (slope * behind[..., None])[..., None]
+
+    def possible(self, size: Array) -> bool:
+        """Whether the output changes by about what its own coefficients make of the delay.
+
+        A delay in a fiftieth of them, or against them, is an effect with a lag of its own; with the temperatures delayed after
+        that the residuals would grow.
+        """
+        return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
+
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+        """The time constant."""
+        del size
+        behind = np.abs(_temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0))
+        alone = "unit" in place
+        behind = behind[int(place["unit"])] if alone else behind
+        return (
+            f"{'the unit follows' if alone else 'the devices follow'} the temperature that was read with a time constant of "
+            f"{place['tau']:.0f} s, up to {float(behind.max()):.1f} K behind it; soak longer, or measure the device's temperature"
+        )
+
+    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
+        """With the temperatures of the devices in place of the readings, each unit's time constant found by its own dwells."""
+        from scipy.optimize import minimize_scalar  # noqa: PLC0415  # a quarter of a second, and few lots need it
+
+        del size
+        each = np.zeros(lot.state.time.shape[0])
+        middle, reach = float(np.log(place["tau"])), float(np.log(_SPREAD))
+        for unit in [int(place["unit"])] if "unit" in place else range(each.size):
+            own = lot.units([unit])
+
+            def left(log_tau: float, own: "Lot" = own, unit: int = unit) -> float:
+                return misfit(replace(own, state=delayed(own.state, np.array([np.exp(log_tau)]))), (unit,))
+
+            bounds = (middle - reach, middle + reach)
+            minimum = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": _EXACT})
+            each[unit] = float(np.exp(minimum.x))
+        return replace(lot, state=delayed(lot.state, each))
+
+
+def delayed(state: State, tau: Array) -> State:
+    """A state whose temperatures are a first-order lag behind those that were read, by time constants (units,), s; 0: as read."""
+    if state.temperature is None:
+        return state
+    history = state.history
+    if history is None:
+        return replace(state, temperature=_lag(state.time, state.temperature, tau), memory={})
+    whole = np.broadcast_to(history.temperature, (len(tau), history.time.size))
+    late = _lag(np.broadcast_to(history.time, whole.shape), whole, tau)
+    each = [np.interp(t, history.time, h) for t, h in zip(state.time, late, strict=True)]
+    return replace(state, temperature=np.stack(each), history=History(history.time, late), memory={})
+
+
+def _lag(time: Array, temperature: Array, tau: Array) -> Array:
+    each = zip(time, temperature, tau.tolist(), strict=True)
+    return np.stack([operators.first_order_lag(t, v, s) if s > 0.0 else v for t, v, s in each])
+
+
+def _temperature(state: State, tau: float) -> Array:
+    """Temperatures of the devices at the dwells, (units, n), °C; as read for a time constant of zero."""
+    return state.temperature_operator(
+        ("device_not_soaked", tau), lambda time, value: operators.first_order_lag(time, value, tau) if tau else value
+    )

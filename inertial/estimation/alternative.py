@@ -1,0 +1,227 @@
+"""Handling errors that look like effects: a unit that moved, a wrong pose, a thermometer with an offset in one soak.
+
+Such alternatives have one to three coefficients, and take part in the same search as the effects, which have one for every unit
+and
+axis. They are of scope "data": no model is extended by them.
+"""
+
+from abc import abstractmethod
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.effects.base import Effect
+from inertial.state import State
+
+if TYPE_CHECKING:
+    from inertial.estimation.lot import Lot
+
+Array = NDArray[np.float64]
+
+
+class Misfit(Protocol):
+    """How badly the model fits a lot of some units, by their numbers in the whole lot."""
+
+    def __call__(self, lot: "Lot", units: tuple[int, ...], *, own_noise: bool = False) -> float:
+        """The whitened sum of squares, or with the noise of that lot the deviance."""
+        ...
+
+
+_PLACES = 40
+EDGE = 3  # dwells at both ends after which, or before which, no change can be detected
+_SOAK_APART = 3.0  # K
+
+
+class Handling(Effect):
+    """A handling error.
+
+    Attributes
+    ----------
+    fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
+    of_one_axis : whether it concerns the bias of one axis of one unit, at an ``axis``
+    in_part : whether some units of a large lot stand for it: it is the same for all, and mended without a look at each
+    """
+
+    scope: ClassVar[Literal["sensor", "station", "slot", "data"]] = "data"  # pyright: ignore[reportIncompatibleVariableOverride]
+    source: ClassVar[str] = "benchmarks/worlds"
+    typical_ug: ClassVar[tuple[float, float]] = (0.0, float("inf"))
+    simplicity: ClassVar[int] = 0
+    fewest_units: ClassVar[int] = 2
+    in_part: ClassVar[bool] = True
+    of_one_axis: ClassVar[bool] = False
+
+    @abstractmethod
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """The places of the search: values of ``unit``, ``other``, ``dwell``, ``soak`` or ``pose``; units in order."""
+
+    def looks(self, lot: "Lot", places: int) -> int:
+        """Number of places that are paid for: those of the search, unless residuals have chosen them among more."""
+        del lot
+        return places
+
+    @abstractmethod
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Columns of the affected units, (units or 1, n, 3, k), g per unit of the coefficient."""
+
+    def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Columns (units or 1, n, 3, k) of the alternative in each unit at a place without its ``unit``; 1: the same in all."""
+        units = range(lot.state.time.shape[0])
+        return np.concatenate([self.change(lot, slope, unit=float(unit), **place) for unit in units])
+
+    @abstractmethod
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+        """The description for people; ``size`` (k,) are the coefficients."""
+
+    def possible(self, size: Array) -> bool:
+        """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""
+        del size
+        return True
+
+    def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """The place and those between it and its neighbours in :meth:`places`."""
+        if "dwell" not in place:
+            return [place]
+        n, step = lot.state.time.shape[1], stride(lot)
+        low, high = max(1, int(place["dwell"]) - step + 1), min(n - 1, int(place["dwell"]) + step - 1)
+        return [{**place, "dwell": float(k)} for k in range(low, high + 1)]
+
+    def placed(self, lot: "Lot", **place: float) -> dict[str, float]:
+        """The place once more in a lot with the dwells that were left out of the search."""
+        del lot
+        return place
+
+    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """The lot without it; None if only its term in the model removes it."""
+        del lot, size, place
+        return None
+
+    def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
+        """The same if it needs more than the coefficients: ``misfit`` is the misfit of the model on a lot of some units."""
+        del misfit
+        return self.mended(lot, size, **place)
+
+    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+        """Places of the affected dwells: the first after a change, or each one that is wrong."""
+        del lot
+        return [int(place["dwell"])] if "dwell" in place else []
+
+    def units(self, **place: float) -> tuple[int, ...]:
+        """The affected units; none where all are."""
+        return tuple(int(place[name]) for name in ("unit", "other") if name in place)
+
+    def columns(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """Columns of all blocks, (blocks, n, k); zero in unaffected units."""
+        change = self.change(lot, slope, **place)
+        units, n = lot.state.time.shape
+        whole = np.zeros((units, n, 3, change.shape[-1]))
+        if "unit" in place:
+            whole[int(place["unit"])] = change[0]
+        else:
+            whole[:] = change
+        return by_block(whole)
+
+
+class OfOneDwell(Handling):
+    """A handling error each of whose places is one dwell, ``at``: all of them are searched in one pass."""
+
+    @abstractmethod
+    def every_dwell(self, lot: "Lot") -> Array:
+        """Columns (units or 1, n, 3, k) for each dwell in turn."""
+
+
+class Exchangeable(Handling):
+    """A handling error that another place may explain equally well."""
+
+    @abstractmethod
+    def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
+        """Other places that may explain the same dwells equally well."""
+
+    @abstractmethod
+    def short(self, size: Array, **place: float) -> str:
+        """A short text for one of :meth:`instead`."""
+
+
+def by_block(change: Array) -> Array:
+    """(units, n, 3, k) as (3·units, n, k)."""
+    units, n, _, k = change.shape
+    return np.swapaxes(change, 1, 2).reshape(3 * units, n, k)
+
+
+def stride(lot: "Lot") -> int:
+    """Distance in dwells of the places of the first search for a change."""
+    return max(1, int(np.ceil(lot.state.time.shape[1] / _PLACES)))
+
+
+def times(lot: "Lot") -> list[int]:
+    """Dwells from which on a change is possible, without the ends."""
+    n = lot.state.time.shape[1]
+    return list(range(EDGE, n - EDGE + 1, stride(lot)))
+
+
+def after(lot: "Lot", dwell: float) -> Array:
+    """One from a dwell on, (n,)."""
+    return (np.arange(lot.state.time.shape[1]) >= dwell).astype(np.float64)
+
+
+def common(values: Array) -> Array:
+    """Values (units, ...) of all units; (1, ...) where they are the same for all."""
+    return values[:1] if bool(np.all(values == values[:1])) else values
+
+
+def common_force(lot: "Lot") -> Array:
+    """Forces (units, n, 3), g; (1, n, 3) where they are the same for all units."""
+    return lot.state.remember(
+        ("common_force",), lambda: common(np.broadcast_to(lot.state.force, (*lot.state.time.shape, 3)))
+    )
+
+
+def rotated_force(lot: "Lot") -> Array:
+    """What small rotations about x, y, z add to the forces, (units or 1, n, 3, 3), g per rad."""
+    return lot.state.remember(("rotated_force",), lambda: turns(common_force(lot)))
+
+
+def turns(force: Array) -> Array:
+    """What small rotations about x, y, z add to forces (..., n, 3), by axis and rotation: (..., n, 3, 3), g per rad."""
+    return np.stack([np.cross(e, force) for e in np.eye(3)], axis=-1)
+
+
+def tilts(state: State) -> Array:
+    """What small errors of the outer and inner angle add to the forces, (units or 1, n, 3, 2), g per rad."""
+    outer, inner = state.outer, state.inner
+    if outer is None or inner is None:
+        return np.zeros((*state.force.shape, 0))
+    outer, inner = common(outer), common(inner)
+    by_outer = np.stack([np.cos(outer) * np.sin(inner), np.cos(outer) * np.cos(inner), -np.sin(outer)], axis=-1)
+    by_inner = np.stack([np.sin(outer) * np.cos(inner), -np.sin(outer) * np.sin(inner), np.zeros_like(outer)], axis=-1)
+    return np.stack([by_outer, by_inner], axis=-1)
+
+
+def poses(lot: "Lot") -> NDArray[np.intp]:
+    """Number of the pose of each dwell, (n,)."""
+    force = lot.state.force.reshape(-1, *lot.state.force.shape[-2:])[0]
+    return np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def soaks(state: State) -> NDArray[np.intp]:
+    """Number of the soak of each dwell, (n,); all zero at constant temperature."""
+    return state.remember(("soaks",), lambda: _soaks(state).astype(np.float64)).astype(np.intp)
+
+
+def _soaks(state: State) -> NDArray[np.intp]:
+    if state.temperature is None:
+        return np.zeros(state.time.shape[-1], dtype=np.intp)
+    typical = np.median(state.temperature.reshape(-1, state.temperature.shape[-1]), axis=0)
+    soak = np.zeros(typical.size, dtype=np.intp)
+    for k in range(1, typical.size):
+        inside = typical[:k][soak[:k] == soak[k - 1]]
+        soak[k] = soak[k - 1] + int(abs(typical[k] - float(np.median(inside))) > _SOAK_APART)
+    return soak
+
+
+def without(lot: "Lot", dwells: list[int]) -> "Lot":
+    """The lot without some dwells of all units."""
+    error = lot.error.copy()
+    error[:, dwells] = np.inf
+    return replace(lot, error=error)

@@ -1,0 +1,137 @@
+"""Coefficients of a model by generalised least squares, and their residuals on their own run and on a fresh run."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Coefficients of a model's terms in the blocks of a problem, from data whitened for white noise and wander.
+
+    local : (blocks, p), shared : (q,), g per unit of the column; standard errors likewise. The coefficients of the unknown state
+    before the first dwell follow those of the terms; a run of the same plan is assumed to start in the same state.
+    """
+
+    terms: tuple[Term, ...]
+    local: Array
+    shared: Array
+    local_error: Array
+    shared_error: Array
+
+
+def estimate(model: Model) -> Estimate:
+    """Coefficients at the model's own noise."""
+    space = model.space
+    x, z = space.local, space.whiten(model.shared)
+    y = space.whiten(model.problem.y[..., None])[..., 0]
+    size = np.sqrt(np.einsum("bnp,bnp->bp", x, x))
+    size = np.where(size > 0.0, size, 1.0)
+    unit = x / size[:, None, :]
+    inverse: Array = np.linalg.pinv(np.swapaxes(unit, -1, -2) @ unit, rcond=CONDITION, hermitian=True).astype(
+        np.float64
+    )
+    shared, shared_error = np.zeros(0), np.zeros(0)
+    variance = space.variance
+    if z.shape[-1]:
+        free = _free(unit, inverse, z)
+        target = _free(unit, inverse, y[..., None])[..., 0]
+        flat = free.reshape(-1, z.shape[-1])
+        shared = np.linalg.lstsq(flat, target.reshape(-1), rcond=1e-9)[0].astype(np.float64)
+        # nearly collinear columns can give diagonals slightly below zero by rounding
+        inverted = np.diag(np.linalg.pinv(flat.T @ flat, rcond=1e-12))
+        shared_error = np.sqrt(variance * np.maximum(inverted, 0.0))
+        y = y - z @ shared
+    right = np.einsum("bnp,bn->bp", unit, y)
+    scaled = np.einsum("bpr,br->bp", inverse, right)
+    scaled = _pooled(model, unit, right, scaled, variance * inverse, size)
+    errors = np.sqrt(variance * np.diagonal(inverse, axis1=-2, axis2=-1)) / size
+    return Estimate(model.terms, scaled / size, shared, errors, shared_error)
+
+
+CONDITION = 1e-8
+"""Directions of the scaled normal matrix below this are scatter of the angles, not effects: they get no coefficient."""
+
+OWN = ("bias", "scale", "misalignment", "turn_on_bias")
+"""Ratio of the scatter between units to the errors above which coefficients are not combined."""
+
+_FEW_UNITS = 4
+
+_VANISHED = 1e-100
+"""Size of a whitened column below which its squares leave the range of numbers."""
+
+
+def _pooled(model: Model, unit: Array, right: Array, scaled: Array, covariance: Array, size: Array) -> Array:
+    """Coefficients shrunk towards the lot's mean, as far as their scatter over the units is smaller than their errors.
+
+    Empirical Bayes with the moments of the lot (Efron & Morris, J. Am. Stat. Assoc. 70 (1975) 311): a coefficient that the run
+    determines poorly, and that units of one type have in common, is predicted better from all of them.
+    """
+    problem = model.problem
+    units = problem.lot.state.time.shape[0]
+    if units < _FEW_UNITS or problem.lot.radial:
+        return scaled
+    # a column that has died away (a warm-up of seconds, hours later) has no coefficient to shrink
+    seen = size > _VANISHED
+    free = _shrinkable(model, scaled.shape[-1]) & seen
+    size = np.where(seen, size, 1.0)
+    value = np.where(seen, scaled / size, 0.0)
+    error2 = np.diagonal(covariance, axis1=-2, axis2=-1) / size**2
+    by_axis = value.reshape(units, 3, -1)
+    mean = by_axis.mean(axis=0)
+    scatter = ((by_axis - mean) ** 2).sum(axis=(0, 1)) / (3.0 * (units - 1))
+    between = np.maximum(scatter - error2.mean(axis=0), 1e-3 * error2.mean(axis=0))
+    variance = model.space.variance
+    there = free & (between > 0.0)
+    precision = np.where(there, variance / (np.where(there, between, 1.0) * size**2), 0.0)
+    gram = np.swapaxes(unit, -1, -2) @ unit + np.einsum("bp,pr->bpr", precision, np.eye(size.shape[-1]))
+    centre = np.tile(mean, (units, 1)) * size
+    drawn = np.linalg.pinv(gram, rcond=CONDITION, hermitian=True) @ (right + precision * centre)[..., None]
+    return drawn[..., 0].astype(np.float64)
+
+
+def _shrinkable(model: Model, count: int) -> NDArray[np.bool_]:
+    """The local coefficients that are shrunk: those of the effects beyond bias, scale and misalignment."""
+    flags: list[bool] = []
+    for term in model.terms:
+        if not term.shared:
+            columns = model.problem.columns(term.effect, term.keywords).shape[-1]
+            flags += [term.effect.id not in OWN] * (columns if term.first is None else min(term.first, columns))
+    return np.array([*flags, *[False] * (count - len(flags))], dtype=bool)
+
+
+def _free(unit: Array, inverse: Array, columns: Array) -> Array:
+    """Columns without the part that the local ones explain."""
+    return columns - unit @ (inverse @ (np.swapaxes(unit, -1, -2) @ columns))
+
+
+def residuals_of(problem: Problem, fit: Estimate) -> Array:
+    """Residuals (blocks, n) in g of a problem under given coefficients; NaN where a dwell is missing."""
+    local = [t for t in fit.terms if not t.shared]
+    shared = [t for t in fit.terms if t.shared]
+    left = problem.series.copy()
+    if local:
+        left -= np.einsum("bnp,bp->bn", _columns(problem, local), fit.local)
+    if shared:
+        left -= _columns(problem, shared) @ fit.shared
+    return np.where(np.isfinite(problem.error), left, np.nan)
+
+
+def _columns(problem: Problem, terms: Sequence[Term]) -> Array:
+    own = [problem.columns(t.effect, t.keywords)[..., : t.first] for t in terms]
+    # as in the model: a memory that was at rest has no unknown state
+    started = [problem.start(t.effect, t.keywords) for t in terms if not t.rest]
+    return np.concatenate([*own, *started], axis=-1)
+
+
+def rms(values: Array) -> float:
+    """Root mean square of the values that are not missing."""
+    return float(np.sqrt(np.nanmean(values**2)))

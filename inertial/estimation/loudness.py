@@ -1,0 +1,136 @@
+"""Noise that is louder in one soak than in another: most noise of a sensor grows with its temperature.
+
+A lot's covariance has one scale for every unit and axis, the same over the whole run. Where the noise of a hot soak is twice
+that of a cold one, nothing that looks like a step between two soaks, or a curve over temperature, has the significance that it
+seems to have. The scale of each soak is estimated before any effect is searched, from what a generous model of each soak by
+itself leaves: own bias, response and products of force in every soak take up effects of temperature and nonlinearity, and a
+robust scatter does not see single bad dwells. What all units do together at a dwell is taken off: a wrong pose is no noise.
+"""
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.decisions import LOUDER_BELOW
+from inertial.distributions import f_tail
+from inertial.estimation.alternative import soaks
+from inertial.estimation.comparison import estimate
+from inertial.estimation.model import Model
+from inertial.estimation.noise import LONGEST
+
+Array = NDArray[np.float64]
+
+_LEFT = 0.25
+"""Share of the dwells of a soak that the model of a soak must leave as degrees of freedom."""
+
+_TOGETHER = 4
+"""Units from which on their median at a dwell is what they do together."""
+
+_DRIFTS = 16
+"""Dwells of a soak from which on a curved drift over it is taken off."""
+
+_FEWEST = 4
+"""Dwells of a soak from which on it has a scatter."""
+
+
+def loudness_of(model: Model, soak: NDArray[np.intp] | None = None) -> Array | None:
+    """Standard deviation of the noise of each dwell over the lot's, (n,), mean square one; None where soaks do not differ.
+
+    Parameters
+    ----------
+    soak : (n,), number of the soak of each dwell, where the temperatures of the model are not those that tell it
+    """
+    problem = model.problem
+    if problem.lot.radial or problem.n > LONGEST or problem.lot.state.temperature is None:
+        return None
+    soak = soaks(problem.lot.state) if soak is None else soak
+    members = [np.flatnonzero(soak == k) for k in range(int(soak.max()) + 1)]
+    members = [places for places in members if places.size >= _FEWEST]
+    if len(members) < 2:
+        return None
+    fitted = estimate(model)
+    series = problem.y - np.einsum("bnp,bp->bn", model.local, fitted.local)
+    if model.shared.shape[-1]:
+        series = series - model.shared @ fitted.shared
+    ratios = np.stack([_of_soak(model, series, places) for places in members], axis=1)
+    ratios = ratios[np.isfinite(ratios).all(axis=1)]
+    if len(ratios) < 2:
+        return None
+    each = ratios - ratios.mean(axis=1, keepdims=True)
+    by_soak = np.median(each, axis=0)
+    between = len(ratios) * float(np.sum(each.mean(axis=0) ** 2)) / (len(members) - 1)
+    dof = (len(ratios) - 1) * (len(members) - 1)
+    inside = float(np.sum((each - each.mean(axis=0)) ** 2)) / dof
+    if float(f_tail(between / max(inside, 1e-12), len(members) - 1, dof)) > LOUDER_BELOW:
+        return None
+    loud = np.ones(problem.n)
+    for places, value in zip(members, by_soak, strict=True):
+        loud[places] = np.exp(0.5 * value)
+    return loud / np.sqrt(np.mean(loud**2))
+
+
+def _of_soak(model: Model, series: Array, places: NDArray[np.intp]) -> Array:
+    """Logarithm (blocks,) of the robust variance of a soak's residuals over that of the model's noise; NaN if none."""
+    problem, covariance = model.problem, model.problem.covariance
+    there = covariance.there[:, places]
+    force = np.broadcast_to(problem.lot.state.force, (*problem.lot.state.time.shape, 3))[:, places]
+    time = problem.lot.state.time[:, places]
+    left = np.full((problem.blocks, places.size), np.nan)
+    expected = np.full(problem.blocks, np.nan)
+    before: tuple[Array, Array] | None = None
+    q: Array | None = None
+    for block in range(problem.blocks):
+        own = there[block]
+        if np.count_nonzero(own) < _FEWEST:
+            continue
+        here = force[block // 3][own], time[block // 3][own]
+        if before is None or not all(map(np.array_equal, here, before)):
+            # the axes of a unit, and units in the same poses at the same times, have the same columns
+            before, x = here, _columns(*here)
+            q = None if x is None else np.linalg.qr(x)[0]
+        if q is None:
+            continue
+        y = series[block, places[own]]
+        left[block, own] = y - q @ (q.T @ y)
+        v = covariance.of_dwells(block, model.noise, places[own])
+        expected[block] = (np.trace(v) - np.trace(q.T @ v @ q)) / np.count_nonzero(own)
+    units = problem.blocks // 3
+    if units >= _TOGETHER:
+        by_axis = left.reshape(units, 3, -1)
+        known = np.isfinite(by_axis).sum(axis=0) >= _TOGETHER
+        together = np.zeros(by_axis.shape[1:])
+        together[known] = np.nanmedian(by_axis[:, known], axis=0)
+        left = (by_axis - together).reshape(left.shape)
+    size = np.sort(np.where(np.isfinite(left), left, np.inf) ** 2, axis=1)
+    count = np.isfinite(left).sum(axis=1)
+    # the mean of the smaller three quarters: single bad dwells are not in it
+    kept = np.maximum((3 * count) // 4, 1)
+    inner = np.arange(size.shape[1]) < kept[:, None]
+    mean = np.where(inner, size, 0.0).sum(axis=1) / kept
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.log(mean / expected)
+    return np.where((count >= _FEWEST) & (expected > 0.0), ratio, np.nan)
+
+
+def _columns(force: Array, time: Array) -> Array | None:
+    """Columns (k, p) of a soak: a drift, and products of force up to the largest degree that leaves enough; None where none does.
+
+    A device that had not soaked drifts over the soak: that is no noise.
+    """
+    best = None
+    since = (time - time.min()) / max(float(np.ptp(time)), 1e-9)
+    drift = [since, since**2, since**3] if len(time) >= _DRIFTS else [since] if len(time) > 2 * _FEWEST else []
+    for degree in (1, 2, 3):
+        columns = [np.ones(len(force)), *drift]
+        for order in range(1, degree + 1):
+            columns += [
+                np.prod(force[:, list(which)], axis=1) for which in combinations_with_replacement(range(3), order)
+            ]
+        x = np.stack(columns, axis=1)
+        vectors, values, _ = np.linalg.svd(x, full_matrices=False)
+        rank = int(np.sum(values > 1e-6 * values[0]))
+        if len(force) - rank < max(2.0, _LEFT * len(force)):
+            break
+        best = vectors[:, :rank]
+    return best

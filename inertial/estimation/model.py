@@ -1,0 +1,376 @@
+"""A model under criticism: its columns in a problem, and the noise of its residuals."""
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.estimation import variance
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.covariance import LARGE
+from inertial.estimation.noise_shares import Noise, Shares
+from inertial.estimation.own_shares import own_shares
+from inertial.estimation.problem import KnownDeviances, Problem
+from inertial.estimation.share_statistics import ShareStatistics
+from inertial.estimation.shares import best_shares, plausible_shares
+from inertial.estimation.space import Space
+from inertial.estimation.term import Term
+
+Array = NDArray[np.float64]
+
+_LONG = 400
+"""Number of dwells above which shares are searched by half decades, because each whitener takes time and memory."""
+
+
+_SPACES = 2_000_000
+"""Largest number of whitened values stored for shares that were tried; of small lots at least two spaces are stored."""
+
+_RICHER = 2
+"""Number of models with one more term that a model keeps."""
+
+_SHARE_OF_WHITE = 0.5
+"""Part of the recorded white variance that the noise of norms has at the least."""
+
+
+_TURNS = 3
+"""Rounds in which blocks with shares of their own and the shares of the others are found in turn."""
+
+_OWN = 20
+"""Degrees of freedom of a block from which on its own variance is used for the shares; blocks with fewer have a common one."""
+
+
+class Model:
+    """Terms in a problem.
+
+    Parameters
+    ----------
+    near : noise at which the search for this model's noise starts
+    curves, shared_curves : (blocks, n, d), columns of a driver that is not an effect, sized by block or for all blocks
+    simpler : the model without the last term or without the curves, whose products serve this one, too; None where there is none
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        terms: Sequence[Term],
+        *,
+        near: Noise | None = None,
+        curves: Array | None = None,
+        shared_curves: Array | None = None,
+        simpler: "Model | None" = None,
+    ) -> None:
+        self.problem, self.terms, self._near = problem, tuple(terms), near
+        self._curves, self._shared_curves = curves, shared_curves
+        self._simpler, self._noises = simpler, dict[tuple[object, ...], Noise]()
+        self._added = None if simpler is None or len(simpler.terms) == len(self.terms) else self.terms[-1]
+        self._spaces: dict[Shares, Space] = {}
+        self._last: Space | None = None
+        self._richer: dict[tuple[object, ...], Model] = {}
+
+    @cached_property
+    def local(self) -> Array:
+        """Columns with coefficients by block, (blocks, n, p)."""
+        columns = [self._of(t) for t in self.terms if not t.shared]
+        columns += [self._start(t) for t in self.terms if not t.shared]
+        if self._curves is not None:
+            columns.append(self._curves)
+        if not columns:
+            return np.zeros((self.problem.blocks, self.problem.n, 0))
+        return np.concatenate(columns, axis=-1)
+
+    @cached_property
+    def shared(self) -> Array:
+        """Columns with coefficients of all blocks, (blocks, n, q)."""
+        columns = [self._of(t) for t in self.terms if t.shared]
+        if self._shared_curves is not None:
+            columns.append(self._shared_curves)
+        if not columns:
+            return np.zeros((self.problem.blocks, self.problem.n, 0))
+        columns += [self._start(t) for t in self.terms if t.shared]
+        return np.concatenate(columns, axis=-1)
+
+    def _of(self, term: Term) -> Array:
+        columns = self.problem.columns(term.effect, term.keywords)
+        return columns if term.first is None else columns[..., : term.first]
+
+    def _start(self, term: Term) -> Array:
+        """Columns of the unknown state of a term's memory before the first dwell; none where it was at rest."""
+        if term.rest:
+            return np.zeros((self.problem.blocks, self.problem.n, 0))
+        return self.problem.start(term.effect, term.keywords)
+
+    def at(self, noise: Noise) -> Space:
+        """The residuals of the model, whitened for a noise; those for its own noise and for the last other one are kept."""
+        if noise is self.__dict__.get("noise"):
+            return self.space
+        if self._last is None or self._last.noise is not noise:
+            self._last = self._space(noise)
+        return self._last
+
+    def _space(self, noise: Noise) -> Space:
+        return Space(self.problem.covariance, noise, self.problem.y, self.local, self.shared)
+
+    @cached_property
+    def noise(self) -> Noise:
+        """Shares of wander by restricted likelihood, pooled over the blocks, and variances of the blocks."""
+        # a model with one more term is made again, where it is too large to be kept: its noise is not
+        noises = {} if self._simpler is None else self._simpler._noises  # noqa: SLF001  # of its own kind
+        known = None if self._added is None else noises.get(self._added.key)
+        if known is None:
+            known = self.noise_at(self._best_shares())
+            self._spaces.clear()
+            if self._added is not None:
+                noises[self._added.key] = known
+        return known
+
+    def _best_shares(self) -> Shares:
+        """Shares of the smallest restricted deviance; blocks whose wander is of another kind have their own."""
+        near = None if self._near is None else self._near.shares
+        finest = 4 if self.problem.n > _LONG else 2
+        best = best_shares(self._restricted, near, finest=finest)
+        for _ in range(_TURNS):
+            space = self._rough(best)
+            series = self.problem.y if not self.shared.shape[-1] else self.problem.y - self.shared @ space.shared_sizes
+            own = own_shares(self.problem, series, self.local, space, self._by_products(best))
+            if own == best.own:
+                break
+            # the others without them, from where they were
+            best = best_shares(self._restricted, best._replace(own=own), finest=finest)
+        return best
+
+    def forget(self) -> None:
+        """Drop what is kept for models that follow: of a large lot it takes much memory."""
+        self._richer.clear()
+        self._spaces.clear()
+        self._last = None
+        for name in ("space", "statistics", "_even"):
+            self.__dict__.pop(name, None)
+
+    def plausible_shares(self) -> list[tuple[Shares, float]]:
+        """Shares that the residuals do not rule out, with weights that add up to one."""
+        return plausible_shares(self._restricted, self.noise.shares)
+
+    def noise_at(self, shares: Shares) -> Noise:
+        """The noise at given shares: each block's variance shrunk towards the others as far as they are similar."""
+        space = self._rough(shares)
+        squares, prior = variance.moderated(space.squares, space.by_block)
+        return Noise(shares, np.sqrt(np.maximum(squares, self._least)), prior)
+
+    @cached_property
+    def _least(self) -> Array:
+        """Variances (blocks,) over the recorded white ones below which those of a norm cannot be; zero where nothing is known.
+
+        White noise of the samples is a lower bound. Few dwells that fit well by chance otherwise pass for strong wander with less
+        white noise than their samples have. A record that scatters less than its samples say has a lower bound of its own.
+        """
+        lot = self.problem.lot
+        if not (lot.radial and lot.recorded):
+            return np.zeros(self.problem.blocks)
+        space = self._space(self.problem.covariance.white_noise())
+        scatter = space.squares / np.maximum(space.by_block, 1.0)
+        return _SHARE_OF_WHITE * np.minimum(scatter, 1.0)
+
+    def _rough(self, shares: Shares) -> Space:
+        """The space at shares, with the blocks weighted by their known variances."""
+        if shares not in self._spaces:
+            most = max(2 if self.problem.y.size <= LARGE else 1, _SPACES // max(self.local.size, 1))
+            while len(self._spaces) >= most:  # the oldest first: a search for shares seldom goes back
+                del self._spaces[next(iter(self._spaces))]
+            self._spaces[shares] = self._space(Noise(shares, self._weights))
+        return self._spaces[shares]
+
+    @cached_property
+    def _weights(self) -> Array:
+        """Standard deviations by which the blocks weigh while the shares are searched, (blocks,)."""
+        if self._near is None and self._joined:
+            return self._own_scale
+        return np.ones(self.problem.blocks) if self._near is None else self._near.scale
+
+    @cached_property
+    def _own_scale(self) -> Array:
+        """Standard deviations of the blocks under white noise: weights for columns that all share."""
+        space = self._space(self.problem.covariance.white_noise())
+        return np.sqrt(variance.moderated(space.squares, space.by_block)[0])
+
+    def _restricted(self, shares: Shares) -> float:
+        """−2 log restricted likelihood, each block with its own variance if it has enough degrees of freedom."""
+        known = self._known.of_lot.get(shares)
+        if known is None:
+            known, firm = self._deviance(shares)
+            if firm:
+                self._known.of_lot[shares] = known
+        return known
+
+    def _deviance(self, shares: Shares) -> tuple[float, bool]:
+        """The same, computed: by the products of the columns if these are precise, else in the whitened space.
+
+        And whether it is the same for all models of equal terms.
+        """
+        quick = self.statistics.beside_shared(shares, self._weights) if self._joined else self.statistics.at(shares)
+        if quick is None:
+            space = self._rough(shares)
+            return self._deviance_of(shares, space.information, space.squares, space.by_block), False
+        dof = self.problem.covariance.count - float(self.statistics.rank)
+        return self._deviance_of(shares, quick.information, quick.squares, dof), self._alike and quick.firm
+
+    def _deviance_of(self, shares: Shares, information: float, squares: Array, dof: Array) -> float:
+        logdet = float(np.sum(self.problem.covariance.logdet(shares)))
+        if self._least.any():
+            known = dof > 0
+            level = np.maximum(squares[known] / dof[known], np.maximum(self._least[known], 1e-300))
+            return logdet + information + float(np.sum(dof[known] * np.log(level) + squares[known] / level))
+        if float(np.median(dof)) < _OWN:
+            return logdet + information + variance.deviance(squares, dof)
+        known = dof > 0
+        own = dof[known] * np.log(np.maximum(squares[known], 1e-300) / dof[known])
+        return logdet + information + float(np.sum(own))
+
+    def _by_products(self, best: Shares) -> Callable[[int, Shares], float | None]:
+        """−2 log restricted likelihood of a block at shares, less the log-determinant; None if products are not precise enough.
+
+        What all blocks share has the coefficients that it has at the best shares.
+        """
+        beside = self.statistics.beside_shared(best, self._weights) if self._joined else None
+        if self._joined and beside is None:
+            return lambda _, __: None
+        sizes = None if beside is None else beside.sizes
+
+        def deviance(block: int, shares: Shares) -> float | None:
+            known = self._known.of_blocks.get((block, shares))
+            if known is None and (left := self.statistics.left_of_block(block, shares, sizes)) is not None:
+                dof = int(self.problem.covariance.count[block]) - self.statistics.rank
+                known = left.information + dof * float(np.log(max(float(left.squares[0]), 1e-300)))
+                if self._alike and left.firm:
+                    self._known.of_blocks[block, shares] = known
+            return known
+
+        return deviance
+
+    @property
+    def _joined(self) -> bool:
+        """Whether all blocks share some coefficients."""
+        return self.shared.shape[-1] > 0
+
+    @property
+    def _alike(self) -> bool:
+        """Whether the restricted likelihood depends on the terms alone: no weights, and no curve, are in it."""
+        return not self._joined and self._curves is None
+
+    @cached_property
+    def _known(self) -> KnownDeviances:
+        """The deviances that are known."""
+        return (
+            self.problem.deviances_of(frozenset(term.key for term in self.terms)) if self._alike else KnownDeviances()
+        )
+
+    @cached_property
+    def statistics(self) -> ShareStatistics:
+        """Products of the columns and of the measurements, at any shares."""
+        before, further = self._simpler, None
+        if self._added is not None:
+            further = self._added.with_start(self.problem)
+        elif before is not None and self._curves is not before._curves and self._curves is not None:  # noqa: SLF001  # of its own kind
+            further = Candidate(self._curves[:, :, None], shared=False)
+        elif before is not None and self._shared_curves is not None:
+            further = Candidate(before.statistics.independent(self._shared_curves)[:, :, None], shared=True)
+        return ShareStatistics(
+            self.problem,
+            self.local,
+            None if before is None or further is None else before.statistics,
+            further,
+            self.shared,
+        )
+
+    @cached_property
+    def space(self) -> Space:
+        """The residuals of the model, whitened for its own noise."""
+        return self._space(self.noise)
+
+    def floor(self) -> float:
+        """RMS of the noise of a dwell mean, g: white and wander about the record's own mean."""
+        # the constant part of the wander is part of the bias of the run, not an error between dwells
+        return self._noise_rms(self.problem.covariance.about_mean(self.noise.shares))
+
+    def scatter(self) -> float:
+        """RMS of the noise of a dwell mean against its neighbours, g: white, and the wander from dwell to dwell.
+
+        A random walk raises :meth:`floor` with the length of the record, this with the time between two dwells only.
+        """
+        return self._noise_rms(self.problem.covariance.side_by_side(self.noise.shares))
+
+    def _noise_rms(self, wander: Array) -> float:
+        """RMS, g, over all dwells of white noise and a wander of variance (blocks,) over it."""
+        covariance = self.problem.covariance
+        each = (self.noise.scale * covariance.level) ** 2 * (1.0 + wander)
+        return float(np.sqrt(np.sum(each * covariance.count) / max(int(covariance.count.sum()), 1)))
+
+    def shared_sizes(self, term: Term) -> Array:
+        """Coefficients (k,) of a term that all blocks share."""
+        at = 0
+        for other in (t for t in self.terms if t.shared):
+            count = self._of(other).shape[-1]
+            if other.key == term.key:  # a model that was kept has an equal term
+                return self.space.shared_sizes[at : at + count]
+            at += count
+        raise KeyError(f"{term.effect.id}: not a term of the model")
+
+    def explained(self, candidate: Candidate, floor: float) -> float:
+        """RMS, g, of the part of a candidate that the model cannot absorb, less that of noise of RMS ``floor``."""
+        covariance = self.problem.covariance
+        gain = self._even.gain(candidate)
+        if self.problem.y.size > LARGE:
+            del self._even
+        beyond = float(gain.drop[0]) * covariance.white - floor**2 * float(gain.rank[0])
+        return float(np.sqrt(max(beyond, 0.0) / self.problem.count))
+
+    @cached_property
+    def _even(self) -> Space:
+        """The space in which all blocks have equal weight: of the lot's white noise."""
+        covariance = self.problem.covariance
+        return self._space(Noise(Shares(), np.sqrt(covariance.white) / covariance.level))
+
+    def _variant(
+        self,
+        terms: Sequence[Term],
+        curves: Array | None = None,
+        shared_curves: Array | None = None,
+        simpler: "Model | None" = None,
+    ) -> "Model":
+        """Another model near this one; curves are kept unless others are given."""
+        return Model(
+            self.problem,
+            terms,
+            near=self.noise,
+            curves=self._curves if curves is None else curves,
+            shared_curves=self._shared_curves if shared_curves is None else shared_curves,
+            simpler=simpler,
+        )
+
+    def with_term(self, term: Term) -> "Model":
+        """The model with one more term; the last few are kept, as a term is fitted, judged and sized one after the other."""
+        key = term.key
+        richer = self._richer.get(key)
+        if richer is None:
+            richer = self._variant([*self.terms, term], simpler=self)
+            if self.problem.y.size <= LARGE:
+                while len(self._richer) >= _RICHER:
+                    del self._richer[next(iter(self._richer))]
+                self._richer[key] = richer
+        return richer
+
+    def with_curves(self, columns: Array) -> "Model":
+        """The model with the columns (blocks, n, d) of a driver, sized by block."""
+        return self._variant(self.terms, curves=columns, simpler=self if self._curves is None else None)
+
+    def with_shared_curves(self, columns: Array) -> "Model":
+        """The model with the columns (blocks, n, d) of a driver, whose coefficients all blocks share."""
+        return self._variant(self.terms, shared_curves=columns, simpler=self if self._shared_curves is None else None)
+
+    def without(self, effect_id: str) -> "Model":
+        """The model less one effect."""
+        return self._variant([t for t in self.terms if t.effect.id != effect_id])
+
+    def without_term(self, term: Term) -> "Model":
+        """The model less one term; a model that was kept holds an equal one."""
+        return self._variant([t for t in self.terms if t.key != term.key])

@@ -1,0 +1,353 @@
+"""A lot's dwells as series in g: one block per unit and axis, or one per unit where only the norm of gravity is known."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.effects import SensorEffect
+from inertial.effects.base import AnyEffect, excited, has_start
+from inertial.estimation.alternative import Handling, by_block
+from inertial.estimation.candidate import Candidate
+from inertial.estimation.covariance import Covariance
+from inertial.estimation.lot import Lot
+from inertial.estimation.noise_shares import Shares
+from inertial.estimation.shared_rows import finest_rows, shared_rows
+
+Array = NDArray[np.float64]
+
+SHARED = ("station", "data")
+"""Scopes of effects whose coefficients all blocks share."""
+
+_PIECE = 1_000_000
+"""Number of columns processed at a time."""
+
+_WIDE = 3_000_000
+"""The same of the columns of one effect at several values: each pass over them goes through the model's own columns once."""
+
+_FEW = 1000
+"""Values of a column of all blocks up to which it takes longer to find equal columns than to work on all."""
+
+_MOST = 40
+"""Values of a grid at a time, where blocks have equal columns."""
+
+_PART = 4
+"""Part of the room, one over this, that the columns of one effect may take."""
+
+_WIDEST = 3
+"""Usual largest number of columns of an effect per axis."""
+
+_CACHE = 5_000_000
+"""Number of columns stored between passes; more are computed again, to limit the memory for large lots."""
+
+
+Values = Mapping[str, float | tuple[float, ...]]
+"""Nonlinear parameters and constants by name: one value, or one per sensor axis."""
+
+
+def on_axis(values: Values, axis: int) -> dict[str, float]:
+    """The values that hold for one sensor axis."""
+    return {name: value[axis] if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def _by_axis(values: Values) -> list[dict[str, float]]:
+    """The values of each sensor axis; the same where no parameter has one for each."""
+    if any(isinstance(value, tuple) for value in values.values()):
+        return [on_axis(values, axis) for axis in range(3)]
+    return [on_axis(values, 0)] * 3
+
+
+def _of_axes(effect: SensorEffect, values: Values, made: Callable[[int, dict[str, float]], Array]) -> list[Array]:
+    """What is made for each sensor axis; the same three times where the effect depends on none, and its values neither."""
+    each = _by_axis(values)
+    if effect.same_on_axes and each[0] is each[2]:
+        return [made(0, each[0])] * 3
+    return [made(axis, own) for axis, own in enumerate(each)]
+
+
+@dataclass(frozen=True)
+class KnownDeviances:
+    """Restricted deviances that the models of equal terms have in common, by the shares of the noise.
+
+    of_lot : of all blocks; of_blocks : of single blocks, less the log-determinants
+    """
+
+    of_lot: dict[Shares, float] = field(default_factory=dict[Shares, float])
+    of_blocks: dict[tuple[int, Shares], float] = field(default_factory=dict[tuple[int, Shares], float])
+
+
+class Problem:
+    """Series and columns of a lot by block.
+
+    Parameters
+    ----------
+    slope : (units, n, 3), g/K, known response of the outputs to temperature: the factor of an error of the thermometer
+    """
+
+    def __init__(self, lot: Lot, *, slope: Array | None = None) -> None:
+        self.lot, self.slope = lot, slope
+        units, n = lot.state.time.shape
+        self.blocks = units if lot.radial else 3 * units
+        self.n = n
+        self.error = self._error()
+        self.y = self._series()
+        self._kept: dict[tuple[object, ...], Candidate] = {}
+        self._terms: dict[tuple[object, ...], Array] = {}
+        self._room = _CACHE
+        self._deviances: dict[frozenset[tuple[object, ...]], KnownDeviances] = {}
+
+    def deviances_of(self, terms: frozenset[tuple[object, ...]]) -> KnownDeviances:
+        """What is known of the models whose terms have these keys."""
+        return self._deviances.setdefault(terms, KnownDeviances())
+
+    @property
+    def series(self) -> Array:
+        """Measurements (blocks, n), g."""
+        return self.y
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """The covariances of the blocks, at any noise."""
+        time = self.lot.state.time if self.lot.radial else np.repeat(self.lot.state.time, 3, axis=0)
+        return Covariance(time, self.error, self._direction if self.lot.radial else None, self.lot.loudness)
+
+    def forget(self) -> None:
+        """Drop the columns and products that are kept: they are made again where they are needed."""
+        self._kept.clear()
+        self._terms.clear()
+        self._room = _CACHE
+        self.covariance.forget()
+        self.lot.state.memory.clear()
+
+    def _series(self) -> Array:
+        """Measurements (blocks, n), g: outputs, or the norm of the corrected output less 1 g."""
+        if self.lot.radial:
+            return np.einsum("unj,unj->un", self._direction, self.lot.output) - 1.0
+        return np.swapaxes(self.lot.output, -1, -2).reshape(self.blocks, self.n)
+
+    def _error(self) -> Array:
+        if self.lot.radial:
+            squares = np.where(np.isfinite(self.lot.error), self.lot.error, 0.0) ** 2
+            total = np.sqrt(np.einsum("unj,unj->un", self._direction**2, squares))
+            return np.where(np.isfinite(self.lot.error).all(axis=-1), total, np.inf)
+        return np.swapaxes(self.lot.error, -1, -2).reshape(self.blocks, self.n)
+
+    @cached_property
+    def _direction(self) -> Array:
+        return self.lot.state.force / np.linalg.norm(self.lot.state.force, axis=-1, keepdims=True)
+
+    @cached_property
+    def one(self) -> "Problem":
+        """The first unit."""
+        return Problem(self.lot.units([0]))
+
+    @property
+    def count(self) -> int:
+        """Number of measurements."""
+        return int(np.isfinite(self.error).sum())
+
+    def columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
+        """Columns of an effect by block, (blocks, n, p), g per unit of the coefficient; radial lots join the axes' columns."""
+        key = (effect.id, *values.items())
+        kept = self._terms.get(key)
+        if kept is None:
+            kept = self._columns(effect, values)
+            if kept.size < self._room:
+                self._room -= kept.size
+                self._terms[key] = kept
+        return kept
+
+    def _columns(self, effect: AnyEffect | Handling, values: Values) -> Array:
+        if isinstance(effect, Handling):
+            return effect.columns(self.lot, self.slope, **on_axis(values, 0))
+        if isinstance(effect, SensorEffect):
+            state = self.lot.state
+            return self._by_axis(
+                _of_axes(effect, values, lambda axis, own: excited(effect, effect.columns(state, axis, **own)))
+            )
+        return self.seen(effect.force_change(self.lot.state, **on_axis(values, 0)))
+
+    def start(self, effect: AnyEffect | Handling, values: Values) -> Array:
+        """Columns (blocks, n, k) of the unknown state of an effect's memory before the first dwell."""
+        if isinstance(effect, Handling) or not has_start(effect):
+            return np.zeros((self.blocks, self.n, 0))
+        if isinstance(effect, SensorEffect):
+            state = self.lot.state
+            columns = self._by_axis(
+                _of_axes(effect, values, lambda axis, own: effect.start_columns(state, axis, **own))
+            )
+        else:
+            columns = self.seen(effect.start_change(self.lot.state, **on_axis(values, 0)))
+        # a state that decays before the second dwell leaves a column of one dwell only: it is kept, and this dwell has no
+        # information
+        return columns
+
+    def _by_axis(self, axes: list[Array]) -> Array:
+        """Columns of three axes, each (units or 1, n, p), by block."""
+        state = self.lot.state
+        shape = state.time.shape
+        if self.lot.radial:
+            axes = [a if a.shape[:-1] == shape else np.broadcast_to(a, (*shape, a.shape[-1])) for a in axes]
+            weighted = [a * self._direction[..., i, None] for i, a in enumerate(axes)]
+            return np.concatenate(weighted, axis=-1)
+        joined = np.empty((shape[0], 3, shape[1], axes[0].shape[-1]))
+        for axis, columns in enumerate(axes):
+            joined[:, axis] = columns
+        return joined.reshape(self.blocks, self.n, -1)
+
+    def seen(self, change: Array) -> Array:
+        """Changes of force (units or 1, n, 3, q) as measured with every unit's response, by block."""
+        state = self.lot.state
+        seen = np.einsum(
+            "uij,unjq->uinq", self.lot.response, np.broadcast_to(change, (*state.force.shape, change.shape[-1]))
+        )
+        seen = np.broadcast_to(seen, (state.time.shape[0], 3, self.n, seen.shape[-1]))
+        if self.lot.radial:
+            return np.einsum("uni,uinq->unq", self._direction, seen)
+        return seen.reshape(self.blocks, self.n, -1)
+
+    def candidate(
+        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, of: int = 1
+    ) -> Candidate:
+        """Columns of an effect over values of its nonlinear parameters.
+
+        Parameters
+        ----------
+        first : how many columns an axis; all if None
+        of : number of values of the whole grid, of which these are a part
+        """
+        key = (effect.id, len(grid), tuple(grid[0].items()), tuple(grid[-1].items()), first)
+        kept = self._kept.get(key)
+        if kept is None:
+            kept = self._made(effect, grid, first, key)
+            # columns of many values, which differ from block to block, are made again: they would take the room of all others
+            if kept.columns.size / len(grid) * max(of, len(grid)) < self._room / (_PART if len(grid) < of else 1):
+                self._room -= kept.columns.size
+                self._kept[key] = kept
+        return kept
+
+    @property
+    def at_a_time(self) -> int:
+        """Values of an effect's parameters whose columns are worked on together: few of a large lot, to limit the memory."""
+        return max(1, _WIDE // (1 + self.blocks * self.n * _WIDEST))
+
+    def varied(
+        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None, start: bool = False
+    ) -> Candidate:
+        """The same for values that are tried once: nothing of them is kept.
+
+        Parameters
+        ----------
+        start : whether columns of the unknown state of a memory follow
+        """
+        return self._made(effect, grid, first, None, start=start)
+
+    def _made(
+        self,
+        effect: AnyEffect | Handling,
+        grid: Sequence[Values],
+        first: int | None,
+        key: object,
+        *,
+        start: bool = False,
+    ) -> Candidate:
+        """Columns over values, those of one value after another: rows that blocks share are stored once."""
+        shared = effect.scope in SHARED
+        every: list[Array] = []
+        rows_of: list[NDArray[np.intp] | None] = []
+        for values in grid:
+            known = self._terms.get((effect.id, *values.items()))
+            own = (self._columns(effect, values) if known is None else known)[..., :first]
+            if start:
+                own = np.concatenate([own, self.start(effect, values)], axis=-1)
+            rows = None if shared or self.blocks * self.n <= _FEW else self.rows_of(own)
+            every.append(own if rows is None else own[np.unique(rows, return_index=True)[1]])
+            rows_of.append(rows)
+        rows = finest_rows(rows_of, radial=self.lot.radial)
+        count = self.blocks if rows is None else int(rows.max()) + 1
+        columns = np.empty((count, len(grid), every[0].shape[-1], self.n))
+        for place, (own, of_own) in enumerate(zip(every, rows_of, strict=True)):
+            if len(own) < count and of_own is not None:
+                own = own[of_own if rows is None else of_own[np.unique(rows, return_index=True)[1]]]  # noqa: PLW2901
+            columns[:, place] = np.swapaxes(own, -1, -2)
+        return Candidate(columns.transpose(0, 3, 1, 2), shared, rows=rows, key=key)
+
+    def rows_of(self, columns: Array) -> NDArray[np.intp] | None:
+        """The row of each block where columns (blocks, ...) are equal: of all blocks, by axis, or in each unit; else None."""
+        return shared_rows(columns, radial=self.lot.radial)
+
+    def pieces(
+        self, effect: AnyEffect | Handling, grid: Sequence[Values], *, first: int | None = None
+    ) -> Iterator[Candidate]:
+        """The candidate of an effect in pieces of its grid, small enough to limit the memory for large lots."""
+        if isinstance(effect, Handling):
+            yield from self._places(effect, grid)
+            return
+        size, begin = self.at_a_time, 0
+        while begin < len(grid):
+            made = self.candidate(effect, grid[begin : begin + size], first=first, of=len(grid))
+            yield made
+            begin += size
+            if made.rows is not None:
+                size = max(1, min(_MOST, _PIECE // made.columns[:, :, 0].size))
+
+    def _places(self, effect: Handling, grid: Sequence[Values]) -> Iterator[Candidate]:
+        """The places of an alternative, those of units one unit after another, no more at a time than a piece has room for."""
+        if grid and ("unit" not in grid[0] or "other" in grid[0]):
+            alike = len(effect.change(self.lot, self.slope, **on_axis(grid[0], 0))) == 1
+            size = max(1, _PIECE // ((3 if alike else self.blocks) * self.n * _WIDEST))
+            for start in range(0, len(grid), size):
+                yield self._together(effect, grid[start : start + size])
+            return
+        by_unit = [list(places) for _, places in groupby(grid, key=lambda values: values["unit"])]
+        for places, alike in groupby(by_unit, key=_without_unit):
+            units = np.array([int(on_axis({"unit": own[0]["unit"]}, 0)["unit"]) for own in alike])
+            size = max(1, _PIECE // (3 * self.n * _WIDEST * len(places)))
+            yield from self._of_units(effect, units, [dict(place) for place in places], size)
+
+    def _of_units(
+        self, effect: Handling, units: NDArray[np.intp], places: Sequence[Values], size: int
+    ) -> Iterator[Candidate]:
+        """The places of an alternative of one unit, for some units; at most ``size`` units at a time if their columns differ."""
+        key = (effect.id, units.size, int(units[0]), len(places), *places[0].items(), *places[-1].items())
+        kept = self._kept.get(key)
+        if kept is None:
+            columns = np.stack([effect.of_each_unit(self.lot, self.slope, **on_axis(p, 0)) for p in places], axis=3)
+            few, n, _, g, k = columns.shape
+            kept = Candidate(np.swapaxes(columns, 1, 2).reshape(3 * few, n, g, k), shared=True, units=units, key=key)
+            if few == 1:
+                kept = replace(kept, rows=np.tile(np.arange(3), units.size))
+            if kept.columns.size < self._room:
+                self._room -= kept.columns.size
+                self._kept[key] = kept
+        if kept.rows is not None:
+            yield kept
+            return
+        for start in range(0, units.size, size):
+            some = units[start : start + size]
+            blocks = (3 * some[:, None] + np.arange(3)).reshape(-1)
+            yield replace(kept, columns=kept.columns[blocks], units=some, key=(*key, start, size))
+
+    def _together(self, effect: Handling, places: Sequence[Values]) -> Candidate:
+        """An alternative of the whole lot at some places."""
+        key = (effect.id, len(places), *places[0].items(), *places[-1].items())
+        kept = self._kept.get(key)
+        if kept is None:
+            changes = [effect.change(self.lot, self.slope, **on_axis(place, 0)) for place in places]
+            units = self.lot.state.time.shape[0]
+            rows = np.tile(np.arange(3), units) if all(len(f) == 1 for f in changes) else None
+            if rows is None:
+                changes = [np.broadcast_to(f, (units, *f.shape[1:])) for f in changes]
+            kept = Candidate(np.stack([by_block(f) for f in changes], axis=2), shared=True, rows=rows, key=key)
+            if kept.columns.size < self._room:
+                self._room -= kept.columns.size
+                self._kept[key] = kept
+        return kept
+
+
+def _without_unit(places: Sequence[Values]) -> tuple[tuple[tuple[str, float | tuple[float, ...]], ...], ...]:
+    """Places of one unit as a key, without the unit."""
+    return tuple(tuple((name, value) for name, value in place.items() if name != "unit") for place in places)

@@ -1,0 +1,190 @@
+"""The residual of a true effect under a wrong one whose nonlinear parameters are fitted again: the minimum over their values.
+
+Every value of the grid is tried, and values near the best, for each truth by itself; each sensor axis may have its own if that
+brings the reduction that the search requires (:data:`inertial.decisions.AXES_DIFFER`).
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.decisions import AXES_DIFFER
+from inertial.design import grid_of
+from inertial.effects.base import Nonlinear
+from inertial.estimation.alternative import Handling
+from inertial.estimation.bases import eigen
+from inertial.estimation.candidate import Candidate, times_rows
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
+from inertial.estimation.problem import Values
+from inertial.estimation.refinement import around, cell, on_scale
+from inertial.estimation.term import Term
+
+Array = NDArray[np.float64]
+
+Place = tuple[tuple[str, float | tuple[float, ...]], ...]
+
+_JITTER = 1e-8
+"""Part of a column, squared, below which a direction is rounding error, as in the fits."""
+
+_ROUNDS = 3
+_AXES = 3
+
+
+class LikelihoodProfile:
+    """Truths that a model does not have, and the part of them that a wrong effect cannot explain.
+
+    Parameters
+    ----------
+    rest : the model without the rivals
+    targets : (blocks, n, r), contribution of each truth to the series, g
+    noise : of the whitening
+    by_axis : least reduction, in whitened squares, for which each axis has its own values; infinite for never
+    """
+
+    def __init__(self, rest: Model, targets: Array, noise: Noise, by_axis: float = AXES_DIFFER) -> None:
+        self.problem, self.noise, self.by_axis = rest.problem, noise, by_axis
+        self.space = rest.at(noise)
+        self.targets = self.space.project(self.space.whiten(targets))
+        shared = self.space.targets[..., 1:]
+        size = np.sqrt(np.einsum("bnq,bnq->q", shared, shared))
+        self.shared = shared / np.where(size > 0.0, size, 1.0)
+        self._known: dict[Term, dict[Place, tuple[Array, Array | None]]] = {}
+
+    @cached_property
+    def whole(self) -> Array:
+        """Whitened sum of squares (r,) of each truth after the model without any rival."""
+        flat = self.targets.reshape(-1, self.targets.shape[-1])
+        return _after(self.shared.reshape(flat.shape[0], -1), flat)
+
+    def left(self, wrong: Term, *, fine: bool) -> Array:
+        """Whitened sum of squares (r,) of each truth after the model with a wrong effect.
+
+        Parameters
+        ----------
+        fine : whether values between those of the grid are tried, too
+        """
+        if isinstance(wrong.effect, Handling):
+            raise TypeError(f"{wrong.effect.id}: a handling error has no parameters to fit again")
+        state = self.problem.lot.state
+        grid: list[Values] = [dict(v) for v in grid_of(wrong.effect, state)]
+        parameters = [p for p in wrong.effect.parameters(state) if not p.choices]
+        if wrong.values:
+            grid += [{**grid[0], **wrong.keywords}]
+        total, axes = self._over(wrong, grid)
+        best = [grid[int(k)] for k in np.argmin(total, axis=0)]
+        least = total.min(axis=0)
+        own = None if axes is None else [[grid[int(k)] for k in np.argmin(a, axis=0)] for a in axes]
+        least_own = None if axes is None else axes.min(axis=1)
+        if fine and parameters:
+            best, least = self._finer(wrong, parameters, best, least, None)
+            if own is not None and least_own is not None:
+                for axis in range(_AXES):
+                    own[axis], least_own[axis] = self._finer(wrong, parameters, own[axis], least_own[axis], axis)
+        if least_own is None or not parameters:
+            return least
+        apart = least_own.sum(axis=0)
+        return np.where(least - apart > self.by_axis, apart, least)
+
+    def _finer(
+        self, wrong: Term, parameters: Sequence[Nonlinear], best: list[Values], least: Array, axis: int | None
+    ) -> tuple[list[Values], Array]:
+        """The best values of each truth moved between those of the grid, one parameter after the other."""
+        best, least = list(best), least.copy()
+        truths = range(len(best))
+        for parameter in parameters:
+            width = cell(parameter)
+            for _ in range(_ROUNDS):
+                tried = [
+                    {**best[r], parameter.name: float(v)}
+                    for r in truths
+                    for v in around(parameter, on_scale(parameter, _value(best[r], parameter, axis)), width)
+                ]
+                total, axes = self._over(wrong, tried)
+                squares = total if axis is None or axes is None else axes[axis]
+                count = len(tried) // len(best)
+                for r in truths:
+                    place = r * count + int(np.argmin(squares[r * count : (r + 1) * count, r]))
+                    if squares[place, r] < least[r]:
+                        best[r], least[r] = tried[place], squares[place, r]
+                width *= 0.4
+        return best, least
+
+    def _over(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
+        """Remaining sums of squares (g, r) at each set of values; by sensor axis (3, g, r) if blocks have own coefficients.
+
+        What is left at a set of values is kept: truths and axes are often best at the same values, and a round begins where the
+        one before it ended.
+        """
+        known = self._known.setdefault(wrong, {})
+        names = [tuple(values.items()) for values in grid]
+        new = [name for name in dict.fromkeys(names) if name not in known]
+        if new:
+            total, axes = self._at(wrong, [dict(name) for name in new])
+            known.update({name: (total[k], None if axes is None else axes[:, k]) for k, name in enumerate(new)})
+        by_axis = [own for name in names if (own := known[name][1]) is not None]
+        return np.stack([known[name][0] for name in names]), np.stack(by_axis, axis=1) if by_axis else None
+
+    def _at(self, wrong: Term, grid: Sequence[Values]) -> tuple[Array, Array | None]:
+        """The same, computed."""
+        candidate = self.problem.varied(wrong.effect, grid, first=wrong.first, start=True)
+        if not wrong.shared:
+            return self._local(candidate)
+        columns = candidate.of_blocks
+        blocks, n, g, p = columns.shape
+        white = self.space.whiten(columns.reshape(blocks, n, g * p))
+        size = np.sqrt(np.einsum("bnm,bnm->m", white, white)).reshape(g, p)
+        left = self.space.project(white).reshape(blocks, n, g, p) / np.where(size > 0.0, size, 1.0)
+        flat = self.targets.reshape(blocks * n, -1)
+        shared = self.shared.reshape(blocks * n, -1)
+        squares = [
+            _after(np.concatenate([shared, left[:, :, k].reshape(blocks * n, p)], axis=1), flat) for k in range(g)
+        ]
+        return np.array(squares), None
+
+    @cached_property
+    def _both(self) -> Array:
+        """The truths and the columns that all blocks share, (blocks, n, r + q)."""
+        return np.concatenate([self.targets, self.shared], axis=-1)
+
+    @cached_property
+    def _rows(self) -> Array:
+        return self.space.backed(self._both)
+
+    def _local(self, candidate: Candidate) -> tuple[Array, Array | None]:
+        """The same for columns with coefficients by block."""
+        both = self._both
+        r = self.targets.shape[-1]
+        found = self.space.products(candidate)
+        size = np.sqrt(np.where(found.squares > 0.0, found.squares, 1.0))
+        gram = found.left / (size[..., :, None] * size[..., None, :])
+        inside = times_rows(self._rows, candidate) / size[..., None]
+        values, vectors = eigen(gram)
+        scale = np.where(values > _JITTER, 1.0 / np.sqrt(np.where(values > _JITTER, values, 1.0)), 0.0)
+        along = np.einsum("bgps,bgpt->bgst", vectors, inside, optimize=True) * scale[..., None]
+        if not self.shared.shape[-1]:
+            own = np.einsum("bnt,bnt->bt", both, both)[:, None, :] - np.sum(along**2, axis=2)
+            own = np.maximum(own, 0.0)
+            radial = self.problem.lot.radial
+            axes = None if radial else np.stack([own[a::3].sum(axis=0) for a in range(_AXES)])
+            return own.sum(axis=0), axes
+        whole = np.einsum("bnt,bns->ts", both, both) - np.einsum("bgpt,bgps->gts", along, along, optimize=True)
+        inner = np.linalg.pinv(whole[:, r:, r:], rcond=_JITTER, hermitian=True)
+        taken = np.einsum("gtq,gqs,gts->gt", whole[:, :r, r:], inner, whole[:, :r, r:], optimize=True)
+        return np.maximum(np.einsum("gtt->gt", whole[:, :r, :r]) - taken, 0.0), None
+
+
+def _value(values: Values, parameter: Nonlinear, axis: int | None) -> float:
+    value = values[parameter.name]
+    if isinstance(value, tuple):
+        return float(np.mean(value)) if axis is None else value[axis]
+    return value
+
+
+def _after(columns: Array, targets: Array) -> Array:
+    """Sums of squares (r,) of targets (m, r) after columns (m, p)."""
+    if columns.shape[1]:
+        targets = targets - columns @ np.linalg.lstsq(columns, targets, rcond=1e-6)[0]
+    return np.sum(targets**2, axis=0)

@@ -1,0 +1,258 @@
+"""Nonlinear parameters of a term moved from the grid to the best fit."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial import decisions
+from inertial.design import grid_of
+from inertial.effects.base import AnyEffect, Nonlinear
+from inertial.estimation.alternative import Handling
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
+from inertial.estimation.problem import Problem, Values
+from inertial.estimation.space import Gain, Space
+from inertial.estimation.term import Term
+
+Array = NDArray[np.float64]
+
+
+_NEAR = 3
+"""Dwells on either side of a change of handling that are tried once more with all other terms in the model."""
+
+_CLEARLY = 1.0
+"""Chi-square by which another of them must be better."""
+
+
+def refine(model: Model, term: Term, noise: Noise, *, axes: bool = True) -> Term:
+    """A term with its continuous nonlinear parameters moved to the best fit near their grid values.
+
+    One value serves all units and axes, unless one per axis reduces the residual far more than noise can.
+    """
+    space = model.at(noise)
+    if isinstance(term.effect, Handling):
+        return _placed(space, model.problem, term)
+    parameters = term.effect.parameters(model.problem.lot.state)
+    for parameter in parameters:
+        if parameter.every:
+            term = _between_choices(space, model.problem, term, parameter)
+    continuous = [p for p in parameters if not p.choices]
+    for parameter in continuous:
+        term = _refine_one(space, model.problem, term, parameter)
+    if not axes or term.shared or model.problem.lot.radial:
+        return term
+    for parameter in continuous:
+        term = _per_axis(space, model.problem, term, parameter)
+    return term
+
+
+def _placed(space: Space, problem: Problem, term: Term) -> Term:
+    """An alternative at the best dwell near its own."""
+    if not isinstance(term.effect, Handling):
+        return term
+    near = term.effect.near(problem.lot, **{k: v for k, v in term.keywords.items() if isinstance(v, float)})
+    if len(near) < 2:
+        return term
+    pieces = list(problem.pieces(term.effect, near))
+    drop = np.concatenate([space.gain(replace(p, key=None)).drop for p in pieces])
+    return Term(term.effect, tuple(near[int(np.argmax(drop))].items()))
+
+
+def better_placed(model: Model, term: Term) -> Term | None:
+    """A change of handling in a model at a dwell near its own that is clearly better; None if there is none."""
+    dwell = term.keywords.get("dwell")
+    if not isinstance(term.effect, Handling) or not isinstance(dwell, float):
+        return None
+    rest = model.without_term(term)
+    space, n = rest.at(model.noise), model.problem.n
+    near = [dwell, *(dwell + k for k in range(-_NEAR, _NEAR + 1) if k and 1 <= dwell + k < n)]
+    terms = [Term(term.effect, tuple({**term.keywords, "dwell": k}.items())) for k in near]
+    drops = [float(space.gain(replace(t.candidate(rest.problem), key=None)).drop[0]) for t in terms]
+    best = int(np.argmax(drops))
+    return terms[best] if drops[best] > drops[0] + _CLEARLY else None
+
+
+def _between_choices(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
+    """The best of all values of a discrete parameter near its own: between the neighbouring choices of its grid."""
+    value = float(np.mean(term.keywords[parameter.name]))
+    values = parameter.between(value)
+    while values.size:
+        step = -(-values.size // _PLACES)
+        some = values[::step]
+        best = int(np.argmax(_varied(space, problem, term, parameter, some).drop))
+        value = float(some[best])
+        if step == 1:
+            break
+        middle = step * best
+        values = values[max(middle - step + 1, 0) : middle + step]
+    return _with_value(term, parameter, value)
+
+
+def _refine_one(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
+    """Three rounds of five values, each round narrower, about the value that all axes share."""
+    centre, width = on_scale(parameter, float(np.mean(term.keywords[parameter.name]))), cell(parameter)
+    for _ in range(3):
+        values = around(parameter, centre, width)
+        gain = _varied(space, problem, term, parameter, values)
+        centre, width = on_scale(parameter, float(values[int(np.argmax(gain.drop))])), 0.4 * width
+    return _with_value(term, parameter, float(_off_scale(parameter, centre)))
+
+
+def _per_axis(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> Term:
+    """The same for every axis by itself, if the axes differ by more than noise."""
+    common = float(_gain(space, problem, term, [term.keywords]).drop[0])
+    values = np.repeat(parameter.grid()[:, None], 3, axis=1)
+    width, best, taken = cell(parameter), values[0], np.zeros(3)
+    for _ in range(4):
+        # a value of its own for each axis: one pass over the columns serves the three
+        sets = [{**term.keywords, parameter.name: tuple(each)} for each in values.tolist()]
+        by_block = _gain(space, problem, term, sets).by_block
+        by_axis = by_block.reshape(-1, 3, len(values)).sum(axis=0)
+        place = np.argmax(by_axis, axis=1)
+        best, taken = values[place, range(3)], by_axis[range(3), place]
+        values = np.stack([around(parameter, on_scale(parameter, float(v)), width) for v in best], axis=1)
+        width *= 0.4
+    if float(taken.sum()) - common < decisions.AXES_DIFFER * space.variance:
+        return term
+    return _with_value(term, parameter, tuple(best.tolist()))
+
+
+def on_scale(parameter: Nonlinear, value: float) -> float:
+    """A value on the scale on which it is varied."""
+    return {"log": np.log, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
+
+
+def _off_scale(parameter: Nonlinear, value: float) -> float:
+    return {"log": np.exp, "inverse": lambda v: 1.0 / v, "linear": lambda v: v}[parameter.scale](value)
+
+
+def cell(parameter: Nonlinear) -> float:
+    """Width of a cell of the starting grid, on its scale."""
+    return abs(on_scale(parameter, parameter.high) - on_scale(parameter, parameter.low)) / max(
+        parameter.grid().size - 1, 1
+    )
+
+
+def around(parameter: Nonlinear, centre: float, width: float) -> Array:
+    """Five values about a centre on the parameter's scale, within its bounds."""
+    low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
+    points = np.clip(centre + width * np.array([-0.9, -0.45, 0.0, 0.45, 0.9]), low, high)
+    return np.array([_off_scale(parameter, float(p)) for p in points])
+
+
+def _varied(space: Space, problem: Problem, term: Term, parameter: Nonlinear, values: Array) -> Gain:
+    """The gain of a term at several values of one parameter."""
+    return _gain(space, problem, term, [{**term.keywords, parameter.name: float(v)} for v in values])
+
+
+def _gain(space: Space, problem: Problem, term: Term, sets: Sequence[Values]) -> Gain:
+    """The gain of a term at several sets of values, with the unknown state of its memory; of a large lot not many at a time."""
+    size, start = problem.at_a_time, term.memory and not term.rest
+    parts = [sets[first : first + size] for first in range(0, len(sets), size)]
+    made = (problem.varied(term.effect, part, first=term.first, start=start) for part in parts)
+    return Gain.joined([space.gain(one) for one in made])
+
+
+def _with_value(term: Term, parameter: Nonlinear, value: float | tuple[float, ...]) -> Term:
+    return replace(term, values=tuple({**term.keywords, parameter.name: value}.items()))
+
+
+def terms_of(effects: Sequence[AnyEffect], problem: Problem) -> list[Term]:
+    """Terms of a given model, nonlinear parameters estimated one after the other."""
+    terms = [Term(e, tuple(grid_of(e, problem.lot.state)[0].items())) for e in effects]
+    for place, effect in enumerate(effects):
+        grid = grid_of(effect, problem.lot.state)
+        if len(grid) < 2:
+            continue
+        rest = Model(problem, [t for i, t in enumerate(terms) if i != place])
+        gain = rest.space.gain(problem.candidate(effect, grid))
+        best = Term(effect, tuple(grid[int(np.argmax(gain.drop))].items()))
+        terms[place] = refine(rest, best, rest.noise)
+    return terms
+
+
+def replaced(model: Model) -> Model:
+    """A model with the discrete parameters of its effects at the best of their values beside all its other terms.
+
+    Where dwells were left out, all instants of a step between them are equally good; with the dwells back one is best.
+    """
+    terms = list(model.terms)
+    for place, term in enumerate(model.terms):
+        if isinstance(term.effect, Handling):
+            continue
+        found = [p for p in term.effect.parameters(model.problem.lot.state) if p.choices]
+        rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+        for parameter in found:
+            drop = _varied(rest.at(model.noise), model.problem, terms[place], parameter, parameter.grid()).drop
+            best = _with_value(terms[place], parameter, float(parameter.grid()[int(np.argmax(drop))]))
+            terms[place] = _between_choices(rest.at(model.noise), model.problem, best, parameter)
+    return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
+
+
+def settled(model: Model) -> Model:
+    """A model with the nonlinear parameters of its terms at the best fit beside all its other terms, at its own noise.
+
+    A search places each parameter near its grid and at the noise without its term, which is larger: where the residual depends
+    on it weakly, the value would differ between a search and a fit of the resulting model. Parameters with one value per axis
+    stay.
+    """
+    terms = list(model.terms)
+    for place, original in enumerate(model.terms):
+        term = original
+        for parameter in _continuous(model.problem, original):
+            rest = Model(model.problem, [t for k, t in enumerate(terms) if k != place], near=model.noise)
+            values, drop = _profile(rest.at(model.noise), model.problem, term, parameter)
+            term = _with_value(term, parameter, float(values[int(np.argmax(drop))]))
+        terms[place] = term
+    return Model(model.problem, terms, near=model.noise) if terms != list(model.terms) else model
+
+
+def intervals(model: Model) -> dict[str, dict[str, tuple[float, float]]]:
+    """For each effect the 68 % interval of every continuous nonlinear parameter that all axes share, by its profile.
+
+    Within it the sum of squares rises by less than one variance of the noise above its least value; an interval that ends at a
+    bound of the parameter is open there.
+    """
+    by_effect: dict[str, dict[str, tuple[float, float]]] = {}
+    for place, term in enumerate(model.terms):
+        for parameter in _continuous(model.problem, term):
+            rest = Model(model.problem, [t for k, t in enumerate(model.terms) if k != place], near=model.noise)
+            space = rest.at(model.noise)
+            values, drop = _profile(space, model.problem, term, parameter)
+            inside = values[drop >= drop.max() - space.variance]
+            own = by_effect.setdefault(term.effect.id, {})
+            own[parameter.name] = float(inside.min()), float(inside.max())
+    return by_effect
+
+
+_PLACES = 81
+"""Values over the range of a parameter at which its profile is computed; as many again around the best."""
+
+
+def _profile(space: Space, problem: Problem, term: Term, parameter: Nonlinear) -> tuple[Array, Array]:
+    """Values of a parameter over its range, closer together around the best and its own, and the reduction of χ² at each."""
+    low, high = sorted((on_scale(parameter, parameter.low), on_scale(parameter, parameter.high)))
+    coarse = np.append(
+        np.linspace(low, high, _PLACES), on_scale(parameter, float(np.mean(term.keywords[parameter.name])))
+    )
+
+    def drop(places: Array) -> Array:
+        values = np.array([_off_scale(parameter, float(v)) for v in places])
+        return _varied(space, problem, term, parameter, values).drop
+
+    first = drop(coarse)
+    centre, cell_ = coarse[int(np.argmax(first))], (high - low) / (_PLACES - 1)
+    fine = np.clip(np.linspace(centre - cell_, centre + cell_, _PLACES), low, high)
+    places = np.concatenate([coarse, fine])
+    values = np.array([_off_scale(parameter, float(v)) for v in places])
+    return values, np.concatenate([first, drop(fine)])
+
+
+def _continuous(problem: Problem, term: Term) -> list[Nonlinear]:
+    """The parameters of a term that are continuous and have one value for all axes."""
+    if isinstance(term.effect, Handling):
+        return []
+    parameters = [p for p in term.effect.parameters(problem.lot.state) if not p.choices]
+    return [p for p in parameters if isinstance(term.keywords.get(p.name), float)]

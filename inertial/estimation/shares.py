@@ -1,0 +1,134 @@
+"""The shares of 1/f and of random walk, searched on a lattice by restricted likelihood."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from inertial.decisions import LARGEST_SHARE, LEAST_SHARE, SHARE_STEP
+from inertial.estimation.noise_shares import Shares
+
+Place = tuple[int | None, int | None]
+
+_STRIDES = (4, 2, 1)
+"""Half decades, quarters, eighths."""
+
+_LEAST = 1e-3
+"""Smallest reduction of the deviance by a step."""
+
+_RULED_OUT = 12.0
+"""Deviance above the least from which shares are ruled out: a weight of 0.25 %."""
+
+_MOST_PLACES = 240
+
+
+def best_shares(deviance: Callable[[Shares], float], near: Shares | None = None, *, finest: int = 1) -> Shares:
+    """The shares of the smallest deviance, by descent from a start.
+
+    Parameters
+    ----------
+    near : start; 1/f of three times the white variance if None; blocks that have their own keep them
+    finest : smallest stride, in eighths of a decade
+    """
+    known: dict[Place, float] = {}
+    own = () if near is None else near.own
+
+    def at(place: Place) -> float:
+        if place not in known:
+            known[place] = deviance(shares_at(place, own))
+        return known[place]
+
+    here = (4, None) if near is None else place_of(near)
+    for stride in _STRIDES:
+        if stride < finest:
+            break
+        for _ in range(60):
+            best = next((p for p in _around(here, stride) if at(p) < at(here) - _LEAST), None)
+            if best is None:
+                break
+            here = best
+    return shares_at(here, own)
+
+
+def plausible_shares(deviance: Callable[[Shares], float], best: Shares) -> list[tuple[Shares, float]]:
+    """Shares by half decades about the best that a record does not rule out, with their weights, which add up to one.
+
+    The weights are the restricted likelihood: a flat density over the logarithms of the shares, where shares of zero count as one
+    half decade. Few dwells leave decades of shares open, and errors that are stated at the best alone are too small.
+    """
+    stride = _STRIDES[0]
+    middle = place_of(best)
+    known = {middle: deviance(shares_at(middle, best.own))}
+    open_, least = [middle], known[middle]
+    while open_:
+        first, second = open_.pop()
+        near = [(k, second) for k in _beside(first, stride, middle[0])]
+        near += [(first, k) for k in _beside(second, stride, middle[1])]
+        for place in near:
+            if place not in known and len(known) < _MOST_PLACES:
+                known[place] = deviance(shares_at(place, best.own))
+                if known[place] < least + _RULED_OUT:
+                    least = min(least, known[place])
+                    open_.append(place)
+    kept = {place: np.exp(-0.5 * (value - least)) for place, value in known.items() if value < least + _RULED_OUT}
+    total = sum(kept.values())
+    return [(shares_at(place, best.own), float(weight / total)) for place, weight in kept.items()]
+
+
+def _beside(k: int | None, stride: int, middle: int | None) -> list[int | None]:
+    """Half decades up and down on the lattice through the best; below the least share there is none."""
+    least = LEAST_SHARE if middle is None else middle - stride * ((middle - LEAST_SHARE) // stride)
+    if k is None:
+        return [least]
+    return [k - stride if k - stride >= LEAST_SHARE else None, *([k + stride] if k + stride <= LARGEST_SHARE else [])]
+
+
+def place_of(shares: Shares) -> Place:
+    """The place of the lattice nearest to shares."""
+    first, second = (
+        None if s <= 10.0 ** ((LEAST_SHARE - 4) / SHARE_STEP) else _inside(round(SHARE_STEP * np.log10(s)))
+        for s in (shares.flicker, shares.walk)
+    )
+    return first, second
+
+
+def shares_at(place: Place, own: tuple[tuple[int, float, float], ...] = ()) -> Shares:
+    """The shares of a place of the lattice, and of blocks that have their own."""
+    flicker, walk = (0.0 if k is None else 10.0 ** (k / SHARE_STEP) for k in place)
+    return Shares(flicker, walk, own)
+
+
+def _inside(k: int) -> int:
+    return min(max(k, LEAST_SHARE), LARGEST_SHARE)
+
+
+def _around(place: Place, stride: int) -> list[Place]:
+    """Neighbours: each share up or down, one for the other; at the first stride also none, or appearing."""
+    first, second = place
+    near: list[Place] = [*((first, k) for k in _moved(second, stride)), *((k, second) for k in _moved(first, stride))]
+    if first is not None and second is not None:
+        near += [
+            (_inside(first - stride), _inside(second + stride)),
+            (_inside(first + stride), _inside(second - stride)),
+        ]
+        near += [
+            (_inside(first - stride), _inside(second - stride)),
+            (_inside(first + stride), _inside(second + stride)),
+        ]
+    if stride == _STRIDES[0]:
+        near += [(first, None), (None, second)]
+        # a new share is visible only if it is as large as the other
+        if second is None:
+            near += [
+                (first, LEAST_SHARE + 8),
+                *([] if first is None else [(first, first), (_inside(first - 8), first)]),
+            ]
+        if first is None:
+            near += [
+                (LEAST_SHARE + 8, second),
+                *([] if second is None else [(second, second), (second, _inside(second - 8))]),
+            ]
+    return [p for p in dict.fromkeys(near) if p != place]
+
+
+def _moved(k: int | None, stride: int) -> list[int]:
+    return [] if k is None else [_inside(k + stride), _inside(k - stride)]

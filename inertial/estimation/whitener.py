@@ -1,0 +1,141 @@
+"""The lower triangle that makes the noise of one set of dwells white, by Cholesky factors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import get_blas_funcs, get_lapack_funcs
+
+from inertial.decisions import SHARE_STEP
+
+Array = NDArray[np.float64]
+
+_factor, _invert = get_lapack_funcs(("potrf", "trtri"), dtype=np.float64)
+_times, _solve = get_blas_funcs(("trmm", "trsm"), dtype=np.float64)
+
+_ROWS = 48
+"""Rows of a kernel that are scaled at a time: an array of all of them is memory that the system has to clear first."""
+
+EVEN = 1.5
+"""White standard errors of a block that differ by less than this factor are taken as equal."""
+
+
+@dataclass(frozen=True)
+class DwellProfile:
+    """Valid dwells, their times and white profile, common to the blocks of one whitener.
+
+    loudness : (n,), by which all noise of a dwell is larger than the lot's; one where it is not known
+    """
+
+    time: Array
+    there: NDArray[np.bool_]
+    profile: Array
+    direction: Array | None = None
+    loudness: Array | float = 1.0
+
+    @property
+    def white(self) -> Array:
+        """Standard deviation of the white noise of each dwell over the block's, (n,)."""
+        return self.profile * self.loudness
+
+    def louder(self, kernel: Array) -> Array:
+        """A covariance of wander (n, n), as loud as the dwells."""
+        if not isinstance(self.loudness, np.ndarray):
+            return kernel
+        return kernel * (self.loudness[:, None] * self.loudness)
+
+    def fits(self, time: Array, there: NDArray[np.bool_], profile: Array) -> bool:
+        """Whether a block with these dwells can have the same whitener."""
+        if self.direction is not None:
+            return False
+        alike = bool(np.array_equal(there, self.there)) and bool(np.all(np.abs(time - self.time) < 1.0))
+        ratio = np.where(there, profile / self.profile, 1.0)
+        return alike and float(ratio.max()) < EVEN and float(ratio.min()) > 1.0 / EVEN
+
+
+def grouped(
+    time: Array, error: Array, direction: Array | None, level: Array, white: float, loudness: Array | None = None
+) -> tuple[list[DwellProfile], list[tuple[int, int, NDArray[np.intp]]]]:
+    """Profiles of dwells that whiteners are made for, and groups of blocks that have a whitener in common.
+
+    A group is the place of its profile, the steps of the lattice by which its shares are larger than the lot's, and its blocks.
+
+    Parameters
+    ----------
+    time, error : (blocks, n); direction : (blocks, n, 3) or None; as of :class:`inertial.estimation.covariance.Covariance`
+    level : (blocks,), typical white standard error, g; white : the lot's white variance, g²
+    loudness : (n,), of the dwells of all blocks
+    """
+    louder = 1.0 if loudness is None else loudness
+    profiles: list[DwellProfile] = []
+    groups: dict[tuple[int, int], list[int]] = {}
+    for block, there in enumerate(np.isfinite(error)):
+        profile = np.where(there, np.where(there, error[block], 1.0) / level[block], 1.0)
+        own = profile[there]
+        if own.size and own.max() < EVEN * own.min():
+            profile = np.ones_like(profile)
+        place = next((i for i, one in enumerate(profiles) if one.fits(time[block], there, profile)), None)
+        if place is None:
+            place = len(profiles)
+            way = None if direction is None else direction[block]
+            profiles.append(DwellProfile(time[block], there, profile, way, louder))
+        # by quarters of a decade: levels within a factor of 1.3 share a whitener, the rest is in the block's own variance
+        steps = 2 * round(0.5 * SHARE_STEP * np.log10(white / level[block] ** 2))
+        groups.setdefault((place, steps), []).append(block)
+    return profiles, [(place, steps, np.array(blocks)) for (place, steps), blocks in groups.items()]
+
+
+def whitener_of(dwells: DwellProfile, index: list[int | None], wander: tuple[Array, Array]) -> tuple[Array, float]:
+    """Lower triangle (n, n) that makes a block's noise white, and the log-determinant of its covariance.
+
+    Parameters
+    ----------
+    index : steps of the lattice at which the shares of 1/f and of random walk stand; None for none
+    wander : covariances (n, n) of 1/f and of random walk of variance one
+    """
+    there, whole = dwells.there, bool(dwells.there.all())
+    covariance = np.zeros((there.size, there.size))
+    covariance.reshape(-1)[:: there.size + 1] = dwells.white**2
+    for i, each in zip(index, wander, strict=True):
+        if i is not None:
+            kernel, share = dwells.louder(each), 10.0 ** (i / SHARE_STEP)
+            for rows in (slice(first, first + _ROWS) for first in range(0, there.size, _ROWS)):
+                covariance[rows] += share * kernel[rows]
+    if not whole:
+        covariance = covariance[np.ix_(there, there)]
+    # of the transpose, which is in Fortran order: no copy
+    upper, failed = _factor(covariance.T, lower=0, clean=1, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError("the covariance of the noise is not positive definite")
+    logdet = 2.0 * float(np.sum(np.log(np.diagonal(upper))))
+    inverse = _invert(upper, lower=0, overwrite_c=1)[0].T
+    if whole:
+        return inverse, logdet
+    filled = np.zeros((there.size, there.size))
+    filled[np.ix_(there, there)] = inverse
+    return filled, logdet
+
+
+def applied(lower: Array, series: Array, *, overwrite: bool = False) -> Array:
+    """Series (blocks, m, n) times a lower triangle (n, n), by half of the products, as the matrix is triangular.
+
+    Parameters
+    ----------
+    overwrite : whether the result may take the place of the series
+    """
+    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
+    return _times(1.0, lower.T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite).T.reshape(series.shape)
+
+
+def solved(lower: Array, series: Array, *, overwrite: bool = False) -> Array:
+    """Series (blocks, m, n) that a lower triangle (n, n) makes the given ones; parameters as of :func:`applied`."""
+    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
+    return _solve(
+        1.0, np.ascontiguousarray(lower).T, flat.T, side=0, lower=0, trans_a=1, overwrite_b=overwrite
+    ).T.reshape(series.shape)
+
+
+def applied_back(lower: Array, series: Array) -> Array:
+    """Series (..., n) times the transpose of a lower triangle (n, n), by half of the products."""
+    flat = np.ascontiguousarray(series).reshape(-1, lower.shape[0])
+    return _times(1.0, lower.T, flat.T, side=0, lower=0).T.reshape(series.shape)

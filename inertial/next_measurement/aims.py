@@ -1,0 +1,297 @@
+"""Aims of a next measurement: to separate rival effects, or to show unseen effects."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.decisions import CLASS_WIDTH
+from inertial.estimation.heldout import Fitting
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import freedom, price
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.term import Term
+from inertial.estimation.turn_on import with_turn_on
+from inertial.next_measurement.separation import (
+    Apart,
+    Rivals,
+    apart,
+    predictions,
+    residual_squares,
+    separations,
+    widened,
+)
+from inertial.planning.sequences import SequenceStep, StationPace
+
+Array = NDArray[np.float64]
+
+UNLUCKY = 1.65
+"""Standard deviations of chance against which the measurement must still separate."""
+
+LEAST_WEIGHT = 0.02
+
+_SHOWN = 36.0
+"""Chi-square, a coefficient, at which an effect of typical size counts as seen: six standard errors."""
+
+
+class Objective(Protocol):
+    """The aim of measurements; ``least`` is the smallest share of the aim that a further sequence must add."""
+
+    least: float
+
+    @property
+    def lot(self) -> Lot:
+        """A few units of what was measured."""
+        ...
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The effects of the aim."""
+        ...
+
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
+        """Share, 0 … 1, of the aim that is reached after these steps; ``fine`` for the stated gain, not for the search."""
+        ...
+
+    def picks(
+        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
+    ) -> list[SequenceStep]:
+        """Steps of a grid, each the best after those before it."""
+        ...
+
+    def effect_of_steps(
+        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
+    ) -> "Promise":
+        """The gain of ``steps``, measured after ``already``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Promise:
+    """Expected result of steps.
+
+    before, after : chi-square between the pair, the smaller for either being true; of a coefficient for unseen effects
+    ids : the best rival and the nearest that is separated from it; or the effects that become visible
+    if_true : chi-square expected between the two, by which of them is true
+    remaining : rivals that are not separated from the best
+    """
+
+    before: float
+    after: float
+    ids: tuple[str, ...]
+    if_true: tuple[tuple[str, float], ...] = ()
+    remaining: tuple[str, ...] = ()
+
+
+class RivalDiscrimination:
+    """Separation of rivals: for each truth, by its probability, every other rival must leave enough chi-square."""
+
+    least = 0.03
+
+    def __init__(
+        self, rivals: Rivals, scores: Array, every: Rivals | None = None, never: NDArray[np.bool_] | None = None
+    ) -> None:
+        self.rivals, self.every = rivals, every or rivals
+        # (r, r): pairs that no measurement separates do not count
+        self.never = np.eye(len(scores), dtype=bool) if never is None else never | np.eye(len(scores), dtype=bool)
+        self.weight = np.maximum(np.exp(-0.5 * scores), LEAST_WEIGHT)
+        self.needed = _needed(rivals, apart(rivals, fine=False))
+        self._begun: dict[bool, Array] = {}
+
+    @property
+    def lot(self) -> Lot:
+        """A few units of what was measured."""
+        return self.rivals.lot
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The rivals."""
+        return self.rivals.terms
+
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
+        """Share of the required separations that is reached after these steps."""
+        gap, needed = self.expected(steps, pace, fine=fine)
+        open_pairs = self.weight[:, None] * ~self.never
+        return float(np.sum(open_pairs * np.clip(gap / needed, 0.0, 1.0)) / max(float(np.sum(open_pairs)), 1e-12))
+
+    def expected(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = True) -> tuple[Array, Array]:
+        """Chi-square (r, r) expected for the truth of a row against that of a column, and how much is needed.
+
+        For the present measurements the observed chi-square counts; new steps add their expected one.
+        """
+        rivals = self.every if fine else self.rivals
+        if fine not in self._begun:
+            self._begun[fine] = separations(rivals, fine=fine)
+        if not steps:
+            return rivals.observed, _needed(rivals, apart(rivals, fine=fine))
+        separation = apart(rivals, steps, pace, fine=fine)
+        return rivals.observed + np.maximum(separation.left - self._begun[fine], 0.0), _needed(rivals, separation)
+
+    def picks(
+        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
+    ) -> list[SequenceStep]:
+        """Steps at which the rivals differ most after those before are fitted."""
+        rivals = self.rivals
+        problem = widened(rivals, [*held, *grid], pace)
+        truths = predictions(rivals, problem)
+        rest = with_turn_on(problem.lot.state, rivals.rest)
+        fits = [Fitting(problem, [*rest, wrong]) for wrong in rivals.terms]
+        n = problem.n - len(grid)
+        error = _error(problem, rivals)[:, n:, None]
+
+        def separation(train: NDArray[np.bool_]) -> Array:
+            total = np.zeros(len(grid))
+            for column, fit in enumerate(fits):
+                left = fit.left(truths, train)[:, n:] / error
+                gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance  # (grid, truths)
+                gained[:, self.never[:, column]] = 0.0
+                total += np.minimum(gained / self.needed[:, column], 1.0) @ self.weight
+            return total
+
+        return _greedy(grid, n, count, separation)
+
+    def effect_of_steps(
+        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
+    ) -> Promise:
+        """The best rival and the nearest that is separated from it, for either being true."""
+        before, _ = self.expected(already, pace)
+        after, needed = self.expected([*already, *steps], pace)
+        names = self.rivals.ids
+        sure = np.minimum(after / needed, (after / needed).T)[0, 1:]
+        separable = [k for k in range(1, len(names)) if sure[k - 1] >= 1.0]
+        other = separable[0] if separable else 1 + int(np.argmax(sure))
+        both = (names[0], float(after[0, other])), (names[other], float(after[other, 0]))
+        return Promise(
+            before=float(max(before[0, other], 0.0)),
+            after=min(chi for _, chi in both),
+            ids=(names[0], names[other]),
+            if_true=both,
+            remaining=tuple(names[k] for k in range(1, len(names)) if k not in separable),
+        )
+
+
+class Sighting:
+    """Unseen effects made visible: each coefficient, at the effect's typical size, by six standard errors."""
+
+    least = 0.1
+
+    def __init__(self, rivals: Rivals, terms: Sequence[Term]) -> None:
+        self.rivals, self._terms = rivals, tuple(terms)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The unseen effects."""
+        return self._terms
+
+    @property
+    def lot(self) -> Lot:
+        """A few units of what was measured."""
+        return self.rivals.lot
+
+    def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
+        """Mean share over the effects of the required chi-square."""
+        del fine
+        return float(np.mean(np.minimum(self.shown(steps, pace) / _SHOWN, 1.0)))
+
+    def shown(self, steps: Sequence[SequenceStep], pace: StationPace) -> Array:
+        """Chi-square per coefficient of each effect at its typical size, (effects,)."""
+        rivals = self.rivals
+        problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
+        columns, sizes = _typical(problem, self.terms)
+        rest = with_turn_on(problem.lot.state, rivals.rest)
+        noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
+        left = residual_squares(Model(problem, rest), columns, noise)
+        per_column = left * rivals.weight / rivals.variance / problem.blocks
+        return np.array([float(np.mean(part)) for part in np.split(per_column, np.cumsum(sizes)[:-1])])
+
+    def picks(
+        self, held: Sequence[SequenceStep], grid: Sequence[SequenceStep], pace: StationPace, count: int
+    ) -> list[SequenceStep]:
+        """Steps at which the effects beyond the model are largest."""
+        rivals = self.rivals
+        problem = widened(rivals, [*held, *grid], pace)
+        columns, _ = _typical(problem, self.terms)
+        fit = Fitting(problem, with_turn_on(problem.lot.state, rivals.rest))
+        n = problem.n - len(grid)
+        error = _error(problem, rivals)[:, n:, None]
+
+        def shown(train: NDArray[np.bool_]) -> Array:
+            left = fit.left(columns, train)[:, n:] / error
+            gained = np.sum(left**2, axis=0) * rivals.weight / rivals.variance / problem.blocks
+            return np.sum(np.minimum(gained / _SHOWN, 1.0), axis=1)
+
+        return _greedy(grid, n, count, shown)
+
+    def effect_of_steps(
+        self, already: Sequence[SequenceStep], steps: Sequence[SequenceStep], pace: StationPace
+    ) -> Promise:
+        """Chi-square per coefficient of the least visible effect, before and after; and the visible effects."""
+        before, after = self.shown(already, pace), self.shown([*already, *steps], pace)
+        will = after >= max(1.0, 0.5 * min(_SHOWN, float(np.max(after))))
+        names = tuple(t.effect.id for t, there in zip(self.terms, will, strict=True) if there)
+        return Promise(float(before[will].min()), float(after[will].min()), names)
+
+
+def _typical(problem: Problem, terms: Sequence[Term]) -> tuple[Array, list[int]]:
+    """Columns of some effects at their typical size, (blocks, n, all), g, and how many each has.
+
+    The size is the geometric mean of the usual range, at the largest excursion of the column.
+    """
+    scaled: list[Array] = []
+    for term in terms:
+        columns = problem.columns(term.effect, term.keywords)[..., : term.first]
+        largest = np.max(np.abs(columns), axis=(0, 1))
+        low, high = term.effect.typical_ug
+        size = 1e-6 * float(np.sqrt(max(low, 1e-3) * high))
+        scaled.append(columns * np.where(largest > 0.0, size / np.where(largest > 0.0, largest, 1.0), 0.0))
+    return np.concatenate(scaled, axis=-1), [f.shape[-1] for f in scaled]
+
+
+def _greedy(grid: Sequence[SequenceStep], n: int, count: int, score: "Score") -> list[SequenceStep]:
+    """The steps of a grid that score best one after the other; ``n`` dwells are before them."""
+    train = np.arange(n + len(grid)) < n
+    chosen: list[SequenceStep] = []
+    for _ in range(min(count, len(grid))):
+        apart = score(train)
+        apart[train[n:]] = -1.0
+        place = int(np.argmax(apart))
+        train[n + place] = True
+        chosen.append(grid[place])
+    return chosen
+
+
+class Score(Protocol):
+    """The gain of each step of a grid after some dwells."""
+
+    def __call__(self, train: NDArray[np.bool_]) -> Array:
+        """One value per step."""
+        ...
+
+
+def _error(problem: Problem, rivals: Rivals) -> Array:
+    return np.where(np.isfinite(problem.error), problem.error * rivals.noise.scale[:, None], np.inf)
+
+
+def _needed(rivals: Rivals, separation: Apart) -> Array:
+    """Chi-square (r, r) between a truth (row) and a wrong rival (column) that removes the wrong one.
+
+    The observed difference
+    scatters by twice its own root; a simpler rival has the lower price.
+    """
+    counts = [_coefficients(rivals, t) for t in rivals.terms]
+    paid = np.array([price(d, k) for d, k in zip(separation.whole, counts, strict=True)])
+    wrong = np.array([[price(max(d - lost, 0.0), k) for k, lost in zip(counts, row, strict=True)]
+                      for d, row in zip(separation.whole, separation.left, strict=True)])  # fmt: skip
+    least = np.maximum(CLASS_WIDTH + paid[:, None] - wrong, CLASS_WIDTH)
+    return (UNLUCKY + np.sqrt(UNLUCKY**2 + least)) ** 2
+
+
+def _coefficients(rivals: Rivals, term: Term) -> float:
+    """Coefficients of a rival in the whole lot, the unknown state of its memory and nonlinear parameters among them."""
+    problem = Problem(rivals.lot)
+    columns = problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
+    columns += problem.start(term.effect, term.keywords).shape[-1]
+    blocks = 1.0 if term.shared else problem.blocks * rivals.weight
+    return blocks * columns + freedom(term)

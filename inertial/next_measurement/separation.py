@@ -1,0 +1,191 @@
+"""Separation of rivals by measurements: the chi-square that the wrong one leaves, before and after planned steps.
+
+Every rival is assumed as the truth once, with its fitted coefficients and nonlinear parameters; every other one, with the rest
+of the model, is fitted to what it predicts. The residual, whitened for white noise and wander, is the noncentrality of the
+test between the two (Atkinson & Fedorov, Biometrika 62 (1975) 57: T-optimal designs maximise the smallest of these).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.decisions import AXES_DIFFER
+from inertial.estimation.alternative import Handling
+from inertial.estimation.comparison import estimate
+from inertial.estimation.covariance import Covariance
+from inertial.estimation.model import Model
+from inertial.estimation.noise_shares import Noise
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.profile import LikelihoodProfile
+from inertial.estimation.shared_noise import shared_factor
+from inertial.estimation.space import Space
+from inertial.estimation.term import Term
+from inertial.estimation.turn_on import with_turn_on
+from inertial.planning.sequences import SequenceStep, StationPace, extended
+
+Array = NDArray[np.float64]
+
+FEW, MANY = 3, 16
+"""Units that stand for the lot, as all have the same steps: during the search, and for the expected result."""
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """Effects that measurements do not separate, with their fits.
+
+    lot : a few units of it; weight : units of the whole lot over these
+    rest : the terms of the model beside the rivals
+    predicted : per rival, its coefficients (blocks, p) or (p,) for a station's effect
+    noise : of the few units; variance : enlarged by noise that units share
+    covariance : the unit of the noise's shares
+    observed : (r, r), chi-square of the present measurements in favour of the rival of a row over that of a column
+    """
+
+    lot: Lot
+    weight: float
+    rest: tuple[Term, ...]
+    terms: tuple[Term, ...]
+    predicted: tuple[Array, ...]
+    noise: Noise
+    variance: float
+    covariance: Covariance
+    observed: Array
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Effect ids, the best first."""
+        return tuple(t.effect.id for t in self.terms)
+
+    @cached_property
+    def typical_error(self) -> Array:
+        """Median white standard error of the dwells of each unit and axis, (units, 1, 3), g; NaN where it has none."""
+        return np.nanmedian(np.where(np.isfinite(self.lot.error), self.lot.error, np.nan), axis=1, keepdims=True)
+
+
+def rivals_of(model: Model, terms: Sequence[Term], others: Sequence[Term], most: int = FEW) -> Rivals:
+    """Rivals with the coefficients that a fit beside the rest of the model gives each of them.
+
+    Parameters
+    ----------
+    model : with all identified effects, for the noise
+    terms : the rivals
+    others : the terms of the model beside them
+    most : units that stand for the lot
+    """
+    units = model.problem.lot.state.time.shape[0]
+    pick = np.unique(np.linspace(0, units - 1, min(units, most)).round().astype(int)).tolist()
+    blocks = pick if model.problem.lot.radial else [3 * u + a for u in pick for a in range(3)]
+    # what memories held before the run is not known, whatever explains the run at the least price
+    terms, others = ([replace(t, rest=False) for t in each] for each in (terms, others))
+    others = [
+        t for t in others if not isinstance(t.effect, Handling)
+    ]  # of single units, and no step to come changes them
+    fitted = [Model(model.problem, [t, *others], near=model.noise) for t in terms]
+    predicted = tuple(_coefficients(m, t, blocks) for m, t in zip(fitted, terms, strict=True))
+    squares = np.array([m.at(model.noise).rss for m in fitted])
+    widened_by = shared_factor(Model(model.problem, [terms[0], *others], near=model.noise), terms[0]) if terms else 1.0
+    variance = model.space.variance * widened_by
+    return Rivals(
+        lot=model.problem.lot.units(pick),
+        weight=units / len(pick),
+        rest=tuple(others),
+        terms=tuple(terms),
+        predicted=predicted,
+        noise=model.noise.pick(blocks),
+        variance=variance,
+        covariance=model.problem.covariance,
+        observed=(squares[None, :] - squares[:, None]) / variance,
+    )
+
+
+def _coefficients(model: Model, term: Term, blocks: Sequence[int]) -> Array:
+    """Coefficients of the first term of a model: of some blocks, or shared."""
+    fit = estimate(model)
+    columns = model.problem.columns(term.effect, term.keywords)[..., : term.first].shape[-1]
+    return fit.shared[:columns] if term.shared else fit.local[list(blocks), :columns]
+
+
+@dataclass(frozen=True)
+class Apart:
+    """The separation of rivals.
+
+    left : (r, r), chi-square over the whole lot that the rival of a column leaves of what the rival of a row predicts
+    whole : (r,), the same that the model without any of them leaves
+    """
+
+    left: Array
+    whole: Array
+
+
+def separations(
+    rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
+) -> Array:
+    """Chi-square (r, r) that the rival of a column leaves, fitted to what the rival of a row predicts, in the whole lot.
+
+    Parameters
+    ----------
+    steps : after the present measurements; none for the separation by the present measurements
+    fine : whether the wrong rival's nonlinear parameters are fitted, or only the best of their grid is used
+    """
+    return apart(rivals, steps, pace, fine=fine).left
+
+
+def apart(
+    rivals: Rivals, steps: Sequence[SequenceStep] = (), pace: StationPace | None = None, *, fine: bool = True
+) -> Apart:
+    """The separation of rivals with steps after the present measurements; parameters as :func:`separations`."""
+    problem = widened(rivals, steps, pace) if steps else Problem(rivals.lot)
+    noise = problem.covariance.rescaled(rivals.noise, rivals.covariance)
+    rest = Model(problem, with_turn_on(problem.lot.state, rivals.rest))
+    to_lot = rivals.weight / rivals.variance
+    profile = LikelihoodProfile(rest, predictions(rivals, problem), noise, AXES_DIFFER / to_lot)
+    left = np.stack([profile.left(wrong, fine=fine) for wrong in rivals.terms], axis=1)
+    np.fill_diagonal(left, 0.0)
+    return Apart(left * to_lot, profile.whole * to_lot)
+
+
+def smallest(left: Array) -> Array:
+    """The smaller of the two directions of each pair, (r, r) symmetric: for either being true."""
+    return np.minimum(left, left.T)
+
+
+def residual_squares(model: Model, targets: Array, noise: Noise) -> Array:
+    """Whitened sums of squares (r,) of the residuals of a model on some series (blocks, n, r)."""
+    space: Space = model.at(noise)
+    free = space.project(space.whiten(targets))
+    blocks, n, count = free.shape
+    flat = free.reshape(blocks * n, count)
+    if model.shared.shape[-1]:
+        shared = space.targets[..., 1:].reshape(blocks * n, -1)
+        size = np.linalg.norm(shared, axis=0)
+        shared = shared / np.where(size > 0.0, size, 1.0)
+        flat = flat - shared @ np.linalg.lstsq(shared, flat, rcond=1e-9)[0]
+    return np.sum(flat**2, axis=0)
+
+
+def predictions(rivals: Rivals, problem: Problem) -> Array:
+    """Contribution of each rival to the series of a problem of the same units, (blocks, n, r), g."""
+    contributions: list[Array] = []
+    for term, coefficients in zip(rivals.terms, rivals.predicted, strict=True):
+        columns = problem.columns(term.effect, term.keywords)[..., : term.first]
+        own = np.einsum("bnp,bp->bn", columns, np.broadcast_to(coefficients, (columns.shape[0], columns.shape[-1])))
+        contributions.append(own)
+    return np.stack(contributions, axis=-1)
+
+
+def widened(rivals: Rivals, steps: Sequence[SequenceStep], pace: StationPace | None) -> Problem:
+    """The problem with steps taken after its dwells; their readings are not used."""
+    lot = rivals.lot
+    units = lot.state.time.shape[0]
+    state = extended(lot.state, steps, pace, response=lot.response)
+    scale = 1.0 if pace is None or pace.last_dwell_s <= 0.0 else float(np.sqrt(pace.last_dwell_s / pace.dwell_s))
+    typical = scale * rivals.typical_error
+    if not np.isfinite(typical).all():
+        typical = np.where(np.isfinite(typical), typical, np.nanmedian(typical))
+    error = np.concatenate([lot.error, np.broadcast_to(typical, (units, len(steps), 3))], axis=1)
+    output = np.concatenate([lot.output, np.zeros((units, len(steps), 3))], axis=1)
+    loudness = None if lot.loudness is None else np.concatenate([lot.loudness, np.ones(len(steps))])
+    return Problem(replace(lot, state=state, output=output, error=error, loudness=loudness))

@@ -1,0 +1,174 @@
+"""A certificate's XML against the archive: the document is made again from the archive, and the two are compared whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import takewhile, zip_longest
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from pipelines.archive import Archive, Run
+from pipelines.certificates import Ledger
+from pipelines.certificates.days import today
+from pipelines.certificates.document.compose import compose
+from pipelines.certificates.document.dcc import dcc
+from pipelines.certificates.document.signature_check import canonical, parsed
+from pipelines.certificates.document.stated_laboratory import NOBODY, laboratory_in, said_by
+from schemas.errors import ArchiveUnusable, TumblelineError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipelines.certificates import Calibration
+    from pipelines.certificates.document.content import CertificateContent
+    from pipelines.certificates.document.laboratory import LaboratoryFile
+    from pipelines.certificates.document.xml_facts import CertificateFacts
+
+SHOWN = 3  # different places that are named
+LONGEST = 90  # of a text that is shown
+SPACE = "space between elements"
+NONE = ("", "", "")
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What the archive says of a certificate.
+
+    known : whether the ledger has its number; ended : why it is not valid any more, empty where it is
+    until : until when it is valid and what comes then, where that is known already
+    different : sentences about what differs; count : texts and numbers that were compared
+    reason : why the document could not be made again, empty where it was
+    unproven : what the archive cannot know, in one line; empty where the laboratory's file was given
+    """
+
+    known: bool
+    ended: str = ""
+    until: str = ""
+    different: tuple[str, ...] = ()
+    reason: str = ""
+    count: int = 0
+    unproven: str = ""
+
+
+def compare(root: Any, facts: CertificateFacts, archive: Archive, who: LaboratoryFile | None = None) -> Compared:
+    """What the archive says of a certificate.
+
+    Parameters
+    ----------
+    root : the root element of its XML; facts : what it states
+    who : the laboratory's file; where None its texts are taken from the document and told as not proven
+    """
+    known = Ledger(archive).calibrations(facts.serial) if facts.serial else []
+    own = next((one for one in known if one.certificate == facts.number), None)
+    if own is None:
+        return Compared(known=False)
+    try:
+        made = _made_again(root, Run(archive, own.run), own, known, who)
+    except ValidationError as problem:
+        text = f"{'.'.join(map(str, problem.errors()[0]['loc']))}: {problem.errors()[0]['msg']}".removeprefix(": ")
+        return Compared(True, *_ended(own), (f"what the file says of the laboratory is not allowed: {text}",))
+    except ArchiveUnusable as problem:
+        return Compared(True, *_ended(own), (*_other_entry(facts, own), str(problem)))
+    except TumblelineError as problem:
+        return Compared(True, *_ended(own), _other_entry(facts, own), reason=str(problem))
+    # comments and instructions before the root element count as well
+    here, there = root.getroottree(), [parsed(dcc(content)).getroottree() for content in made]
+    if any(canonical(here) == canonical(one) for one in there):
+        unproven = "" if who is not None else said_by(made[0].who)
+        return Compared(True, *_ended(own), count=len(list(_places(root))), unproven=unproven)
+    return Compared(True, *_ended(own), tuple(_different(root, there[0].getroot())))
+
+
+def _made_again(
+    root: Any, run: Run, own: Calibration, known: list[Calibration], who: LaboratoryFile | None
+) -> list[CertificateContent]:
+    """The document of the day of issue, and, where another has replaced the certificate since, the one that names that."""
+    first = compose(run, replace(own, ended_by=None), known, who or NOBODY)
+    if who is None:
+        said = laboratory_in(root, first)
+        method = f"{said.method.procedure}. {first.method}" if said.method.procedure else first.method
+        first = first.model_copy(update={"who": said, "method": method})
+    if own.ended_by is None or own.ended_by.action == "revoke":
+        return [first]
+    named = first.amendment.model_copy(update={"replaced_by": own.ended_by.certificate})
+    return [first, first.model_copy(update={"amendment": named})]
+
+
+def _other_entry(facts: CertificateFacts, own: Calibration) -> tuple[str, ...]:
+    """What of a document differs from its entry in the ledger, where the document cannot be made again."""
+    entries = (
+        ("run", facts.run, own.run),
+        ("SHA-256 of the coefficients", facts.coefficients, own.event.coefficients),
+        ("date of issue", facts.issued, own.event.when[:10]),
+    )
+    return tuple(
+        f"{what}: the file says {found or 'nothing'}, the ledger {needed}"
+        for what, found, needed in entries
+        if found != needed
+    )
+
+
+def _different(here: Any, there: Any) -> list[str]:
+    """The first places at which two documents differ, and how many there are."""
+    pairs = [(a, b) for a, b in zip_longest(_places(here), _places(there)) if (a or NONE)[:2] != (b or NONE)[:2]]
+    if not pairs:
+        return ["the file differs from the document of the archive in what stands around its root element"]
+    pairs = [pair for pair in pairs if SPACE not in {one[0] for one in pair if one}] or pairs
+    lines = [_line(a or NONE, b or NONE) for a, b in pairs[:SHOWN]]
+    return [*lines, f"and {len(pairs) - SHOWN} other places"] if len(pairs) > SHOWN else lines
+
+
+def _line(here: tuple[str, str, str], there: tuple[str, str, str]) -> str:
+    if here[0] == there[0]:
+        equal = takewhile(lambda pair: pair[0] == pair[1], zip(here[1], there[1], strict=False))
+        same = len(list(equal)) if len(here[1]) > LONGEST else 0
+        return f"{there[2]}: the file says {_short(here[1], same)}, the archive {_short(there[1], same)}"
+    return (
+        f"{here[2] or 'end of the document'}: the file says {_short(here[1])}, the archive has "
+        f"{there[2] or 'nothing'} {_short(there[1])} in its place"
+    )
+
+
+def _short(text: str, same: int = 0) -> str:
+    """A text from shortly before its first difference on."""
+    own = " ".join(f"{'…' if same > 20 else ''}{text[max(0, same - 20) :]}".split())
+    return f"'{own[:LONGEST]}{'…' if len(own) > LONGEST else ''}'" if own else "nothing"
+
+
+def _places(root: Any) -> Iterator[tuple[str, str, str]]:
+    """Every element, attribute and text of a document in order: what it is, its text, and the place that people know."""
+    for one in root.iter():
+        if not isinstance(one.tag, str):
+            yield "comment or instruction", str(one.text), "comment or instruction"
+        else:
+            place = _named(one)
+            yield one.tag, one.text or "", place
+            for name, value in sorted(one.attrib.items()):
+                yield f"{one.tag} {name}", value, f"{place}, attribute {name}"
+        yield SPACE, one.tail or "", SPACE
+
+
+def _named(element: Any) -> str:
+    """The path of an element below the nearest one that has a name, such as a result."""
+    path: list[str] = []
+    while element is not None:
+        head = next((child.findtext("{*}content") for child in element.findall("{*}name")), None)
+        if head and path:
+            return f"{head}: {' '.join(reversed(path))}"
+        path.append(element.tag.rpartition("}")[2])
+        element = element.getparent()
+    return " ".join(reversed(path[:3]))
+
+
+def _ended(one: Calibration) -> tuple[str, str]:
+    """Why a calibration is not valid any more, and until when it still is where its end is known; each may be empty."""
+    by = one.ended_by
+    if by is None:
+        return "", ""
+    reason = f": {by.reason}" if by.reason else ""
+    if by.action == "revoke":
+        return f"revoked on {by.when[:10]} by {by.who}, not valid from {one.until} on{reason}", ""
+    amended = "amended and replaced" if by.run == one.run else "superseded"
+    text = f"{amended} by certificate {by.certificate} on {by.when[:10]}, not valid from {one.until} on{reason}"
+    return ("", text) if today() < one.until else (text, "")

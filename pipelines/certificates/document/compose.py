@@ -1,0 +1,297 @@
+"""The content of a certificate from the run, its stated budget, the ledger and the laboratory's file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from inertial.counts import number_of
+from pipelines.certificates.document.as_found import adjustment
+from pipelines.certificates.document.content import (
+    Amendment,
+    BudgetTable,
+    CertificateContent,
+    Coefficient,
+    Condition,
+    Conformity,
+    Contribution,
+    ReferenceStandard,
+    Result,
+)
+from pipelines.certificates.measured import measured_on, measured_span
+from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, stated_budget
+from pipelines.certificates.statement import stated
+from pipelines.stages.figures import FIGURES
+from pipelines.stages.uncertainty.contributions import left_out
+from pipelines.stages.uncertainty.tables import LABELS
+from pipelines.tables.frames import rows_of
+from schemas.errors import ArchiveUnusable, WrongUse
+from schemas.uncertainty import Uncertainty
+
+if TYPE_CHECKING:
+    from pipelines.archive import Run
+    from pipelines.certificates import Calibration
+    from pipelines.certificates.document.laboratory import LaboratoryFile
+
+QUANTITIES = {
+    "bias": "bias at the reference temperature",
+    "scale": "sensitivity at the reference temperature",
+    "misalignment": "misalignment to the fixture",
+    "orthogonality": "deviation from orthogonality",
+    "bias_temperature": "temperature coefficient of bias",
+    "scale_temperature": "temperature coefficient of sensitivity",
+    "output": "corrected output, anywhere in the certified range",
+    "bias_error": "error of the corrected output, verification (RMS)",
+    "verification_norm": "error of the norm of gravity, verification (largest of the poses)",
+    "bias_error_period": "error of the corrected output to be expected over the stated period (standard deviation)",
+}
+BUDGETS = ("bias", "scale", "output", "bias_error_period")
+"""Quantities whose budget a certificate prints."""
+SOURCES = {
+    "[stability], ": "stability of the device, ",
+    "[stability]": "stability of the device",
+    "[uncertainty]": "uncertainties of the references",
+    "slot_rotation_mrad of the simulation": "simulation: rotation of the slots",
+    "slot_gradient_K of the simulation": "simulation: gradient in the slots",
+    "slot_lag_s of the simulation": "simulation: thermal lag of the slots",
+    "supply_reading_ppm of the simulation": "simulation: measurement of the supply",
+}
+DECLARATION = (
+    "The results relate only to the item calibrated, in the condition in which it was received, and to the stated conditions. "
+    "This certificate may be reproduced in full only, unless the laboratory has approved otherwise in writing."
+)
+UNCERTAINTY = (
+    "The reported expanded uncertainty U is the standard uncertainty multiplied by the coverage factor k that is stated beside "
+    "it, for a coverage probability of about 95 %. It was evaluated by propagation through the fit (JCGM 100)."
+)
+NORMS = ("JCGM 100:2008", "JCGM 106:2012")
+FRAMES = {
+    "intrinsic": "axes of the sensor; a rotation of the whole unit in its mount is not part of the result",
+    "fixture": "axes of the fixture",
+}
+
+
+def compose(run: Run, calibration: Calibration, known: list[Calibration], who: LaboratoryFile) -> CertificateContent:
+    """The content of the certificate of a calibration.
+
+    Parameters
+    ----------
+    known : calibrations of the unit in the ledger, in order; who : the laboratory's file.
+
+    Raises
+    ------
+    WrongUse
+        The calibration was revoked, its run states no uncertainty, or an archive of an earlier version lacks what is needed.
+    ArchiveUnusable
+        The run's coefficients are not those that were certified.
+    """
+    event, about, serial = calibration.event, run.about, calibration.serial
+    _refuse(run, calibration)
+    budget = stated_budget(run, serial)
+    recipe, station = about.get("recipe") or {}, about.get("station") or {}
+    coefficients = [_coefficient(row) for row in rows_of(run.table("coefficients")) if row["unit"] == serial]
+    first, last = measured_span(run) or (measured_on(run), measured_on(run))
+    references = tuple(_reference(one) for one in budget["references"])
+    return CertificateContent(
+        number=calibration.certificate,
+        issued=event.when[:10],
+        serial=serial,
+        device=event.device,
+        grade=event.grade,
+        run=run.id,
+        measured_from=first[:10],
+        measured_to=last[:10],
+        simulated=station.get("kind") == "simulated",
+        who=who,
+        method=_method(run, recipe, who),
+        norms=NORMS,
+        frame=FRAMES.get(budget["frame"], budget["frame"]),
+        conditions=tuple(_conditions(run, serial, recipe)),
+        references=references,
+        traceability=_traceability(budget, {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}),
+        results=tuple(_result(one, coefficients) for one in budget["quantities"]),
+        budgets=tuple(_budget(one) for one in budget["quantities"] if one["quantity"] in BUDGETS),
+        coefficients=tuple(coefficients),
+        conformity=tuple(_conformity(one) for one in budget["decisions"]),
+        decision_rule="; ".join(dict.fromkeys(one["rule"] for one in budget["decisions"])),
+        limits=str((about.get("limits") or {}).get("name", "")),
+        adjustment=adjustment(run, calibration, known),
+        amendment=_amendment(calibration, known),
+        interval=_interval(calibration, agreed=budget["customer_agreed"]),
+        adequacy=event.adequacy,
+        left_out=_left_out(run),
+        uncertainty_note=UNCERTAINTY,
+        declaration=DECLARATION,
+        software=f"Tumbleline {(about.get('software') or {}).get('tumbleline', 'version not known')}",
+        coefficients_sha256=event.coefficients,
+    )
+
+
+def _refuse(run: Run, one: Calibration) -> None:
+    if one.state == "revoked" and one.ended_by is not None:
+        raise WrongUse(
+            f"certificate {one.certificate} of run {run.id} was revoked ({one.ended_by.reason}); no document is made of it, "
+            "certify the unit again"
+        )
+    if run.manifest("coefficients")["sha256"] != one.event.coefficients:
+        stated(run, [one.serial])  # says which hash is which
+        raise ArchiveUnusable(
+            f"certificate {one.certificate}: run {run.id} has other coefficients than were certified; restore the table "
+            "from a copy"
+        )
+
+
+def _coefficient(row: dict[str, Any]) -> Coefficient:
+    return Coefficient(
+        effect=row["effect"],
+        name=row["name"],
+        axis=row["axis"],
+        value=float(row["value"]),
+        standard_error=float(row["standard_error"]),
+        unit=row["unit_text"],
+    )
+
+
+def _result(one: StatedQuantity, coefficients: list[Coefficient]) -> Result:
+    """A quantity of the budget; the scale, which the budget has relative to itself, as a sensitivity in units of the output."""
+    name, value, unit, expanded = (
+        QUANTITIES.get(one["quantity"], one["quantity"]),
+        one["value"],
+        one["unit"],
+        one["expanded"],
+    )
+    own = [c for c in coefficients if c.effect == "scale" and c.axis == one["axis"]]
+    if one["quantity"] == "scale" and own:
+        value, unit, expanded = own[0].value, own[0].unit, abs(own[0].value) * 1e-6 * expanded
+    bare = one["quantity"] in {"output", "scale"} and not (one["quantity"] == "scale" and own)
+    return Result(
+        quantity=name,
+        axis=one["axis"],
+        unit=unit,
+        value=None if bare else value,
+        expanded=expanded,
+        k=one["k"],
+        dof=one["dof"],
+    )
+
+
+def _budget(one: StatedQuantity) -> BudgetTable:
+    rows = sorted(one["contributions"], key=lambda row: -row["share"])
+    deviation = (
+        one["quantity"] == "bias_error_period"
+    )  # its contributions add up to the result, not to the result's own u
+    return BudgetTable(
+        quantity=f"{QUANTITIES.get(one['quantity'], one['quantity'])}, {one['axis']}",
+        unit=one["unit"],
+        u=one["value"] if deviation else one["u"],
+        k=None if deviation else one["k"],
+        expanded=None if deviation else one["expanded"],
+        rows=tuple(
+            Contribution(
+                name=LABELS.get(row["name"], row["name"]),
+                type=row["type"],
+                distribution=row["distribution"],
+                u=row["u"],
+                unit=one["unit"],
+                share=row["share"],
+                source=_source(row["source"]),
+            )
+            for row in rows
+        ),
+    )
+
+
+def _source(text: str) -> str:
+    """The source of a contribution without the names of tables and keys in files."""
+    for table, words in SOURCES.items():
+        text = text.replace(table, words)
+    return text
+
+
+def _conformity(one: Any) -> Conformity:
+    label = FIGURES[one["figure"]].label if one["figure"] in FIGURES else one["figure"]
+    return Conformity(
+        figure=f"{label} (least value, accepted from)" if one.get("least") else label,
+        **{name: one[name] for name in ("value", "expanded", "limit", "accept", "unit", "outcome", "pfa")},
+    )
+
+
+def _reference(one: Any) -> ReferenceStandard:
+    accreditation = f" ({one['accreditation']})" if one["accreditation"] else ""
+    uncertainty = "" if one["U"] is None else f"U = {one['U']:g} {one['unit'] or ''} (k = {one['k']:g})"
+    return ReferenceStandard(
+        id=one["id"], what=one["what"], certificate=one["certificate"], laboratory=one["laboratory"] + accreditation,
+        date=one["date"] or "", due=one["due"], uncertainty=uncertainty, sha256=one["sha256"],
+    )  # fmt: skip
+
+
+def _traceability(budget: StatedBudget, stated_entries: dict[str, Any]) -> str:
+    """What is traceable and what is not: an entry of the budget that names no standard is said to rest on its source."""
+    source = budget["grade_source"].replace("_", " ")
+    if not budget["references"]:
+        return (
+            "No reference standard with a certificate is stated for this calibration; metrological traceability to the SI is not "
+            f"claimed. The uncertainties of the references are taken from: {source}."
+        )
+    own = {name: entry for name, entry in stated_entries.items() if isinstance(entry, dict)}
+    traced = sorted(name for name, entry in own.items() if entry.get("reference"))
+    rest = sorted(set(own) - set(traced))
+    text = (
+        "Traceable to the SI through the calibration certificates of the standards listed: "
+        f"{', '.join(traced).replace('_', ' ') or 'no contribution names one of them'}."
+    )
+    if not rest:
+        return text
+    named = ", ".join(rest).replace("_", " ")
+    return f"{text} Without a standard of their own, by the sources in the budgets ({source}): {named}."
+
+
+def _left_out(run: Run) -> str:
+    """The contributions that the statement of the references lacks: U counts them as zero."""
+    terms = run.manifest("budget")["parameters"].get("uncertainty") or {}
+    names = left_out(Uncertainty.model_validate(terms))
+    named = ", ".join(LABELS.get(name, name) for name in names)
+    return f"Not stated, and not contained in the uncertainties U: {named}." if names else ""
+
+
+def _method(run: Run, recipe: dict[str, Any], who: LaboratoryFile) -> str:
+    dwells = run.table("dwells")
+    kinds = dwells["kind"].astype(str)
+    poses, kept = (dwells.loc[kinds == kind, "pose"].nunique() for kind in ("dwell", "verification"))
+    verified = f"; verification in {kept} other poses" if kept else "; no pose was kept for verification"
+    soaks = number_of(len(recipe.get("temperatures_C") or [0]), "temperature")
+    procedure = f"{who.method.procedure}. " if who.method.procedure else ""
+    return (
+        f"{procedure}Static multi-position calibration in the gravity of the Earth: {poses} poses at "
+        f"{soaks}, {recipe.get('dwell_s', 'unknown')} s per pose, recipe "
+        f"'{recipe.get('name', '')}'; least-squares fit of {', '.join(recipe.get('effects', ())).replace('_', ' ')}{verified}."
+    )
+
+
+def _conditions(run: Run, serial: str, recipe: dict[str, Any]) -> list[Condition]:
+    dwells = run.table("dwells")
+    own, conditions = dwells[dwells["unit"] == serial], []
+    for column, name, unit in (
+        ("unit_C", "temperature of the item", "°C"),
+        ("chamber_C", "temperature of the chamber", "°C"),
+        ("supply_V", "supply voltage", "V"),
+    ):
+        values = own[column].dropna() if column in own else []
+        if len(values):
+            conditions.append(Condition(name=name, low=float(min(values)), high=float(max(values)), unit=unit))
+    gravity = recipe.get("local_gravity_m_s2") or (run.about.get("mapping") or {}).get("local_gravity_m_s2")
+    if gravity:
+        conditions.append(Condition(name="local gravity", low=float(gravity), high=float(gravity), unit="m/s²"))
+    return conditions
+
+
+def _amendment(one: Calibration, known: list[Calibration]) -> Amendment:
+    """A certificate of the same run that this one ended: its amendment; one that ended this one: where to look now."""
+    ended = [old.certificate for old in known if old.event.sequence in one.event.ends and old.run == one.run]
+    after = one.ended_by.certificate if one.ended_by is not None and one.ended_by.action != "revoke" else ""
+    return Amendment(replaces=tuple(ended), reason=one.event.reason if ended else "", replaced_by=after)
+
+
+def _interval(one: Calibration, *, agreed: bool) -> str:
+    if not agreed:
+        return ""
+    return f"As agreed with the customer, the next calibration is due on {one.stated_until}."

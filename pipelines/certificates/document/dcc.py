@@ -1,0 +1,238 @@
+"""The certificate as XML: Digital Calibration Certificate 3.0.0 of the PTB, with quantities in D-SI 2.0.0."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pipelines.certificates.document.numbers import least_of, si_unit
+from pipelines.certificates.document.schema_files import EXTRA, WHERE, validate
+from schemas.library import library
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pipelines.certificates.document.content import CertificateContent, Conformity, Result
+
+DCC, SI, VERSION = "https://ptb.de/dcc", "https://ptb.de/si", "3.0.0"
+COVERAGE = 0.9545
+OUTCOMES = {
+    "pass": "pass",
+    "fail": "fail",
+    "conditional pass": "conditionalPass",
+    "conditional fail": "conditionalFail",
+}
+
+
+def dcc(content: CertificateContent) -> bytes:
+    """The XML of a certificate, valid against the schema; the same bytes for the same content.
+
+    Raises
+    ------
+    DocumentInvalid
+        The schema does not allow it.
+    WrongUse
+        lxml is not installed.
+    """
+    etree = library("lxml.etree", EXTRA, WHERE)
+    writer = _Writer(etree)
+    root = etree.Element(f"{{{DCC}}}digitalCalibrationCertificate", nsmap={"dcc": DCC, "si": SI}, schemaVersion=VERSION)
+    _administrative(writer, writer.add(root, "administrativeData"), content)
+    _measured(writer, writer.add(writer.add(root, "measurementResults"), "measurementResult"), content)
+    etree.indent(root)
+    data = etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n"
+    validate(data)
+    return data
+
+
+class _Writer:
+    """Elements of the two namespaces."""
+
+    def __init__(self, etree: Any) -> None:
+        self._etree = etree
+
+    def add(self, parent: Any, name: str, text: str | None = None, space: str = DCC, **attributes: str) -> Any:
+        """A child with text."""
+        child = self._etree.SubElement(parent, f"{{{space}}}{name}", **attributes)
+        child.text = text
+        return child
+
+    def text(self, parent: Any, name: str, text: str) -> Any:
+        """A child whose text is English content."""
+        child = self.add(parent, name)
+        self.add(child, "content", text, lang="en")
+        return child
+
+    def real(self, parent: Any, value: float, unit: str, label: str = "", result: Result | None = None) -> None:
+        """A quantity in SI units with its expanded uncertainty; where its unit has none, a number with the unit in its label."""
+        known = si_unit(unit)
+        factor, text = (1.0, r"\one") if known is None else (known.factor, known.text)
+        real = self.add(parent, "real", space=SI)
+        if label or known is None:
+            self.add(real, "label", label if known is not None else f"{label} in {unit}".strip(), space=SI)
+        self.add(real, "value", repr(float(value) * factor), space=SI)
+        self.add(real, "unit", text, space=SI)
+        if result is not None and result.value is not None:
+            own = self.add(real, "expandedUnc", space=SI)
+            self.add(own, "uncertainty", repr(result.expanded * factor), space=SI)
+            self.add(own, "coverageFactor", repr(result.k), space=SI)
+            self.add(own, "coverageProbability", repr(COVERAGE), space=SI)
+
+
+def _administrative(w: _Writer, parent: Any, c: CertificateContent) -> None:
+    software = w.add(w.add(parent, "dccSoftware"), "software")
+    name, _, release = c.software.partition(" ")
+    w.text(software, "name", name)
+    w.add(software, "release", release)
+    core = w.add(parent, "coreData")
+    w.add(core, "countryCodeISO3166_1", c.who.laboratory.country)
+    w.add(core, "usedLangCodeISO639_1", "en")
+    w.add(core, "mandatoryLangCodeISO639_1", "en")
+    w.add(core, "uniqueIdentifier", c.number)
+    _identifications(w, core, [("calibrationLaboratory", c.run, "run"), ("customer", c.who.customer.order, "order")])
+    if c.who.item.received is not None:
+        w.add(core, "receiptDate", c.who.item.received.isoformat())
+    w.add(core, "beginPerformanceDate", c.measured_from)
+    w.add(core, "endPerformanceDate", c.measured_to)
+    w.add(core, "performanceLocation", c.who.laboratory.place)
+    item = w.add(w.add(parent, "items"), "item")
+    w.text(item, "name", c.who.item.description)
+    if c.who.item.condition:
+        w.text(item, "description", c.who.item.condition)
+    w.text(w.add(item, "manufacturer"), "name", c.who.item.manufacturer)
+    w.add(item, "model", c.who.item.model or c.device)
+    _identifications(w, item, [("manufacturer", c.serial, "serial number")])
+    laboratory = c.who.laboratory
+    place = w.add(parent, "calibrationLaboratory")
+    if laboratory.accreditation is not None:
+        w.add(place, "calibrationLaboratoryCode", laboratory.accreditation.number)
+    _contact(w, place, "contact", laboratory.name, laboratory.email, laboratory.address)
+    person = w.add(w.add(parent, "respPersons"), "respPerson")
+    w.text(w.add(person, "person"), "name", c.who.signatory.name)
+    w.add(person, "role", c.who.signatory.role)
+    w.add(person, "mainSigner", "true")
+    _contact(w, parent, "customer", c.who.customer.name, c.who.customer.email, c.who.customer.address)
+    statements = w.add(parent, "statements")
+    for text in statements_of(c):
+        w.text(w.add(statements, "statement"), "declaration", text)
+
+
+def statements_of(c: CertificateContent) -> list[str]:
+    """What a certificate declares beside its results."""
+    parts = [
+        f"Date of issue: {c.issued}",
+        "SIMULATED: the station that these results come from is a simulation; no device was measured"
+        if c.simulated
+        else "",
+        c.declaration,
+        c.uncertainty_note,
+        c.left_out,
+        c.traceability,
+        f"Model of the fit, by its residuals: {c.adequacy}" if c.adequacy else "",
+        f"Frame of the results: {c.frame}",
+        f"Accreditation: {a.body}, {a.number}" if (a := c.who.laboratory.accreditation) is not None else "",
+        f"Replaces certificate {', '.join(c.amendment.replaces)}; changed: {c.amendment.reason or 'reason not stated'}"
+        if c.amendment.replaces
+        else "",
+        f"Replaced by certificate {c.amendment.replaced_by}" if c.amendment.replaced_by else "",
+        f"Deviations from the method: {c.who.method.deviations}" if c.who.method.deviations else "",
+        c.who.method.remarks,
+        c.interval,
+        f"SHA-256 of the table of coefficients: {c.coefficients_sha256}",
+    ]
+    return [part for part in parts if part]
+
+
+def _identifications(w: _Writer, parent: Any, entries: Iterable[tuple[str, str, str]]) -> None:
+    box = w.add(parent, "identifications")
+    for issuer, value, name in entries:
+        if value:
+            one = w.add(box, "identification")
+            w.add(one, "issuer", issuer)
+            w.add(one, "value", value)
+            w.text(one, "name", name)
+
+
+def _contact(w: _Writer, parent: Any, tag: str, name: str, email: str, address: str) -> None:
+    contact = w.add(parent, tag)
+    w.text(contact, "name", name)
+    w.add(contact, "eMail", email)
+    w.text(w.add(contact, "location"), "further", address)
+
+
+def _measured(w: _Writer, parent: Any, c: CertificateContent) -> None:
+    w.text(parent, "name", f"Calibration of {c.who.item.description} {c.serial}")
+    method = w.add(w.add(parent, "usedMethods"), "usedMethod")
+    w.text(method, "name", "Static multi-position calibration in gravity")
+    w.text(method, "description", c.method)
+    for norm in c.norms:
+        w.add(method, "norm", norm)
+    if c.references:
+        box = w.add(parent, "measuringEquipments")
+        for one in c.references:
+            _reference(w, box, one)
+    if c.conditions or c.adjustment.found_rms_ug is not None:
+        _conditions(w, w.add(parent, "influenceConditions"), c)
+    results = w.add(parent, "results")
+    for result in c.results:
+        own = w.add(results, "result")
+        w.text(own, "name", f"{result.quantity}, {result.axis}")
+        if result.value is None:
+            w.text(own, "description", "expanded uncertainty")
+        data = w.add(w.add(own, "data"), "quantity")
+        w.real(data, result.expanded if result.value is None else result.value, result.unit, result=result)
+    own = w.add(results, "result")
+    w.text(own, "name", "coefficients of the fit, as archived; their uncertainty is in the results above")
+    box = w.add(w.add(own, "data"), "list")
+    for one in c.coefficients:
+        quantity = w.add(box, "quantity")
+        w.text(quantity, "name", f"{one.effect} {one.name} {one.axis}")
+        w.real(quantity, one.value, one.unit)
+    meta = w.add(parent, "measurementMetaData")
+    for one in c.conformity:
+        _conformity(w, w.add(meta, "metaData"), one, c)
+    if not c.conformity:
+        w.text(w.add(meta, "metaData"), "declaration", "no statement of conformity is made")
+
+
+def _reference(w: _Writer, parent: Any, one: Any) -> None:
+    box = w.add(parent, "measuringEquipment")
+    w.text(box, "name", one.what or one.id)
+    w.text(box, "description", f"due {one.due}; {one.uncertainty or 'uncertainty not stated'}")
+    certificate = w.add(box, "certificate")
+    w.text(certificate, "referral", f"{one.laboratory or 'laboratory not stated'}, {one.date or 'date not stated'}")
+    w.add(certificate, "referralID", one.certificate)
+    w.add(certificate, "procedure", "SHA-256" if one.sha256 else "none: no hash is stated")
+    w.add(certificate, "value", one.sha256)
+    _identifications(w, box, [("calibrationLaboratory", one.id, "reference standard")])
+
+
+def _conditions(w: _Writer, parent: Any, c: CertificateContent) -> None:
+    for one in c.conditions:
+        box = w.add(parent, "influenceCondition")
+        w.text(box, "name", one.name)
+        data = w.add(box, "data")
+        for label, value in (("lowest", one.low), ("highest", one.high)):
+            w.real(w.add(data, "quantity"), value, one.unit, label)
+    a = c.adjustment
+    for status, rms, text in (
+        ("beforeAdjustment", a.found_rms_ug, f"with the coefficients of certificate {a.earlier}"),
+        ("afterAdjustment", a.left_rms_ug, "with the coefficients of this certificate"),
+    ):
+        if rms is not None:
+            box = w.add(parent, "influenceCondition")
+            w.text(box, "name", f"RMS error of the norm of gravity {text}")
+            w.add(box, "status", status)
+            w.real(w.add(w.add(box, "data"), "quantity"), rms, "µg")
+
+
+def _conformity(w: _Writer, parent: Any, one: Conformity, c: CertificateContent) -> None:
+    w.add(parent, "norm", one_line(c.decision_rule))
+    limit = f"limit {one.limit:g} {one.unit} of '{c.limits}'"
+    text = f"{one.figure}: {limit}, specific probability of false acceptance {least_of(one.pfa)}"
+    w.text(parent, "declaration", text)
+    w.add(parent, "conformity", OUTCOMES.get(one.outcome, "noPass"))
+
+
+def one_line(text: str) -> str:
+    """Without line ends."""
+    return " ".join(text.split())

@@ -1,0 +1,162 @@
+"""Writing certificates: which ones are meant, and their files, all or none of a certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from pipelines.archive import Archive, Run, files
+from pipelines.certificates import Ledger
+from pipelines.certificates.document.compose import compose
+from pipelines.certificates.document.dcc import dcc
+from pipelines.certificates.document.pdf import pdf
+from pipelines.certificates.document.schema_files import WHERE
+from pipelines.certificates.document.signing import sign_pdf, sign_xml
+from pipelines.tables.frames import rows_of
+from schemas.errors import WrongUse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from pipelines.certificates import Calibration
+    from pipelines.certificates.document.laboratory import LaboratoryFile
+    from pipelines.certificates.document.signing import SigningKey
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files of a certificate; signature : the detached one of the XML."""
+
+    number: str
+    serial: str
+    run: str
+    pdf: Path
+    xml: Path
+    signature: Path | None
+
+
+@dataclass
+class Issued:
+    """What was written, and why not, by serial."""
+
+    written: list[Written] = field(default_factory=list[Written])
+    left_out: dict[str, str] = field(default_factory=dict[str, str])
+
+
+def issue(
+    archive: Archive,
+    names: Sequence[str],
+    who: LaboratoryFile,
+    folder: Path,
+    *,
+    key: SigningKey | None = None,
+    address: str = "",
+) -> Issued:
+    """Write the certificates that are meant into a folder.
+
+    Parameters
+    ----------
+    names : runs, serials, numbers of certificates.
+    key : signs both files; address : of a QR code, ``{number}`` is filled in.
+
+    Raises
+    ------
+    WrongUse
+        A unit that is named has no certificate, one was revoked, or the folder cannot be written.
+    """
+    chosen, done = _chosen(archive, names)
+    contents = [compose(Run(archive, one.run), one, known, who) for one, known in chosen]
+    made: list[tuple[Calibration, dict[str, bytes]]] = []
+    for (one, _), content in zip(chosen, contents, strict=True):  # all are made before one is written
+        xml = dcc(content)
+        document = pdf(content, xml, address.replace("{number}", content.number))
+        parts = {"xml": xml, "pdf": document}
+        if key is not None:
+            parts["pdf"] = sign_pdf(document, key)
+            parts["xml.sig"] = sign_xml(xml, key)
+        made.append((one, parts))
+    for one, parts in made:
+        stem = one.certificate.replace("/", "_")
+        paths = {end: folder / f"{stem}.{end}" for end in parts}
+        _write({paths[end]: data for end, data in parts.items()})
+        done.written.append(
+            Written(one.certificate, one.serial, one.run, paths["pdf"], paths["xml"], paths.get("xml.sig"))
+        )
+    return done
+
+
+def _write(parts: dict[Path, bytes]) -> None:
+    for path, data in parts.items():
+        files.publish(path, data, WHERE, "give another folder with --output")
+
+
+def _chosen(archive: Archive, names: Sequence[str]) -> tuple[list[tuple[Calibration, list[Calibration]]], Issued]:
+    ledger, done = Ledger(archive), Issued()
+    chosen: dict[str, tuple[Calibration, list[Calibration]]] = {}
+    for name in names:
+        serial, _, number = name.rpartition("/") if "/" in name else (name, "", "")
+        known = ledger.calibrations(serial)
+        if known:
+            one = _of_unit(serial, known, number)
+            chosen[one.certificate] = one, known
+        elif number or name in _units(archive):
+            raise WrongUse(f"certificate: unit {serial} has no certificate, one is needed; {_why(archive, serial)}")
+        else:
+            chosen |= _of_run(ledger, archive.run(name), done)
+    return list(chosen.values()), done
+
+
+def _of_unit(serial: str, known: list[Calibration], number: str) -> Calibration:
+    """The certificate of a unit with a number; without one the last that was not ended, else the last."""
+    if number:
+        meant = [one for one in known if str(one.event.sequence) == number]
+        if not meant:
+            there = ", ".join(one.certificate for one in known)
+            raise WrongUse(f"certificate: {serial}/{number} is not in the ledger, there are {there}; give one of them")
+        return meant[0]
+    return next((one for one in reversed(known) if one.state == "valid"), known[-1])
+
+
+def _of_run(ledger: Ledger, run: Run, done: Issued) -> dict[str, tuple[Calibration, list[Calibration]]]:
+    """The last certificate of every unit of a run; the units that have none are left out with the reason."""
+    reasons = _reasons(run)
+    certificates: dict[str, tuple[Calibration, list[Calibration]]] = {}
+    for serial, reason in reasons.items():
+        known = ledger.calibrations(serial)
+        own = [one for one in known if one.run == run.id and one.state != "revoked"]
+        if own:
+            certificates[own[-1].certificate] = own[-1], known
+        else:
+            done.left_out[serial] = reason or f"passed and not certified; certify it with 'tumbleline certify {run.id}'"
+    if not certificates:
+        listed = "; ".join(f"{serial}: {why}" for serial, why in done.left_out.items()) or "it has no grades"
+        raise WrongUse(f"certificate: no unit of run {run.id} has a certificate, one is needed ({listed})")
+    return certificates
+
+
+def _reasons(run: Run) -> dict[str, str]:
+    """Why each unit of a run cannot be certified; empty for one that passed."""
+    rows = rows_of(run.table("grades")) if "grades" in run.tables() else []
+    return {
+        str(row["unit"]): "" if row["outcome"] == "pass" else f"{row['outcome']}, no certificate: {row['reasons']}"
+        for row in rows
+    }
+
+
+def _units(archive: Archive) -> set[str]:
+    return {serial for info in archive.runs() for serial in info.units}
+
+
+def _why(archive: Archive, serial: str) -> str:
+    """Why a unit has no certificate, by the last run that graded it."""
+    for info in reversed([one for one in archive.runs() if serial in one.units]):
+        run = Run(archive, info.id)
+        reason = _reasons(run).get(serial)
+        if reason is not None:
+            return (
+                f"run {run.id}: {reason}"
+                if reason
+                else f"it passed: certify it with 'tumbleline certify {run.id}' first"
+            )
+    return "see 'tumbleline list'"

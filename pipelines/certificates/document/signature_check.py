@@ -1,0 +1,189 @@
+"""Signatures of a certificate's files, checked from the file alone, and the XML that they cover."""
+
+from __future__ import annotations
+
+import base64
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509 import Certificate, load_der_x509_certificate
+
+from pipelines.certificates.document.signers import EXTRA, WHERE, Signer
+from schemas.errors import DataRejected
+from schemas.library import library
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ATTACHMENT = "certificate.xml"
+DSIG = "http://www.w3.org/2000/09/xmldsig#"
+NUMBERS = "{https://ptb.de/si}*"
+MOST_NAMES, LONGEST_NUMBER = 1000, 1000
+DEEPEST = 20  # levels of the tree of attachments
+
+
+class SignatureBroken(DataRejected):
+    """A signature that does not hold, or a file that cannot be read as what it says it is."""
+
+
+def parsed(data: bytes) -> Any:
+    """The root element of an XML document, without a network, entities or a document type.
+
+    Raises
+    ------
+    SignatureBroken
+        It is not such a document.
+    """
+    etree = library("lxml.etree", "pdf", WHERE)
+    try:
+        root = etree.fromstring(data, etree.XMLParser(no_network=True, resolve_entities=False, huge_tree=False))
+    except etree.XMLSyntaxError as problem:
+        raise SignatureBroken(f"it is not well-formed XML ({problem})") from None
+    if root.getroottree().docinfo.doctype:
+        raise SignatureBroken("it has a document type declaration, which a certificate does not need")
+    _refuse_slow(data, root)
+    return root
+
+
+def _refuse_slow(data: bytes, root: Any) -> None:
+    """Refuse what canonical form and schema take the square of its size for, and no certificate has."""
+    spaces = data.count(b"xmlns")
+    if spaces > MOST_NAMES:
+        raise SignatureBroken(f"it declares {spaces} namespaces, a certificate has at most {MOST_NAMES}")
+    for one in root.iter(NUMBERS):
+        if one.text is not None and len(one.text) > LONGEST_NUMBER:
+            name = one.tag.rpartition("}")[2]
+            raise SignatureBroken(f"{name} has {len(one.text)} characters, a number has at most {LONGEST_NUMBER}")
+    for one in root.iter():
+        if len(one.attrib) > MOST_NAMES:
+            raise SignatureBroken(
+                f"an element has {len(one.attrib)} attributes, one of a certificate at most {MOST_NAMES}"
+            )
+
+
+def canonical(root: Any) -> bytes:
+    """An element in exclusive canonical form: equal for documents that say the same."""
+    etree = library("lxml.etree", "pdf", WHERE)
+    try:
+        return etree.tostring(root, method="c14n", exclusive=True)
+    except etree.C14NError as problem:
+        raise SignatureBroken(
+            f"it has no canonical form ({problem}): a namespace in it is not an absolute address"
+        ) from None
+
+
+def xml_signature(data: bytes) -> tuple[Signer, Any]:
+    """The signer of an enveloping XML signature, and the root element of the document that the signature covers.
+
+    Only what the signature returns is used: a second document beside the signed one is not looked at.
+
+    Raises
+    ------
+    SignatureBroken
+        The signature does not hold, names no certificate, or covers no document.
+    """
+    signxml = library("signxml", EXTRA, WHERE)
+    root = parsed(data)
+    if root.tag != f"{{{DSIG}}}Signature":
+        raise SignatureBroken("it is not an XML signature")
+    try:
+        named = [
+            load_der_x509_certificate(base64.b64decode(one.text or ""))
+            for one in root.iterfind(f"{{{DSIG}}}KeyInfo/{{{DSIG}}}X509Data/{{{DSIG}}}X509Certificate")
+        ]
+    except ValueError as problem:
+        raise SignatureBroken(f"the certificate in the signature cannot be read ({problem})") from None
+    if not named:
+        raise SignatureBroken("the signature names no certificate of its signer")
+    pem = named[0].public_bytes(Encoding.PEM).decode()
+    # whether the certificate is valid today is decided with whom to trust, for XML and PDF alike
+    expected = signxml.SignatureConfiguration(
+        location="./", require_x509=True, verification_time=named[0].not_valid_after_utc
+    )
+    try:
+        good = signxml.XMLVerifier().verify(root, x509_cert=pem, expect_config=expected)
+    except MemoryError:  # of this machine: no verdict on the file
+        raise
+    except Exception as problem:  # noqa: BLE001 - a file of others may break any part of the reader
+        raise SignatureBroken(f"the signature does not hold: {_line(problem)}") from None
+    inside = [] if good.signed_xml is None else list(good.signed_xml)
+    if len(inside) != 1:
+        raise SignatureBroken(f"the signature covers {len(inside)} documents, one is needed")
+    return Signer(named[0], tuple(named[1:]), None), parsed(canonical(inside[0]))
+
+
+def attachments(data: bytes) -> list[bytes]:
+    """The attachments of a PDF that have the name of a certificate's XML.
+
+    Raises
+    ------
+    SignatureBroken
+        It cannot be read as a PDF.
+    """
+    reader = library("pyhanko.pdf_utils.reader", EXTRA, WHERE)
+    try:
+        document = reader.PdfFileReader(BytesIO(data))
+        names = document.root.get("/Names", {}).get("/EmbeddedFiles", {})
+        return [spec["/EF"]["/F"].data for name, spec in _named(names, DEEPEST) if name == ATTACHMENT]
+    except MemoryError:  # of this machine: no verdict on the file
+        raise
+    except Exception as problem:  # noqa: BLE001 - the same
+        raise SignatureBroken(f"it cannot be read as a PDF ({_line(problem)})") from None
+
+
+def _named(tree: Any, levels: int) -> Iterator[tuple[str, Any]]:
+    """Names and values of a name tree (ISO 32000-1, 7.9.6)."""
+    own = tree.get("/Names", [])
+    for index in range(0, len(own) - 1, 2):
+        yield str(own[index]), own[index + 1]
+    for child in tree.get("/Kids", []) if levels else []:
+        yield from _named(child, levels - 1)
+
+
+def pdf_signers(data: bytes) -> list[Signer]:
+    """The signers of a PDF in order; empty for one without a signature.
+
+    Raises
+    ------
+    SignatureBroken
+        A signature does not hold, or something other than a further signature was added after it.
+    """
+    reader = library("pyhanko.pdf_utils.reader", EXTRA, WHERE)
+    try:
+        embedded = reader.PdfFileReader(BytesIO(data)).embedded_regular_signatures
+        return [_pdf_signer(one) for one in embedded]
+    except SignatureBroken:
+        raise
+    except MemoryError:  # of this machine: no verdict on the file
+        raise
+    except Exception as problem:  # noqa: BLE001 - the same
+        raise SignatureBroken(f"the signature of the PDF cannot be read ({_line(problem)})") from None
+
+
+def _pdf_signer(embedded: Any) -> Signer:
+    validation = library("pyhanko.sign.validation", EXTRA, WHERE)
+    levels = library("pyhanko.sign.diff_analysis", EXTRA, WHERE).ModificationLevel
+    context = library("pyhanko_certvalidator", EXTRA, WHERE).ValidationContext(
+        trust_roots=[embedded.signer_cert], allow_fetching=False
+    )  # who is trusted is decided apart: here the signature is checked against its own certificate
+    status = validation.validate_pdf_signature(embedded, context)
+    name = embedded.field_name
+    if not status.intact:
+        raise SignatureBroken(f"signature {name}: the signed bytes were changed after signing")
+    if not status.valid:
+        raise SignatureBroken(f"signature {name} is not of the key whose certificate it names")
+    whole = status.coverage is validation.SignatureCoverageLevel.ENTIRE_FILE
+    level = None if whole else status.modification_level
+    if not whole and (level is None or level is levels.OTHER or level is levels.ANNOTATIONS or not status.docmdp_ok):
+        raise SignatureBroken(f"signature {name} does not cover the whole file: something was added after signing")
+    chain = tuple(_certificate(one) for one in embedded.other_embedded_certs)
+    return Signer(_certificate(embedded.signer_cert), chain, status.signer_reported_dt)
+
+
+def _certificate(one: Any) -> Certificate:
+    return load_der_x509_certificate(one.dump())
+
+
+def _line(problem: Exception) -> str:
+    return " ".join((str(problem) or type(problem).__name__).split())[:200]

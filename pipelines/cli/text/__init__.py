@@ -1,0 +1,1 @@
+"""What commands print, from their documents."""

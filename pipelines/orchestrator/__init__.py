@@ -1,0 +1,1 @@
+"""The orchestrator around the flows: server, database, worker, queue rules, heartbeat, policy."""

@@ -1,0 +1,161 @@
+"""Flow runs that the orchestrator lists as running although their process has ended."""
+
+from __future__ import annotations
+
+import os
+from datetime import timedelta
+from pathlib import Path
+from time import monotonic, sleep
+from typing import TYPE_CHECKING
+
+from prefect.client.orchestration import SyncPrefectClient, get_client
+from prefect.client.schemas.filters import (
+    FlowRunFilter,
+    FlowRunFilterName,
+    FlowRunFilterState,
+    FlowRunFilterStateType,
+    WorkPoolFilter,
+    WorkPoolFilterName,
+    WorkQueueFilter,
+    WorkQueueFilterName,
+)
+from prefect.client.schemas.objects import StateType
+from prefect.client.schemas.sorting import FlowRunSort
+from prefect.states import Crashed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from uuid import UUID
+
+    from prefect.client.schemas.objects import FlowRun
+
+PROCESSES = Path("/proc")
+OF_KERNEL = 0x00200000
+"""Flag of a thread of the kernel (PF_KTHREAD of Linux), which never has an environment."""
+
+STARTED_WITHIN = timedelta(seconds=1)
+"""Longest time for which a process that is being started may have no environment yet."""
+
+MANY = 200  # largest page of the server
+WORKING = (StateType.PENDING, StateType.RUNNING, StateType.CANCELLING)
+LOST_S = 60.0
+"""Longest time from the moment at which a worker takes a run to the start of its process, s, with a large margin."""
+
+SUSPENDED = "Suspended"  # such a run has no process and gets a new one when it is resumed
+WORKER = "prefect.worker.name"
+"""Label that the worker of Prefect gives to the runs that it takes."""
+
+GONE = "its process has ended: it was killed, or its worker ended; give the same order again to continue"
+
+
+def close_dead_runs(name: str) -> None:
+    """Mark flow runs of a name as crashed whose process was killed and which the orchestrator still lists as running."""
+    message = "its process was killed; another flow run of this name continues its work"
+    flow_filter = FlowRunFilter(name=FlowRunFilterName(any_=[name]))
+    with get_client(sync_client=True) as client:
+        flow_runs = client.read_flow_runs(flow_run_filter=flow_filter, sort=FlowRunSort.START_TIME_DESC, limit=MANY)
+        for run in flow_runs:
+            if run.state_type == StateType.RUNNING:
+                client.set_flow_run_state(run.id, Crashed(message=message), force=True)
+
+
+def close_dead_runs_of_queue(pool: str, queue: str, worker: str = "") -> list[str]:
+    """Mark the runs of a station's queue as crashed that began and have no process; return their names.
+
+    A run that another worker took is left alone, as its process may live on another computer: the server closes it when its
+    heartbeat stops (:mod:`pipelines.orchestrator.heartbeat`).
+    """
+    with get_client(sync_client=True) as client:
+        dead = _without_process(client, pool, queue, worker)
+        for run in dead:
+            client.set_flow_run_state(run.id, Crashed(message=GONE), force=True)
+    return [run.name for run in dead]
+
+
+def _without_process(client: SyncPrefectClient, pool: str, queue: str, worker: str) -> list[FlowRun]:
+    """Runs in progress that no other worker took and that have no process on this computer."""
+    return [
+        run
+        for run in runs_of_queue(client, pool, queue, (*WORKING, StateType.PAUSED))
+        if not (worker and run.labels.get(WORKER, worker) != worker)
+        and not (run.state and run.state.name == SUSPENDED)
+        and not lives(run)
+    ]
+
+
+class LostRuns:
+    """Runs of a station's queue whose process ended while the server could not be told, while their worker goes on.
+
+    Such a run never begins or ends by itself, and the queue gives out no other one: a run that had not begun yet has no heartbeat
+    that could stop. A worker that has just taken a run has no process for it either, so a run is closed when that was so for
+    ``LOST_S`` in one state. The time is that of this computer since its start: whether its clock is right does not matter.
+    """
+
+    def __init__(self, pool: str, queue: str, worker: str) -> None:
+        self._where = (pool, queue, worker)
+        self._since: dict[tuple[UUID, UUID | None], float] = {}
+
+    def close(self, client: SyncPrefectClient, now: float) -> list[str]:
+        """Mark the lost runs as crashed; return their names.
+
+        Parameters
+        ----------
+        now : s, of a clock that only counts on
+        """
+        lost = {(run.id, run.state_id): run for run in _without_process(client, *self._where)}
+        self._since = {key: self._since.get(key, now) for key in lost}
+        closed: list[str] = []
+        for key, run in lost.items():
+            # a process that has ended changes no state after this look
+            if now - self._since[key] >= LOST_S and client.read_flow_run(run.id).state_id == run.state_id:
+                client.set_flow_run_state(run.id, Crashed(message=GONE), force=True)
+                closed.append(run.name)
+        return closed
+
+
+def runs_of_queue(
+    client: SyncPrefectClient,
+    pool: str,
+    queue: str,
+    states: Sequence[StateType],
+    sort: FlowRunSort = FlowRunSort.EXPECTED_START_TIME_ASC,
+) -> list[FlowRun]:
+    """Flow runs of a work queue in one of the states, in the order of their start."""
+    return client.read_flow_runs(
+        flow_run_filter=FlowRunFilter(state=FlowRunFilterState(type=FlowRunFilterStateType(any_=list(states)))),
+        work_pool_filter=WorkPoolFilter(name=WorkPoolFilterName(any_=[pool])),
+        work_queue_filter=WorkQueueFilter(name=WorkQueueFilterName(any_=[queue])),
+        sort=sort,
+        limit=MANY,
+    )
+
+
+def lives(run: FlowRun) -> bool:
+    """Whether a process of this computer still works on a run; its number alone may belong to a newer process.
+
+    Where the number is not known, since the server was away when the process started, every process is looked at.
+    """
+    pid = run.infrastructure_pid
+    if pid and not pid.isdecimal():
+        return False
+    places = [PROCESSES / pid] if pid else [place for place in PROCESSES.glob("[0-9]*") if place.name.isdecimal()]
+    mark = f"PREFECT__FLOW_RUN_ID={run.id}".encode()
+    return any(mark in _environment(place).split(b"\0") for place in places if int(place.name) != os.getpid())
+
+
+def _environment(process: Path) -> bytes:
+    """Environment of a process as ``/proc`` tells it; empty where the process has ended.
+
+    A process that is just being started has none for a moment: it is asked again until it has, for at most ``STARTED_WITHIN``.
+    """
+    until = monotonic() + STARTED_WITHIN.total_seconds()
+    try:
+        while not (environment := (process / "environ").read_bytes()):
+            # state and flags follow the name, which may hold brackets itself; Z: ended, and not yet collected by its parent
+            state, *_, flags = (process / "stat").read_text(errors="replace").rpartition(")")[2].split()[:7]
+            if state in "ZX" or int(flags) & OF_KERNEL or monotonic() > until:
+                break
+            sleep(0.01)
+    except OSError:
+        return b""
+    return environment

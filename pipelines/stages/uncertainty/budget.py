@@ -1,0 +1,121 @@
+"""The uncertainty budget of every unit: contributions to coefficients, corrected output and verification, and their sum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from inertial.fits.wander import wander_kernels
+from inertial.frames import angles_from_force
+from inertial.uncertainty.influences import MeasurementModel, sensitivity
+from inertial.uncertainty.propagation import fit_design, propagated
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+from pipelines.stages.uncertainty.contributions import DwellConditions, influences, sources
+from pipelines.stages.uncertainty.measurands import VarianceParts, quantities_of
+from pipelines.stages.uncertainty.tables import covariance_rows, empty, rows_of_quantities
+from pipelines.tables.calibration import Calibration
+from schemas.units import MICRO
+from schemas.validity import Stability
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.tables.dwells import LotArrays
+
+    Array = NDArray[np.float64]
+
+
+def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
+    """Tables ``budget``, ``uncertainties`` and ``budget_covariance``; without rows where no uncertainty is stated.
+
+    ``budget`` has one row per unit, quantity and contribution, ``uncertainties`` one per unit and quantity: value, u of type A
+    and B, effective degrees of freedom, k and U, and for verification the part that the station's own verification shows.
+    """
+    if terms.stated is None or tables.coefficients.empty:
+        return empty()
+    lot, calibration, variances = lot_variances(tables, terms)
+    quantities = list(quantities_of(lot, calibration, tables, terms, variances))
+    known = sources(terms.stated)
+    return {
+        **rows_of_quantities(calibration.units, quantities, variances, terms, known),
+        "budget_covariance": covariance_rows(calibration.units, variances.fit.covariance()),
+    }
+
+
+def lot_variances(tables: BudgetTables, terms: BudgetTerms) -> tuple[LotArrays, Calibration, VarianceParts]:
+    """The dwells of a lot with the angles of the table, its calibration, and the influences through its fit."""
+    lot = tables.arrays()
+    if lot.state.outer is None:  # faces or forces that are known otherwise: as a table would have turned to them
+        outer, inner = angles_from_force(lot.state.force)
+        lot = replace(lot, state=replace(lot.state, outer=outer, inner=inner, memory={}))
+    calibration = tables.calibrated()
+    at = conditions(lot, tables.dwells, calibration.response, terms)
+    return lot, calibration, propagate(lot, calibration, tables.wander, terms, at)
+
+
+def conditions(lot: LotArrays, dwells: pd.DataFrame, response: Array, terms: BudgetTerms) -> DwellConditions:
+    """The dwells of a lot on which the influences act."""
+    soak = np.zeros(lot.dwells.size, dtype=np.int64)
+    if "soak" in dwells:
+        own = np.flatnonzero(dwells["unit"].to_numpy(dtype=object) == lot.units[0])
+        own = own[np.argsort(dwells["dwell"].to_numpy()[own], kind="stable")]
+        rows = own[np.searchsorted(dwells["dwell"].to_numpy()[own], lot.dwells)]
+        soak = dwells["soak"].to_numpy()[rows].astype(np.int64)
+    read = lot.state.temperature if lot.state.temperature is not None else np.full(lot.dwells.size, terms.room_C)
+    mean = np.broadcast_to(read, (len(lot.units), lot.dwells.size)).mean(axis=0)
+    target = np.array([mean[soak == one].mean() for one in soak])
+    scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1)).reshape(-1, 3).mean(axis=0)
+    return DwellConditions(lot.state, soak, target, terms.soak_min_s, terms.room_C, scale)
+
+
+def propagate(
+    lot: LotArrays, calibration: Calibration, wander: pd.DataFrame, terms: BudgetTerms, at: DwellConditions
+) -> VarianceParts:
+    """The influences through the fit of a lot."""
+    if terms.stated is None:
+        raise ValueError("no uncertainty is stated")
+    used = lot.of_kind("dwell")
+    model = MeasurementModel(calibration.effects, calibration.coefficients, calibration.nonlinear)
+    physical = with_device_temperature(model, calibration.response, terms.stability)
+    own, scattered = influences(terms.stated, at, terms.stability)
+    whole = sensitivity(physical, lot.state, own, scattered)
+    design = fit_design(model, lot.state, dwell_noise(lot, wander, used), used)
+    fitted = replace(whole, changes=whole.changes[..., used, :, :])
+    fit = propagated(design, fitted, calibration.response)
+    return VarianceParts(
+        fit=fit,
+        verification=whole.changes[..., ~used, :, :],
+        visible_share=lambda: design.visible_share(fitted.changes, fit.coefficients),
+    )
+
+
+def with_device_temperature(model: MeasurementModel, response: Array, stability: Stability | None) -> MeasurementModel:
+    """The model with the stated temperature coefficients of the device, for those that the model lacks."""
+    if stability is None:
+        return model
+    effects, coefficients = list(model.effects), model.coefficients
+    for effect, value in (
+        ("bias_temperature", stability.bias_temperature_ug_K),
+        ("scale_temperature", stability.scale_temperature_ppm_K),
+    ):
+        if effect not in effects and value > 0.0:
+            own = value / MICRO * np.abs(np.diagonal(response, axis1=-2, axis2=-1))[..., None]
+            coefficients = np.concatenate([coefficients, own], axis=-1)
+            effects.append(effect)
+    return MeasurementModel(effects, coefficients, model.nonlinear)
+
+
+def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: NDArray[np.bool_]) -> Array:
+    """Covariance (n, n) of the noise of the fit's dwells as the fit weighed them; its scale is arbitrary."""
+    error = np.broadcast_to(lot.standard_error, lot.output.shape)[:, used]
+    profile = np.sqrt(np.mean(error**2 / np.mean(error**2, axis=1, keepdims=True), axis=(0, 2)))
+    white, flicker, walk = (
+        float(np.mean(np.asarray(wander[name], dtype=float) ** 2)) for name in ("white_ug", "flicker_ug", "walk_ug")
+    )
+    time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0]
+    kernels = [kernel[np.ix_(used, used)] for kernel in wander_kernels(time)]
+    total = np.diag(profile**2) * (white if white > 0.0 else 1.0) + flicker * kernels[0] + walk * kernels[1]
+    return total / np.mean(np.diagonal(total))

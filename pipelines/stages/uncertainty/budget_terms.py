@@ -1,0 +1,118 @@
+"""Inputs of a budget: the tables of a run, and the statements of station, device and certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pipelines.stages.reduce import FollowedSupply
+from pipelines.stages.uncertainty.contributions import merged
+from pipelines.tables.calibration import Calibration, read_calibration
+from pipelines.tables.dwells import LotTables
+from schemas.validity import CertificateTerms, Stability
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+    from pipelines.tables.dwells import LotArrays
+    from schemas.recipe import Recipe
+    from schemas.reference import Reference
+    from schemas.uncertainty import Uncertainty
+
+
+@dataclass(frozen=True)
+class BudgetTables:
+    """The tables that a budget is computed from.
+
+    lot, calibration : dwells with their history, and coefficients, where other stages have converted them already
+    """
+
+    dwells: pd.DataFrame
+    history: pd.DataFrame | None
+    coefficients: pd.DataFrame
+    covariance: pd.DataFrame
+    wander: pd.DataFrame
+    verification: pd.DataFrame
+    verification_poses: pd.DataFrame
+    noise: pd.DataFrame
+    lot: LotTables | None = None
+    calibration: Calibration | None = None
+
+    def arrays(self) -> LotArrays:
+        """The dwells of fit and verification."""
+        return (self.lot or LotTables(self.dwells, self.history)).fitted_kinds
+
+    def calibrated(self) -> Calibration:
+        """The coefficients with their covariance."""
+        return self.calibration or read_calibration(self.coefficients, self.covariance)
+
+
+@dataclass(frozen=True)
+class BudgetTerms:
+    """The statements of station, device and certificate; JSON-able, part of the stage's key.
+
+    stated : ``[uncertainty]`` of station and recipe together; None: noise only
+    """
+
+    stated: Uncertainty | None
+    stability: Stability | None
+    certificate: CertificateTerms
+    references: tuple[Reference, ...]
+    soak_min_s: float
+    dwell_s: float
+    room_C: float
+
+    @property
+    def follows(self) -> FollowedSupply | None:
+        """How the outputs follow a supply that is measured; None where it is not measured, or they do not follow it.
+
+        None as well for runs of earlier versions, which state no nominal supply and are as they were read.
+        """
+        own = self.stability
+        supply = None if self.stated is None else self.stated.supply
+        if own is None or own.supply_V is None or supply is None or not supply.ratio_measured or own.ratiometric == 0.0:
+            return None
+        return FollowedSupply(own.supply_V, own.ratiometric)
+
+    @property
+    def reads_own_temperature(self) -> bool:
+        """Whether fit and user read the same thermometer of the device, so that its errors are in the coefficients alike."""
+        entry = None if self.stated is None else self.stated.thermometer
+        user = self.stability is None or self.stability.temperature_of == "device"
+        return entry is not None and entry.measures == "device" and user
+
+    def document(self) -> dict[str, Any]:
+        """As JSON values."""
+        if self.stated is None:
+            return {"uncertainty": None}
+        return {
+            "uncertainty": self.stated.model_dump(mode="json"),
+            "stability": None if self.stability is None else self.stability.model_dump(mode="json"),
+            "certificate": self.certificate.model_dump(mode="json"),
+            "reference": [one.model_dump(mode="json") for one in self.references],
+            "soak_min_s": self.soak_min_s,
+            "dwell_s": self.dwell_s,
+            "room_C": self.room_C,
+        }
+
+
+def terms_of(
+    recipe: Recipe, station: Uncertainty | None, references: Sequence[Reference], room_c: float, months: int
+) -> BudgetTerms:
+    """The statements of a recipe on a station.
+
+    Parameters
+    ----------
+    months : period of validity where the recipe states no certificate
+    """
+    return BudgetTerms(
+        stated=merged(station, recipe.uncertainty),
+        stability=recipe.stability,
+        certificate=recipe.certificate or CertificateTerms(validity_months=months),
+        references=tuple(references),
+        soak_min_s=recipe.soak_min_s,
+        dwell_s=recipe.dwell_s,
+        room_C=room_c,
+    )

@@ -1,0 +1,84 @@
+"""The uncertainty budget of a lot as far as decisions read it, without its tables: quantities are computed when they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipelines.stages.figures.base import BudgetRow
+from pipelines.stages.uncertainty.budget import lot_variances
+from pipelines.stages.uncertainty.measurands import PARTS, part_of
+from pipelines.stages.uncertainty.tables import combined, groups_of
+from pipelines.tables.calibration import symmetric
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+
+    Array = NDArray[np.float64]
+
+Key = tuple[str, str]
+"""Name and axis of a quantity."""
+
+
+class DecisionBudget:
+    """The quantities of a budget by unit, with the numbers of the table ``uncertainties``.
+
+    covariance : (units, 3p, 3p), of the coefficients by the budget, output unit²
+
+    Parameters
+    ----------
+    tables, terms : those of the budget; a statement is needed, and at least one unit that was fitted
+    """
+
+    def __init__(self, tables: BudgetTables, terms: BudgetTerms) -> None:
+        self._tables, self._terms = tables, terms
+        self._lot, self._calibration, self._variances = lot_variances(tables, terms)
+        self._places = {unit: place for place, unit in enumerate(self._calibration.units)}
+        self._groups = groups_of(self._variances)
+        self._known: dict[str, dict[Key, list[BudgetRow]]] = {}
+        whole = symmetric(self._variances.fit.covariance())
+        self.covariance: Array = np.broadcast_to(whole, (len(self._places), *whole.shape[-2:]))
+
+    def of(self, unit: str) -> Mapping[Key, BudgetRow]:
+        """The quantities of a unit by name and axis; none for an unknown unit."""
+        place = self._places.get(unit)
+        return {} if place is None else _UnitBudget(self, place)
+
+    def rows(self, name: str) -> Mapping[Key, list[BudgetRow]]:
+        """The quantities of the part of the budget with a name, for every unit in order; none for an unknown name."""
+        part = PARTS.get(name, "")
+        if part and part not in self._known:
+            own = part_of(
+                part, self._lot, self._calibration, self._tables, self._terms, self._variances, decisions=True
+            )
+            self._known[part] = {}
+            for one in own:
+                noise, stated, whole = combined(one, self._groups)
+                columns = (np.asarray(values, dtype=float).tolist() for values in (one.value, noise, stated, whole))
+                self._known[part][one.name, one.axis] = [BudgetRow(*row) for row in zip(*columns, strict=True)]
+        return self._known.get(part, {})
+
+
+class _UnitBudget(Mapping[Key, BudgetRow]):
+    """The quantities of the unit at a place of the lot."""
+
+    def __init__(self, lot: DecisionBudget, place: int) -> None:
+        self._lot, self._place = lot, place
+
+    def __getitem__(self, key: Key) -> BudgetRow:
+        return self._lot.rows(key[0])[key][self._place]
+
+    def __iter__(self) -> Iterator[Key]:
+        return iter(dict.fromkeys(key for name in PARTS for key in self._lot.rows(name)))
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+
+def decision_budget(tables: BudgetTables, terms: BudgetTerms) -> DecisionBudget | None:
+    """The budget of a lot for decisions; None where no uncertainty is stated, or no unit was fitted."""
+    return None if terms.stated is None or tables.coefficients.empty else DecisionBudget(tables, terms)

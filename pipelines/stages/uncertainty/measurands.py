@@ -1,0 +1,338 @@
+"""The quantities of a budget: coefficients, angles between axes, corrected output, verification, the error over the period."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import design
+from inertial.frames import angles_from_force
+from inertial.state import State
+from inertial.uncertainty.propagation import norm_errors, rms_over
+from pipelines.stages.uncertainty.period import Period, period_of
+from pipelines.tables.frames import ByUnit
+from schemas.units import AXES, MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from inertial.uncertainty.propagation import Propagated
+    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+    from pipelines.tables.calibration import Calibration
+    from pipelines.tables.dwells import LotArrays
+
+    Array = NDArray[np.float64]
+
+EFFECTS = {
+    "bias": "µg",
+    "scale": "ppm",
+    "misalignment": "µrad",
+    "bias_temperature": "µg/K",
+    "scale_temperature": "ppm/K",
+}
+"""Effects whose coefficients have a budget of their own, relative to the scale of their axis."""
+PARTS = {
+    **dict.fromkeys(EFFECTS, "coefficients"),
+    "orthogonality": "angles",
+    "output": "outputs",
+    **dict.fromkeys(("bias_error", "verification_norm", "bias_error_period"), "verification"),
+}
+"""The part of the budget that every quantity is computed in."""
+UNSEEN = 0.1
+"""Visible share below which the residuals of a fit show nothing of an influence."""
+
+
+@dataclass(frozen=True)
+class VarianceParts:
+    """Influences through a fit, with the part that a verification on the same station shows.
+
+    verification : (..., m, 3, q), J·u at the dwells for verification; visible_share : of :attr:`visible`
+    """
+
+    fit: Propagated
+    verification: Array
+    visible_share: Callable[[], Array]
+
+    @cached_property
+    def visible(self) -> Array:
+        """Visible share of every influence, (q,)."""
+        return self.visible_share()
+
+
+@dataclass(frozen=True)
+class BudgetQuantity:
+    """A quantity of every unit of a lot with the error that each influence makes of it.
+
+    value, noise : (units,), in ``unit``; noise is the standard uncertainty of type A
+    parts : (units, q), errors per standard uncertainty; for RMS figures their RMS
+    shown, unseen : (units,), the part of the budget that the station's own verification shows, and the part that it cannot; None
+    where there is
+        none
+    extra : contributions beyond the run by name, (units,) each; dof_noise : (units,)
+    """
+
+    name: str
+    axis: str
+    unit: str
+    value: Array
+    noise: Array
+    parts: Array
+    dof_noise: Array
+    shown: Array | None = None
+    unseen: Array | None = None
+    extra: dict[str, Array] = field(default_factory=dict[str, "Array"])
+
+
+def quantities_of(
+    lot: LotArrays, calibration: Calibration, tables: BudgetTables, terms: BudgetTerms, variances: VarianceParts
+) -> Iterator[BudgetQuantity]:
+    """Every quantity of a budget."""
+    for part in dict.fromkeys(PARTS.values()):
+        yield from part_of(part, lot, calibration, tables, terms, variances)
+
+
+def part_of(
+    part: str,
+    lot: LotArrays,
+    calibration: Calibration,
+    tables: BudgetTables,
+    terms: BudgetTerms,
+    variances: VarianceParts,
+    *,
+    decisions: bool = False,
+) -> Iterator[BudgetQuantity]:
+    """The quantities of one part of a budget, a value of :data:`PARTS`.
+
+    Parameters
+    ----------
+    decisions : whether the parts that a verification shows are left out where no decision depends on them
+    """
+    dof = np.full(len(lot.units), float(np.sum(np.asarray(tables.wander["dof"], dtype=float))))
+    scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))
+    if part == "coefficients":
+        yield from _coefficients(calibration, variances, scale, dof)
+    elif part == "angles":
+        yield from _angles(calibration, variances, scale, dof)
+    elif part == "outputs":
+        yield from _outputs(lot, calibration, terms, variances, dof)
+    elif part == "verification" and len(tables.verification):
+        split = terms.stability is not None or not decisions  # the error over the period is made of the two parts
+        errors = list(_verification(lot, calibration, tables, terms, variances, dof, split=split))
+        yield from errors
+        yield from _period(errors, lot, tables, terms, dof)
+
+
+def _coefficients(
+    calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array
+) -> Iterator[BudgetQuantity]:
+    spread = np.sqrt(np.diagonal(calibration.covariance, axis1=-2, axis2=-1))
+    for effect, unit in EFFECTS.items():
+        for axis, letter in enumerate(AXES):
+            own = [k for k, (name, _) in enumerate(calibration.names[axis]) if name == effect]
+            for place, column in enumerate(own):
+                along = letter + _across(axis, place) if effect == "misalignment" else letter
+                factor = MICRO / scale[:, axis]
+                value = factor * calibration.coefficients[:, axis, column]
+                parts = factor[:, None] * variances.fit.coefficients[:, axis, column, :]
+                nominal = MICRO if effect == "scale" else 0.0
+                yield BudgetQuantity(effect, along, unit, value - nominal, factor * spread[:, axis, column], parts, dof)
+
+
+def _across(axis: int, place: int) -> str:
+    return AXES[(axis + 1 + place) % 3]
+
+
+def _angles(calibration: Calibration, variances: VarianceParts, scale: Array, dof: Array) -> Iterator[BudgetQuantity]:
+    """Deviation from 90° of the angle between two axes, (m_ij + m_ji): independent of the seat."""
+    if "misalignment" not in calibration.effects:
+        return
+    noise = calibration.covariance
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        columns = [k for k, (name, _) in enumerate(calibration.names[i]) if name == "misalignment"]
+        others = [k for k, (name, _) in enumerate(calibration.names[j]) if name == "misalignment"]
+        a = columns[(j - i - 1) % 3]
+        b = others[(i - j - 1) % 3]
+        fi, fj = MICRO / scale[:, i], MICRO / scale[:, j]
+        value = fi * calibration.coefficients[:, i, a] + fj * calibration.coefficients[:, j, b]
+        parts = fi[:, None] * variances.fit.coefficients[:, i, a] + fj[:, None] * variances.fit.coefficients[:, j, b]
+        u = np.sqrt((fi**2) * noise[:, i, a, a] + (fj**2) * noise[:, j, b, b])
+        yield BudgetQuantity("orthogonality", AXES[i] + AXES[j], "µrad", value, u, parts, dof)
+
+
+def _outputs(
+    lot: LotArrays, calibration: Calibration, terms: BudgetTerms, variances: VarianceParts, dof: Array
+) -> Iterator[BudgetQuantity]:
+    """Corrected output, worst force and temperature of the certified range."""
+    state = certified_range(lot, terms)
+    columns = design.local_columns(design.split(calibration.effects)[0], state, calibration.nonlinear)
+    errors = variances.fit.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    noise = output_noise(calibration, columns)
+    zero = np.zeros(len(lot.units))
+    for axis, letter in enumerate(AXES):
+        yield _worst("output", letter, errors[..., axis, :], noise[..., axis, axis], zero, dof)
+    along = state.force / np.linalg.norm(state.force, axis=-1, keepdims=True)
+    of_norm = np.einsum("mi,umij,mj->um", along, noise, along)
+    yield _worst("output", "norm", norm_errors(errors, state.force), of_norm, zero, dof)
+
+
+def output_noise(calibration: Calibration, columns: Array) -> Array:
+    """Covariance of the corrected output by the noise of the fit, (units, m, 3, 3), µg²."""
+    inverse = np.linalg.inv(calibration.response)
+    own = np.swapaxes(np.sum(np.matmul(columns, calibration.covariance) * columns, axis=-1), -1, -2)
+    return MICRO**2 * np.einsum("uij,umj,ukj->umik", inverse, own, inverse)
+
+
+def _worst(name: str, axis: str, errors: Array, variance: Array, value: Array, dof: Array) -> BudgetQuantity:
+    """The quantity at the condition where its variance is largest, by unit; errors (units, m, q), g, variance (units, m), µg²."""
+    errors = np.broadcast_to(errors, (value.size, *errors.shape[-2:]))
+    whole = MICRO**2 * np.einsum("umq,umq->um", errors, errors) + variance
+    where = np.argmax(whole, axis=-1)
+    rows = np.arange(value.size)
+    return BudgetQuantity(name, axis, "µg", value, np.sqrt(variance[rows, where]), MICRO * errors[rows, where], dof)
+
+
+def certified_range(lot: LotArrays, terms: BudgetTerms) -> State:
+    """Forces along faces, edges and corners of a cube at the ends and the middle of the temperatures."""
+    grid = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)])
+    low, high = terms.certificate.force_range_g or (-1.0, 1.0)
+    force = max(abs(low), abs(high)) * grid / np.linalg.norm(grid, axis=1, keepdims=True)
+    read = lot.state.temperature
+    given = terms.certificate.temperature_range_C
+    ends = given or ((float(np.min(read)), float(np.max(read))) if read is not None else (25.0, 25.0))
+    levels = np.unique([ends[0], 0.5 * (ends[0] + ends[1]), ends[1]])
+    many = np.tile(force, (levels.size, 1))
+    outer, inner = angles_from_force(many)
+
+    def usual(values: Array | None) -> Array | None:
+        return None if values is None else np.full(len(many), float(np.median(values)))
+
+    state = lot.state
+    return State(
+        force=many,
+        time=np.full(len(many), float(np.median(state.time))),
+        temperature=np.repeat(levels, len(force)),
+        chamber=np.repeat(levels, len(force)),
+        since_power=usual(state.since_power),
+        since_move=usual(state.since_move),
+        supply=usual(state.supply),
+        vibration=usual(state.vibration),
+        outer=outer,
+        inner=inner,
+        slot=np.zeros(()),
+        covariates={name: np.full(len(many), float(np.median(values))) for name, values in state.covariates.items()},
+    )
+
+
+def _verification(
+    lot: LotArrays,
+    calibration: Calibration,
+    tables: BudgetTables,
+    terms: BudgetTerms,
+    variances: VarianceParts,
+    dof: Array,
+    *,
+    split: bool,
+) -> Iterator[BudgetQuantity]:
+    """RMS error of each axis for the user, and the magnitude at its worst pose.
+
+    Parameters
+    ----------
+    split : whether the part that the station's own verification shows, and that which it cannot, are computed
+    """
+    unseen = lot.of_kind("verification")
+    columns = design.local_columns(design.split(calibration.effects)[0], lot.state, calibration.nonlinear)
+    columns = columns[..., unseen, :]
+    force = np.broadcast_to(lot.state.force, (*lot.output.shape[:1], *lot.state.force.shape[-2:]))[:, unseen]
+    intrinsic = terms.certificate.frame == "intrinsic"
+    true = MICRO * variances.fit.user_errors(columns, force, intrinsic=intrinsic)
+    shown = MICRO * variances.fit.shown_errors(columns, variances.verification) if split else None
+    hidden = variances.visible < UNSEEN if split else None
+    rows = tables.verification
+    for axis, letter in enumerate(AXES):
+        own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
+        noise = rows[f"rms_uncertainty_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)[:, 0]
+        parts = np.sqrt(np.mean(true[..., axis, :] ** 2, axis=-2))
+        yield BudgetQuantity(
+            "bias_error",
+            letter,
+            "µg",
+            np.sqrt(np.mean(own**2, axis=1)),
+            noise,
+            np.broadcast_to(parts, (len(lot.units), parts.shape[-1])),
+            dof,
+            shown=None if shown is None else _all(rms_over(shown[..., axis, :]), lot),
+            unseen=None if hidden is None else _all(rms_over(true[..., axis, :][..., hidden]), lot),
+        )
+    along = norm_errors(true / MICRO, force)
+    value, noise = _worst_pose(lot, tables)
+    worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
+    if shown is None or hidden is None:
+        yield worst
+        return
+    seen = norm_errors(shown / MICRO, force) * MICRO
+    yield replace(
+        worst,
+        shown=_all(np.sqrt(np.max(np.sum(seen**2, axis=-1), axis=-1)), lot),
+        unseen=_all(MICRO * np.sqrt(np.max(np.sum(along[..., hidden] ** 2, axis=-1), axis=-1)), lot),
+    )
+
+
+def _worst_pose(lot: LotArrays, tables: BudgetTables) -> tuple[Array, Array]:
+    """Magnitude of the largest error of a pose and its uncertainty by noise, of every unit, µg."""
+    rows = ByUnit(tables.verification_poses)
+    largest = np.zeros((2, len(lot.units)))
+    for place, unit in enumerate(lot.units):
+        own = rows.of(unit)
+        error, u = own["error_ug"], own["uncertainty_ug"]
+        worst = int(np.argmax(np.abs(error)))
+        largest[:, place] = abs(error[worst]), u[worst]
+    return largest[0], largest[1]
+
+
+def _all(values: Array, lot: LotArrays) -> Array:
+    return np.broadcast_to(values, (len(lot.units),)).copy()
+
+
+def _period(
+    errors: list[BudgetQuantity], lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, dof: Array
+) -> Iterator[BudgetQuantity]:
+    """RMS error over the period of validity of each axis; none if nothing is stated for the time after the run."""
+    used = lot.of_kind("dwell")
+    time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[:, used]
+    span = float(np.ptp(time[0])) + terms.dwell_s
+    for letter in AXES:
+        own = next(q for q in errors if q.name == "bias_error" and q.axis == letter)
+        periods: list[Period | None] = [period_of(tables, terms, unit, letter, span) for unit in lot.units]
+        whole = [one for one in periods if one is not None]
+        if len(whole) != len(lot.units):
+            return
+        variance = np.sum(own.parts**2, axis=-1)
+        shown, unseen = (np.zeros_like(variance) if part is None else part for part in (own.shown, own.unseen))
+        fixed = np.sqrt(np.maximum(variance - shown**2, unseen**2))
+        later = {name: np.array([one.parts[name] for one in whole]) for name in whole[0].parts}
+        ageing = later.get("ageing", np.zeros_like(fixed))
+        value = np.sqrt(own.value**2 + fixed**2 + np.sum([part**2 for part in later.values()], axis=0))
+        # of a square: that of the run by its own uncertainty, of what is fixed for a unit by its distribution
+        square = 4.0 * (own.value * own.noise) ** 2 + 2.0 * fixed**4 / _dimensions(own.parts) + 2.0 * ageing**4
+        noise = np.sqrt(square) / (2.0 * np.maximum(value, np.finfo(float).tiny))
+        yield BudgetQuantity(
+            "bias_error_period",
+            letter,
+            "µg",
+            value,
+            noise,
+            np.zeros((len(lot.units), 0)),
+            dof,
+            extra={"run": own.value, "budget": fixed, **later},
+        )
+
+
+def _dimensions(parts: Array) -> Array:
+    """Effective number of independent influences: (Σu²)²/Σu⁴."""
+    below = np.sum(parts**4, axis=-1)
+    return np.where(below > 0.0, np.sum(parts**2, axis=-1) ** 2 / np.where(below > 0.0, below, 1.0), 1.0)

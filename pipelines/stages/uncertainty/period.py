@@ -1,0 +1,92 @@
+"""Errors of a device after its run: flicker until the due date, switching on, ageing, for one unit and axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial.uncertainty.period import (
+    DAY_S,
+    MONTH_S,
+    YEAR_S,
+    Windows,
+    bounded_walk,
+    flicker_later,
+    flicker_within,
+    logarithmic,
+    walk_later,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+    from schemas.validity import Ageing
+
+RECTANGULAR = float(np.sqrt(3.0))
+
+
+@dataclass(frozen=True)
+class Period:
+    """Standard deviations of the contributions over the period to the error of the run, µg."""
+
+    parts: dict[str, float]
+
+
+def period_of(tables: BudgetTables, terms: BudgetTerms, unit: str, axis: str, span_s: float) -> Period | None:
+    """The contributions over the period; None where the device's stability is not stated, or not for so long.
+
+    Parameters
+    ----------
+    span_s : of the dwells of the fit
+    """
+    stability, months = terms.stability, terms.certificate.validity_months
+    gap = months * MONTH_S
+    if stability is None or gap > stability.horizon_days * DAY_S * 1.001:
+        return None
+    instability = instability_of(tables, unit, axis)
+    if not np.isfinite(instability):
+        return None
+    windows = Windows(span_s, terms.certificate.use_window_s or terms.dwell_s, gap)
+    later, within = (f(windows, stability.flicker_slowest_s) for f in (flicker_later, flicker_within))
+    parts = {
+        "flicker": instability * float(np.sqrt(max(later**2 - within**2, 0.0))),
+        "switch_on": stability.switch_on_ug,
+        "switch_on_scale": stability.switch_on_ppm / RECTANGULAR,  # RMS of the force along an axis is 1/√3 g
+    }
+    if stability.ageing is not None:
+        parts["ageing"] = ageing_u(stability.ageing, windows)
+    return Period({name: value for name, value in parts.items() if value > 0.0 or name == "flicker"})
+
+
+def ageing_u(ageing: Ageing, windows: Windows) -> float:
+    """Standard uncertainty by ageing, µg: a bound of a drift is rectangular (JCGM 100, 4.3.7)."""
+    gap = windows.gap
+    if ageing.form == "log":
+        return logarithmic(ageing.per_decade_ug or 0.0, gap) / RECTANGULAR
+    if ageing.form == "linear":
+        return (ageing.per_year_ug or 0.0) * gap / YEAR_S / RECTANGULAR
+    if ageing.form == "walk":
+        return (ageing.walk_ug_rtday or 0.0) / float(np.sqrt(DAY_S)) * walk_later(windows)
+    return bounded_walk(ageing.deviation_ug or 0.0, (ageing.correlation_days or 1.0) * DAY_S, gap)
+
+
+def instability_of(tables: BudgetTables, unit: str, axis: str) -> float:
+    """Bias instability B, µg: of the static record, its upper limit where it is not identified; without one that of the fit."""
+    rows = tables.noise
+    own = rows[(rows["unit"] == unit) & (rows["axis"] == axis) & (rows["term"] == "B")] if len(rows) else rows
+    if len(own):
+        first = own.iloc[0]
+        value = float(first["value"] if bool(first["identified"]) else first["high"])
+        if np.isfinite(value):
+            return value
+    return _of_fit(tables.wander, unit, axis)
+
+
+def _of_fit(wander: pd.DataFrame, unit: str, axis: str) -> float:
+    if "bias_instability_ug" not in wander:
+        return float("nan")
+    own = wander[(wander["unit"] == unit) & (wander["axis"] == axis)]
+    return float(own["bias_instability_ug"].iloc[0]) if len(own) else float("nan")

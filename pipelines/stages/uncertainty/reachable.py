@@ -1,0 +1,209 @@
+"""Uncertainty that a recipe can reach on its station, before it is measured, and its largest contributions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial import design
+from inertial.uncertainty.influences import MeasurementModel, sensitivity
+from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
+from inertial.uncertainty.propagation import fit_design, norm_errors, propagated, rms_over
+from pipelines.stages.uncertainty.budget import with_device_temperature
+from pipelines.stages.uncertainty.contributions import DwellConditions, influences
+from pipelines.stages.uncertainty.measurands import EFFECTS
+from pipelines.stages.uncertainty.period import ageing_u
+from schemas.decisions import GRADES
+from schemas.units import AXES, MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from inertial.state import State
+    from inertial.uncertainty.propagation import Propagated
+    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
+    from schemas.limits import Limits
+
+    Array = NDArray[np.float64]
+
+DAY_S = 86_400.0
+LEAST_SHARE = 0.01
+"""Smallest share of a contribution that a reason names."""
+FIGURES = {
+    "bias_error": ("bias_error_ug", 1.0),
+    "bias_error_period": ("bias_error_period_ug", 1.0),
+    "verification_norm": ("verification_norm_ug", 1.0),
+    "bias": ("zero_g_offset_mg", 1e-3),
+    "misalignment": ("misalignment_mrad", 1e-3),
+    "bias_temperature": ("bias_temperature_ug_K", 1.0),
+    "scale_temperature": ("scale_temperature_ppm_K", 1.0),
+}
+"""Figures that may have limits by the quantity whose uncertainty is theirs, with the figure's unit per unit of the quantity."""
+
+
+@dataclass(frozen=True)
+class PlannedDwells:
+    """The dwells that a recipe plans.
+
+    fit, verification : states, (n,) and (m,); soak, target_C : (n,), of the fit's
+    covariance : (n, n), of the dwells of the fit, g²; run_ug : expected error of a dwell within the run
+    instability_ug : bias instability B of the device
+    """
+
+    fit: State
+    verification: State | None
+    soak: NDArray[np.int64]
+    target_C: Array
+    covariance: Array
+    run_ug: float
+    instability_ug: float
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A quantity and its reachable uncertainty.
+
+    u : standard uncertainty, or the expected RMS of an error; parts : by contribution, in ``unit``
+    """
+
+    quantity: str
+    axis: str
+    unit: str
+    u: float
+    parts: dict[str, float]
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Share of each contribution in u², the largest first."""
+        shares = {name: part**2 / self.u**2 for name, part in self.parts.items()} if self.u > 0.0 else {}
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+
+def reachable(planned: PlannedDwells, terms: BudgetTerms, effects: Sequence[str]) -> list[Reach]:
+    """The reachable uncertainty of a recipe; empty if no uncertainty is stated.
+
+    The device is nominal: response 1, with the temperature coefficients that its stability states.
+    """
+    if terms.stated is None:
+        return []
+    nominal = _nominal(effects, planned.fit, 0.0 if terms.stability is None else terms.stability.zero_level_g)
+    model = with_device_temperature(nominal, np.eye(3), terms.stability)
+    at = DwellConditions(planned.fit, planned.soak, planned.target_C, terms.soak_min_s, terms.room_C, np.ones(3))
+    source = sensitivity(model, planned.fit, *influences(terms.stated, at, terms.stability))
+    fit = fit_design(nominal, planned.fit, planned.covariance)
+    propagation = propagated(fit, source, np.eye(3))
+    names = np.array(source.contributions, dtype=object)
+    noise = fit.gain @ planned.covariance @ np.swapaxes(fit.gain, -1, -2)
+    out: list[Reach] = []
+    for effect, unit in EFFECTS.items():
+        for axis, letter in enumerate(AXES):
+            for column in [k for k, (name, _) in enumerate(fit.names[axis]) if name == effect]:
+                own = float(np.sqrt(noise[axis, column, column]))
+                out.append(_reach(effect, letter, unit, own, propagation.coefficients[axis, column], names))
+    if planned.verification is not None:
+        out += _errors(planned, terms, nominal, propagation, names)
+    return out
+
+
+def _nominal(effects: Sequence[str], state: State, zero_level_g: float) -> MeasurementModel:
+    usual = {"scale": 1.0, "bias": zero_level_g}
+    sensor, station = design.split(effects)
+    values = design.starting_values([*sensor, *station], state)
+    names = [design.local_names(sensor, axis, values) for axis in range(3)]
+    coefficients = np.array([[usual.get(effect, 0.0) for effect, _ in own] for own in names])
+    return MeasurementModel(tuple(effects), coefficients, values)
+
+
+def _reach(quantity: str, axis: str, unit: str, noise: float, errors: Array, names: Array) -> Reach:
+    parts = {"noise": MICRO * noise}
+    for group in dict.fromkeys(names.tolist()):
+        parts[group] = MICRO * float(np.sqrt(np.sum(errors[names == group] ** 2)))
+    return Reach(quantity, axis, unit, float(np.sqrt(sum(v**2 for v in parts.values()))), parts)
+
+
+def _errors(
+    planned: PlannedDwells, terms: BudgetTerms, model: MeasurementModel, propagation: Propagated, names: Array
+) -> list[Reach]:
+    """RMS error for the user, by the references alone, and over the period."""
+    state = planned.verification
+    if state is None:
+        return []
+    columns = design.local_columns(design.split(model.effects)[0], state, model.nonlinear)
+    errors = propagation.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
+    out: list[Reach] = []
+    for axis, letter in enumerate(AXES):
+        parts = {
+            group: MICRO * float(rms_over(errors[..., axis, :][..., names == group]))
+            for group in dict.fromkeys(names.tolist())
+        }
+        u = float(np.sqrt(sum(v**2 for v in parts.values())))
+        out.append(Reach("bias_error", letter, "µg", u, parts))
+        later = _later(planned, terms)
+        if later is not None:
+            whole = {"run": planned.run_ug, "budget": u, **later}
+            out.append(
+                Reach("bias_error_period", letter, "µg", float(np.sqrt(sum(v**2 for v in whole.values()))), whole)
+            )
+    return [*out, _norm(errors, state, names)]
+
+
+def _norm(errors: Array, state: State, names: Array) -> Reach:
+    """Magnitude at the pose of the verification where it is least certain."""
+    along = MICRO * norm_errors(errors, state.force)
+    worst = along[int(np.argmax(np.sum(along**2, axis=-1)))]
+    parts = {group: float(np.sqrt(np.sum(worst[names == group] ** 2))) for group in dict.fromkeys(names.tolist())}
+    return Reach("verification_norm", "norm", "µg", float(np.sqrt(np.sum(worst**2))), parts)
+
+
+def _later(planned: PlannedDwells, terms: BudgetTerms) -> dict[str, float] | None:
+    """Contributions beyond the run, µg; None where the device's stability is not stated for so long."""
+    stability, months = terms.stability, terms.certificate.validity_months
+    if stability is None or months * MONTH_S > stability.horizon_days * DAY_S * 1.001:
+        return None
+    span = float(np.ptp(planned.fit.time)) + terms.dwell_s
+    windows = Windows(span, terms.certificate.use_window_s or terms.dwell_s, months * MONTH_S)
+    later, within = (f(windows, stability.flicker_slowest_s) for f in (flicker_later, flicker_within))
+    parts = {
+        "flicker": planned.instability_ug * float(np.sqrt(max(later**2 - within**2, 0.0))),
+        "switch_on": stability.switch_on_ug,
+        "switch_on_scale": stability.switch_on_ppm / float(np.sqrt(3.0)),
+    }
+    if stability.ageing is not None:
+        parts["ageing"] = ageing_u(stability.ageing, windows)
+    return {name: value for name, value in parts.items() if value > 0.0}
+
+
+def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[str]:
+    """Why limits cannot be met, a sentence each: U of the references, or the error expected over the period, exceeds them.
+
+    A unit whose U exceeds the limit is not decided, whatever its value is: every unit of the lot would be.
+    """
+    from pipelines.stages.uncertainty.tables import LABELS
+
+    out: list[str] = []
+    worst = {q: max((r for r in reaches if r.quantity == q), key=lambda r: r.u, default=None) for q in FIGURES}
+    for quantity, (figure, factor) in FIGURES.items():
+        one = worst[quantity]
+        needed = limits.figures[figure].max if figure in limits.figures else None
+        if quantity == "bias_error_period":
+            needed = min(needed or GRADES[limits.grade], GRADES[limits.grade])
+        if one is None or needed is None:
+            continue
+        period = quantity == "bias_error_period"
+        reached = factor * (one.u if period else limits.coverage_factor * one.u)
+        if reached > needed:
+            unit = limits.figures[figure].unit if figure in limits.figures else one.unit
+            what = f"error expected over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
+            shares = [(name, share) for name, share in one.shares.items() if share >= LEAST_SHARE][:3]
+            rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in shares)
+            out.append(f"{figure}: limit {shown(needed)} {unit}, {what} {shown(reached)} {unit} ({rulers})")
+    return out
+
+
+def shown(value: float) -> str:
+    """A value with three digits, without an exponent."""
+    return f"{float(f'{value:.3g}'):g}"

@@ -1,0 +1,289 @@
+"""Tables of a budget: one row per contribution, one per quantity, and the covariance of the coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial.uncertainty.degrees import coverage_factors, effective_degrees
+from pipelines.tables.frames import empty_table, picked
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
+    from pipelines.stages.uncertainty.contributions import UncertaintySource
+    from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts
+
+    Array = NDArray[np.float64]
+
+NOISE = "noise"
+BEYOND = {
+    "run": "figure of the run",
+    "budget": "references, as far as verification cannot show them",
+    "flicker": "flicker to the due date",
+    "switch_on": "bias from one switch-on to the next",
+    "switch_on_scale": "scale from one switch-on to the next",
+    "ageing": "ageing",
+}
+LABELS = {
+    NOISE: "noise of the dwells",
+    "gravity": "local gravity",
+    "level": "level of the base",
+    "orthogonality": "orthogonality of the table's axes",
+    "outer_offset": "offset of the outer encoder",
+    "inner_offset": "offset of the inner encoder",
+    "harmonics": "harmonics of the encoders",
+    "pose": "repeatability of the poses",
+    "seat": "seat of the fixture",
+    "thermometer_offset": "offset of the thermometer",
+    "thermometer_slope": "slope of the thermometer",
+    "thermometer_soak": "thermometer from soak to soak",
+    "gradient": "gradient to the element",
+    "settling": "settling of the temperature",
+    "supply": "supply",
+    "reader_gain": "gain of the reader",
+    "reader_offset": "offset of the reader",
+    "reader_inl": "nonlinearity of the reader",
+    "timing": "timing",
+    "creep": "creep after a move",
+    "vibration": "vibration",
+    **BEYOND,
+}
+"""Titles of the contributions in tables and pictures."""
+TEXTS = "unit quantity axis contribution unit_text type distribution scope input_unit source"
+NUMBERS = "u share divisor stated dof sensitivity visible"
+SUM_TEXTS = "unit quantity axis unit_text largest frame"
+SUM_NUMBERS = "value u_a u_b u dof k expanded shown unseen"
+
+
+def empty() -> dict[str, pd.DataFrame]:
+    """The tables without rows: nothing is stated."""
+    return {
+        "budget": empty_table(texts=TEXTS, numbers=NUMBERS),
+        "uncertainties": empty_table(texts=SUM_TEXTS, numbers=SUM_NUMBERS),
+        "budget_covariance": empty_table(texts="unit", whole="row column", numbers="value"),
+    }
+
+
+@dataclass(frozen=True)
+class _Contributions:
+    """The contributions to one quantity of every unit, (units, c) where not said otherwise.
+
+    names : c of them; u : standard uncertainties; about : columns of the table that are the same for every unit, c values each
+    stated, dof, sensitivity : of each unit
+    """
+
+    names: list[str]
+    u: Array
+    about: dict[str, list[Any]]
+    stated: Array
+    dof: Array
+    sensitivity: Array
+
+
+def rows_of_quantities(
+    units: Sequence[str],
+    quantities: Sequence[BudgetQuantity],
+    variances: VarianceParts,
+    terms: BudgetTerms,
+    known: Mapping[str, UncertaintySource],
+) -> dict[str, pd.DataFrame]:
+    """Tables ``budget`` and ``uncertainties``; every quantity for all units at once."""
+    places = groups_of(variances)
+    parts = [_contributions(one, places, variances, known, terms) for one in quantities]
+    return {
+        "budget": _budget_rows(units, quantities, parts),
+        "uncertainties": _sum_rows(units, quantities, parts, terms),
+    }
+
+
+def groups_of(variances: VarianceParts) -> dict[str, NDArray[np.intp]]:
+    """The places among the influences of every contribution, in order."""
+    names = np.array(variances.fit.source.contributions, dtype=object)
+    return {group: np.flatnonzero(names == group) for group in dict.fromkeys(names.tolist())}
+
+
+def combined(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> tuple[Array, Array, Array]:
+    """Standard uncertainty of type A, of type B and of both of a quantity, (units,) each."""
+    noise = np.asarray(one.noise, dtype=float)
+    if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
+        stated = np.zeros_like(noise)
+    else:
+        _, *groups = _parts(one, places).values()
+        stated = np.sqrt(_summed(np.stack(groups, axis=1) ** 2)) if groups else np.zeros_like(noise)
+    return noise, stated, np.hypot(noise, stated)
+
+
+def _contributions(
+    one: BudgetQuantity,
+    places: Mapping[str, NDArray[np.intp]],
+    variances: VarianceParts,
+    known: Mapping[str, UncertaintySource],
+    terms: BudgetTerms,
+) -> _Contributions:
+    own = _parts(one, places)
+    u = np.ascontiguousarray(np.stack(list(own.values()), axis=1))
+    stated, dof, sensitivity = u.copy(), np.full(u.shape, np.inf), np.full(u.shape, np.nan)
+    about: dict[str, list[Any]] = {name: [] for name in SAME}
+    for column, name in enumerate(own):
+        if name == NOISE or name in BEYOND:
+            row = _beyond(name, terms)
+            if name in {NOISE, "run"}:
+                dof[:, column] = one.dof_noise
+        else:
+            row = _referred(known[name], variances.visible[places[name]])
+            stated[:, column], dof[:, column] = known[name].stated.stated, float(known[name].entry.dof or np.inf)
+            single = known[name].stated.stated / known[name].stated.divisor if known[name].stated.unit else float("nan")
+            if single > 0.0:
+                sensitivity[:, column] = u[:, column] / single
+        for key in SAME:
+            about[key].append(row[key])
+    return _Contributions(list(own), u, about, stated, dof, sensitivity)
+
+
+def _parts(one: BudgetQuantity, places: Mapping[str, NDArray[np.intp]]) -> dict[str, Array]:
+    """Standard uncertainty of every contribution, (units,) each; the noise first."""
+    if one.extra:
+        return {name: np.asarray(values, dtype=float) for name, values in one.extra.items()}
+    out = {NOISE: np.asarray(one.noise, dtype=float)}
+    for group, own in places.items():
+        out[group] = np.sqrt(np.sum(np.ascontiguousarray(one.parts[:, own]) ** 2, axis=1))
+    return out
+
+
+SAME = ("visible", "type", "distribution", "scope", "input_unit", "divisor", "source")
+
+
+def _beyond(name: str, terms: BudgetTerms) -> dict[str, Any]:
+    """The source of the noise, or of a contribution beyond the run; its stated value is its uncertainty."""
+    kind = "A" if name in {NOISE, "run", "flicker"} else "B"
+    stability = f"[stability], {terms.stability.source}" if terms.stability else ""
+    source = "the dwells of the run" if kind == "A" else stability
+    return {"visible": float("nan"), "type": kind, "distribution": "normal", "scope": "unit", "input_unit": "", "divisor": 1.0,
+            "source": source if name != "budget" else "[uncertainty]"}  # fmt: skip
+
+
+def _referred(source: UncertaintySource, shares: Array) -> dict[str, Any]:
+    """The source of a contribution that station or recipe state."""
+    entry, stated = source.entry, source.stated
+    return {
+        "visible": float(np.sqrt(np.mean(shares**2))) if shares.size else float("nan"),
+        "type": "B",
+        "distribution": stated.distribution,
+        "scope": entry.scope,
+        "input_unit": stated.unit,
+        "divisor": stated.divisor,
+        "source": f"reference {entry.reference}" if entry.reference else entry.origin,
+    }
+
+
+def _share(u: Array) -> Array:
+    """Share of each contribution in the sum of the squares, (units, c); zero where all are."""
+    square = _summed(u**2)
+    return np.divide(u**2, square[:, None], out=np.zeros_like(u), where=square[:, None] > 0.0)
+
+
+def _summed(values: Array) -> Array:
+    """Sums over the columns, one after the other: their order decides the last digit."""
+    total = np.zeros(len(values))
+    for column in values.T:
+        total = total + column
+    return total
+
+
+def _budget_rows(
+    units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions]
+) -> pd.DataFrame:
+    many = len(units)
+    counts = [len(own.names) for own in parts]
+
+    def each(of: Callable[[BudgetQuantity], str]) -> list[str]:
+        """A text of the quantities in every row of theirs."""
+        return [text for one, count in zip(quantities, counts, strict=True) for text in [of(one)] * count] * many
+
+    def same(of: Callable[[_Contributions], list[Any]]) -> list[Any]:
+        return [value for own in parts for value in of(own)] * many
+
+    def together(of: Callable[[_Contributions], Array]) -> Array:
+        return np.concatenate([of(own) for own in parts], axis=1).ravel() if parts else np.empty(0)
+
+    return pd.DataFrame(
+        {
+            "unit": [unit for unit in units for _ in range(sum(counts))],
+            "quantity": each(lambda one: one.name),
+            "axis": each(lambda one: one.axis),
+            "unit_text": each(lambda one: one.unit),
+            "contribution": same(lambda own: own.names),
+            "u": together(lambda own: own.u),
+            "visible": same(lambda own: own.about["visible"]),
+            "sensitivity": together(lambda own: own.sensitivity),
+            **{name: same(lambda own, name=name: own.about[name]) for name in SAME[1:-2]},
+            "divisor": same(lambda own: own.about["divisor"]),
+            "stated": together(lambda own: own.stated),
+            "dof": together(lambda own: own.dof),
+            "source": same(lambda own: own.about["source"]),
+            "share": together(lambda own: _share(own.u)),
+        }
+    )
+
+
+def _sum_rows(
+    units: Sequence[str], quantities: Sequence[BudgetQuantity], parts: Sequence[_Contributions], terms: BudgetTerms
+) -> pd.DataFrame:
+    """Every quantity with its combined and expanded uncertainty."""
+    columns: dict[str, list[Array]] = {name: [] for name in SUM_NUMBERS.split()}
+    largest: list[list[str]] = []
+    for one, own in zip(quantities, parts, strict=True):
+        a = np.asarray(one.noise, dtype=float)
+        if one.extra:  # an expected RMS: its contributions make its value, its uncertainty is that of the RMS
+            b, dof = np.zeros_like(a), np.asarray(one.dof_noise, dtype=float)
+        else:
+            stated = [k for k, kind in enumerate(own.about["type"]) if kind == "B"]
+            b, dof = np.sqrt(_summed(own.u[:, stated] ** 2)), effective_degrees(own.u, own.dof)
+        u, k = np.hypot(a, b), coverage_factors(dof)
+        none = np.full_like(a, np.nan)
+        row = {"value": one.value, "u_a": a, "u_b": b, "u": u, "dof": dof, "k": k, "expanded": k * u,
+               "shown": none if one.shown is None else one.shown,
+               "unseen": none if one.unseen is None else one.unseen}  # fmt: skip
+        for name, values in row.items():
+            columns[name].append(np.asarray(values, dtype=float))
+        largest.append(_largest(own))
+    many, count = len(units), len(quantities)
+    texts = {"quantity": [one.name for one in quantities] * many, "axis": [one.axis for one in quantities] * many,
+             "unit_text": [one.unit for one in quantities] * many}  # fmt: skip
+    numbers = {name: np.stack(values, axis=1).ravel() if values else np.empty(0) for name, values in columns.items()}
+    return pd.DataFrame(
+        {
+            "unit": [unit for unit in units for _ in range(count)],
+            **texts,
+            **numbers,
+            "largest": [own[unit] for unit in range(many) for own in largest],
+            "frame": [terms.certificate.frame] * (many * count),
+        }
+    )
+
+
+def _largest(own: _Contributions) -> list[str]:
+    """The three largest contributions of every unit with their shares, as text."""
+    order, share = np.argsort(-own.u, axis=1, kind="stable")[:, :3], _share(own.u)
+    labels = [LABELS[name] for name in own.names]
+    return [
+        ", ".join(f"{labels[c]} {100.0 * share[unit, c]:.0f} %" for c in chosen if share[unit, c] > 0.0)
+        for unit, chosen in enumerate(order.tolist())
+    ]
+
+
+def covariance_rows(units: Sequence[str], covariance: Array) -> pd.DataFrame:
+    """Covariance (units, 3p, 3p) of the coefficients by the budget, x before y before z, as its lower triangles; output unit²."""
+    many = np.broadcast_to(covariance, (len(units), *covariance.shape[-2:]))
+    row, column = np.tril_indices(many.shape[-1])
+    u, k = (index.ravel() for index in np.meshgrid(np.arange(len(units)), np.arange(row.size), indexing="ij"))
+    return pd.DataFrame(
+        {"unit": picked(units, u), "row": row[k], "column": column[k], "value": many[:, row, column].ravel()}
+    )

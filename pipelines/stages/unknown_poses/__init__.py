@@ -1,0 +1,1 @@
+"""Dwells in unknown poses: their fit, verification and budget from the norm of gravity."""

@@ -1,0 +1,83 @@
+"""The uncertainty budget of a fit by the norm of gravity: references that act on the magnitude, through the fit's own design."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from inertial.frames import angles_from_force
+from inertial.uncertainty.influences import sensitivity
+from inertial.uncertainty.norm_design import propagated_by_norm
+from pipelines.stages.uncertainty.budget import conditions, with_device_temperature
+from pipelines.stages.uncertainty.contributions import influences, sources
+from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts, quantities_of
+from pipelines.stages.uncertainty.tables import covariance_rows, empty, rows_of_quantities
+from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
+
+if TYPE_CHECKING:
+    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+    from schemas.uncertainty import Uncertainty
+
+OF_POSES = ("level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose", "seat")
+"""Entries that change the direction of the force only: the norm does not depend on them."""
+
+
+def norm_budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:
+    """The tables of the stage budget for dwells of unknown orientation; empty where nothing is stated."""
+    if terms.stated is None or tables.coefficients.empty:
+        return empty()
+    stated = of_the_norm(terms.stated)
+    own = [
+        _of_unit(one, tables, replace(terms, stated=stated), stated)
+        for one in norm_dwells(tables.dwells, tables.history, tables.coefficients, tables.covariance, tables.wander)
+    ]
+    return {name: pd.concat([part[name] for part in own], ignore_index=True) for name in own[0]}
+
+
+def of_the_norm(stated: Uncertainty) -> Uncertainty:
+    """The entries of a statement that the norm of gravity depends on."""
+    return stated.model_copy(update=dict.fromkeys(OF_POSES))
+
+
+def _of_unit(one: NormDwells, tables: BudgetTables, terms: BudgetTerms, stated: Uncertainty) -> dict[str, pd.DataFrame]:
+    unit = one.lot.units[0]
+    state = one.lot.state
+    outer, inner = angles_from_force(state.force)
+    if state.temperature is None:
+        state = replace(state, temperature=np.full(state.force.shape[:-1], terms.room_C), memory={})
+    lot = replace(one.lot, state=replace(state, outer=outer, inner=inner, memory={}))
+    at = conditions(lot, tables.dwells.assign(unit=tables.dwells["unit"].astype(str)), one.calibration.response, terms)
+    physical = with_device_temperature(one.model, one.calibration.response, terms.stability)
+    own, scattered = influences(stated, at, terms.stability)
+    whole = sensitivity(physical, lot.state, own, scattered)
+    fitted = propagated_by_norm(one.design, whole, one.calibration.response)
+    variances = VarianceParts(
+        fit=replace(fitted, source=replace(whole, changes=whole.changes[:, one.design.used])),
+        verification=whole.changes[:, ~one.design.used],
+        visible_share=lambda: one.design.visible_share(whole.changes[0]),
+    )
+    wander = _of(tables.wander, unit)
+    part = replace(
+        tables,
+        wander=wander.assign(dof=wander["dof"] / 3.0),  # the three axes have the degrees of freedom of one series
+        verification=_of(tables.verification, unit),
+        verification_poses=_of(tables.verification_poses, unit),
+        noise=_of(tables.noise, unit),
+    )
+    quantities = [q for q in quantities_of(lot, one.calibration, part, terms, variances) if not _is_rotation(q)]
+    return {
+        **rows_of_quantities((unit,), quantities, variances, terms, sources(stated)),
+        "budget_covariance": covariance_rows((unit,), variances.fit.covariance()),
+    }
+
+
+def _is_rotation(quantity: BudgetQuantity) -> bool:
+    """Whether it is a coefficient of K below the diagonal: a rotation of the whole unit, zero by definition."""
+    return quantity.name == "misalignment" and quantity.axis in {"yx", "zx", "zy"}
+
+
+def _of(table: pd.DataFrame, unit: str) -> pd.DataFrame:
+    return table[table["unit"].astype(str) == unit]

@@ -1,0 +1,241 @@
+"""Fit of a model to dwells of unknown orientation: coefficients, covariance, residuals of the norm and its noise, as tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from inertial import effects as catalogue
+from inertial.errors import InertialError
+from inertial.estimation.model import Model
+from inertial.estimation.noise import LONGEST, walk_kernel
+from inertial.estimation.problem import Problem
+from inertial.estimation.refinement import terms_of
+from inertial.fits.wander import student
+from inertial.noise.flicker import SLOWEST_DIAGNOSED, flicker_kernel
+from inertial.noise.measurands import DAY_S, instability, of_a_day
+from inertial.norm_fit import NormFit, PlausibleNoise, fit_norms
+from pipelines.stages.uncertainty.bias_measurands import COLUMNS
+from pipelines.tables.calibration import coefficient_rows, covariance_rows
+from pipelines.tables.dwells import Measured, lot_of, measured
+from pipelines.tables.frames import empty_table, picked
+from pipelines.tables.norms import expansion
+from schemas.errors import DataRejected
+from schemas.units import AXES, MICRO
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+FEW_DWELLS = 300
+"""Dwells up to which standard errors are averaged over the plausible shares of wander."""
+
+NORM = "norm"
+"""The axis of a residual of the norm."""
+
+
+@dataclass(frozen=True)
+class FittedNorms:
+    """A fit of norms with its inputs.
+
+    whitener : as :func:`inertial.norm_fit.fit_norms` has it; scale : (units, 3), output unit per g
+    white, flicker, walk : (units,), standard deviations of one dwell's noise, g; walk at the end of the record
+    """
+
+    measured: Measured
+    model: Model
+    fit: NormFit
+    scale: Array
+    white: Array
+    flicker: Array
+    walk: Array
+    gravity: float
+
+    @property
+    def rms(self) -> float:
+        """Residual of the norm over all dwells, g of local gravity."""
+        there = self.measured.readings.there
+        return float(np.sqrt(np.mean((self.fit.left[there] / self.gravity) ** 2)))
+
+
+def norms_fitted(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float = 1.0
+) -> FittedNorms:
+    """A model fitted to dwells of unknown orientation, with the noise that a diagnosis estimates.
+
+    Parameters
+    ----------
+    gravity : where it was measured, g
+
+    Raises
+    ------
+    DataRejected
+        The dwells do not determine the model, or lack a quantity that it needs.
+    """
+    try:
+        measurement = measured(fitted_dwells(dwells), history)
+        lot = lot_of(measurement, square="misalignment" not in effects)
+        problem = Problem(lot)
+        model = Model(problem, terms_of(catalogue.get_all(effects), problem))
+        values = {t.effect.id: t.keywords for t in model.terms if t.keywords}
+        filled = np.where(
+            measurement.readings.there[..., None], measurement.readings.output, _typical(measurement.readings.output)
+        )
+        shape = "six" if "misalignment" not in effects else "nine"
+        origin = [expansion(measurement.readings, unit, shape=shape) for unit in range(len(measurement.units))]
+        start = np.stack([o.bias for o in origin]), np.stack([o.response for o in origin]) / gravity
+        fit = fit_norms(
+            effects,
+            lot.state,
+            filled,
+            whitener(model),
+            start,
+            norm=gravity,
+            nonlinear=values,
+            plausible=plausible_noises(model),
+            weights=measurement.readings.duration,
+        )
+    except InertialError as problem_found:
+        raise DataRejected(str(problem_found)) from None
+    noise, covariance = model.noise, problem.covariance
+    return FittedNorms(
+        measured=measurement,
+        model=model,
+        fit=fit,
+        scale=np.abs(np.diagonal(fit.fit.response(), axis1=-2, axis2=-1)),
+        white=noise.scale * covariance.level,
+        flicker=noise.scale * np.sqrt(covariance.white * noise.shares.flicker),
+        walk=noise.scale * np.sqrt(covariance.white * noise.shares.walk),
+        gravity=gravity,
+    )
+
+
+def whitener(model: Model) -> Array:
+    """Inverse roots of the covariances of the units' norms, (units, n, n), g⁻¹; (units, n) for records too long for them."""
+    covariance, noise, n = model.problem.covariance, model.noise, model.problem.n
+    if n > LONGEST:
+        error = model.problem.error
+        return np.where(np.isfinite(error), 1.0 / np.where(np.isfinite(error), error, 1.0), 0.0)
+    eye = np.broadcast_to(np.eye(n), (model.problem.blocks, n, n))
+    return covariance.whiten(eye, noise.shares) / noise.scale[:, None, None]
+
+
+def fitted_dwells(dwells: pd.DataFrame) -> pd.DataFrame:
+    """The dwells without those that are held out for verification."""
+    return dwells[dwells["kind"] == "dwell"] if "kind" in dwells.columns else dwells
+
+
+def plausible_noises(model: Model) -> Iterator[PlausibleNoise]:
+    """The noises that the residuals do not rule out.
+
+    None for long records: their shares of wander are known well.
+    """
+    problem = model.problem
+    if problem.n > FEW_DWELLS:
+        return
+    eye = np.broadcast_to(np.eye(problem.n), (problem.blocks, problem.n, problem.n))
+    time, white = problem.lot.state.time, problem.covariance.white
+    kernels = np.stack([flicker_kernel(own) for own in time]), np.stack([walk_kernel(own) for own in time])
+    for shares, weight in model.plausible_shares():
+        square = model.noise_at(shares).scale[:, None, None] ** 2
+        slow = white * (shares.flicker * kernels[0] + shares.walk * kernels[1])
+        yield PlausibleNoise(weight, problem.covariance.whiten(eye, shares) / np.sqrt(square), square * slow)
+
+
+def fit_of_norms(
+    dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], gravity: float = 1.0
+) -> dict[str, pd.DataFrame]:
+    """The tables of :func:`pipelines.stages.fit.fit` for dwells of unknown orientation; residuals have the axis ``norm``."""
+    return norm_tables(norms_fitted(dwells, history, effects, gravity), dwells)
+
+
+def norm_tables(done: FittedNorms, dwells: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """A fit of norms as tables."""
+    out_unit = str(dwells["out_unit"].iloc[0])
+    fit = done.fit
+    return {
+        "coefficients": coefficient_rows(
+            done.measured.units, fit.fit, fit.fit.covariance, out_unit, fit.nonlinear_error
+        ),
+        "covariance": covariance_rows(done.measured.units, fit.fit.covariance),
+        "residuals": _residual_rows(done, dwells),
+        "predictions": empty_table(texts="unit axis", numbers="covariance_ug2", whole="dwell other"),
+        "wander": _wander_rows(done),
+    }
+
+
+def _typical(output: Array) -> Array:
+    return np.nan_to_num(np.nanmedian(output, axis=(0, 1)), nan=1.0)
+
+
+def _residual_rows(done: FittedNorms, dwells: pd.DataFrame) -> pd.DataFrame:
+    u, n = np.nonzero(done.measured.readings.there)
+    state, numbers = done.measured.state, done.measured.dwells[n]
+    error = done.model.problem.error * done.model.noise.scale[:, None]
+    expected = np.hypot(error, np.hypot(done.flicker, done.walk)[:, None])
+    poses = dwells.drop_duplicates("dwell").set_index("dwell")["pose"].astype(str) if "pose" in dwells.columns else None
+    return pd.DataFrame(
+        {
+            "unit": picked(done.measured.units, u),
+            "dwell": numbers,
+            "axis": NORM,
+            "pose": [f"dwell {k}" for k in numbers] if poses is None else poses.reindex(numbers).tolist(),
+            "force_g": np.linalg.norm(done.fit.force, axis=-1)[u, n],
+            "residual_ug": MICRO * done.fit.left[u, n] / done.gravity,
+            "standard_error_ug": MICRO * error[u, n],
+            "expected_ug": MICRO * expected[u, n],
+            "unit_C": np.full(u.size, np.nan) if state.temperature is None else state.temperature[u, n],
+        }
+    )
+
+
+def _wander_rows(done: FittedNorms) -> pd.DataFrame:
+    units = len(done.measured.units)
+    u, a = (index.ravel() for index in np.meshgrid(np.arange(units), np.arange(3), indexing="ij"))
+    parts = {"white_ug": done.white, "flicker_ug": done.flicker, "walk_ug": done.walk}
+    return pd.DataFrame(
+        {
+            "unit": picked(done.measured.units, u),
+            "axis": picked(AXES, a),
+            "method": "wander",
+            **{name: MICRO * values[u] for name, values in parts.items()},
+            "lack_of_fit": 1.0,
+            "dof": done.fit.dof[u],
+            **{name: values.ravel() for name, values in bias_uncertainty(done).items()},
+        }
+    )
+
+
+def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
+    """Standard uncertainties of the bias by measurand, (units, 3) each, µg.
+
+    The names are those of :mod:`pipelines.stages.uncertainty.bias_measurands`.
+
+    The flicker of a diagnosis has time constants to four times the record. Scatter that the samples of the dwells do not show
+    counts as flicker: few dwells do not show its kind.
+    """
+    place = [[name for name, _ in names].index("bias") for names in done.fit.fit.names]
+    errors = np.sqrt(np.diagonal(done.fit.fit.covariance, axis1=-2, axis2=-1))
+    record = np.stack([errors[:, axis, k] for axis, k in enumerate(place)], axis=1)
+    record = MICRO * (record if done.fit.record is None else done.fit.record) / done.scale
+    lot = done.model.problem.lot
+    known = done.model.problem.covariance.level if lot.recorded else done.white
+    wander = MICRO * np.sqrt(done.flicker**2 + np.maximum(done.white**2 - known**2, 0.0))
+    wander = np.repeat(wander[:, None], 3, axis=1)
+    time = np.sort(lot.state.time[0])
+    widened = student(max(int(done.fit.dof.sum()), 1))
+    long = of_a_day(record, wander, time, slowest=SLOWEST_DIAGNOSED, widened=widened)
+    by_measurand: dict[str, Any] = {
+        "bias_instability_ug": instability(wander, time, slowest=SLOWEST_DIAGNOSED),
+        "bias_record_u_ug": record,
+        "bias_long_u_ug": long,
+        "bias_long_s": np.full_like(record, DAY_S),
+        "bias_switch_on_u_ug": np.full_like(record, np.nan),
+    }
+    return {name: by_measurand[name] for name in COLUMNS}
