@@ -37,7 +37,7 @@ def documents() -> list[type]:
     A document is a TypedDict in a module ``documents`` of a package of pipelines, or in a module of such a package; its docstring
     begins with the command.
     """
-    places = [*ROOT.glob("pipelines/*/documents.py"), *ROOT.glob("pipelines/*/documents/*.py")]
+    places = [*ROOT.glob("pipelines/**/documents.py"), *ROOT.glob("pipelines/*/documents/*.py")]
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in places]
     modules = [import_module(name) for name in names]
     types = {

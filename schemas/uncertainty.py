@@ -6,16 +6,30 @@ stands in the key (``u_urad``, ``U_K``, ``half_width_arcsec``). It names the ref
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from schemas.bounds import Degrees, NotNegative, Number, Positive
-from schemas.gravity import STANDARD_GRAVITY, formula_gravity
 from schemas.stated import TO_SI, AngleEntry, Entry, RelativeEntry, Scope, StandardUncertainty, Stated
 from schemas.strict import Strict
 
-__all__ = ["NEEDED", "TO_SI", "Entry", "StandardUncertainty", "Uncertainty"]
+__all__ = ["NEEDED", "TO_SI", "Entry", "StandardUncertainty", "Uncertainty", "formula_gravity"]
+
+STANDARD_GRAVITY = 9.80665
+"""m/s², CGPM 1901: a unit, and no site's value."""
+FREE_AIR = -3.086e-6
+"""m/s² per m of height."""
+FORMULA_U_PPM = 60.0
+"""Standard uncertainty of the formula: rms of eight published sites 56 ppm, ruled by one of them."""
+
+
+def formula_gravity(latitude_deg: float, height_m: float = 0.0) -> float:
+    """Normal gravity at a latitude with the free-air reduction, m/s² (Moritz 1980, GRS 1980)."""
+    square = math.sin(math.radians(latitude_deg)) ** 2
+    normal = 9.7803267715 * (1.0 + 0.001931851353 * square) / math.sqrt(1.0 - 0.0066943800229 * square)
+    return normal + FREE_AIR * height_m
 
 
 class Harmonics(AngleEntry):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from inertial.population.comparison import outlier_limit
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding, date_or_never
 from pipelines.audit.parameters import unit_text
-from pipelines.audit.serials import twice
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -180,3 +179,27 @@ def _signed(value: float) -> str:
     """A number with its sign and three significant digits, large ones without an exponent."""
     text = f"{value:+.3g}"
     return f"{float(text):+.0f}" if "e+" in text else text
+
+
+AT_ONCE_D = 1.0 / 96.0  # a quarter of an hour: moving and soaking a unit takes longer
+
+
+class Twice(NamedTuple):
+    """A serial of two units: rows of two calibrations that cannot be of one unit."""
+
+    serial: str
+    first: int
+    second: int
+
+
+def twice(calibrations: Calibrations) -> list[Twice]:
+    """Serials of two units, in order, each once."""
+    order = np.lexsort((calibrations.day, calibrations.unit.astype(str)))
+    unit, device, station = (column[order] for column in (calibrations.unit, calibrations.device, calibrations.station))
+    same = unit[1:] == unit[:-1]
+    close = (np.diff(calibrations.day[order]) < AT_ONCE_D) & (station[1:] != station[:-1])
+    by_serial: dict[str, Twice] = {}
+    for k in np.flatnonzero(same & ((device[1:] != device[:-1]) | close)):
+        serial = str(unit[k])
+        by_serial.setdefault(serial, Twice(serial, int(order[k]), int(order[k + 1])))
+    return list(by_serial.values())

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipelines.archive import files
 from pipelines.archive.signatures import BAD, GOOD, UNSIGNED, check, public_keys
 from pipelines.certificates.entries import folder_of
 from pipelines.certificates.ledger import Ledger
-from pipelines.certificates.libraries import differing_libraries
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from pipelines.archive import Run
     from pipelines.archive.store import Place
+
 
 TABLES = ("coefficients", "covariance", "grades")
 
@@ -70,3 +70,33 @@ def _certificates(run: Run, serials: Iterable[str]) -> list[Place]:
         for one in ledger.calibrations(serial)
         if one.run == run.id
     ]
+
+
+REPORT = "report"  # only for display
+
+
+def differing_libraries(run: str, manifests: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """A line for each library with more than one version among the tables of a run.
+
+    Versions are not in the keys of stages (docs/decisions/re-runs.md), so after an update a run can have stages with
+    different versions.
+
+    Parameters
+    ----------
+    manifests : of the run's tables, by table.
+    """
+    versions: dict[str, dict[str, list[str]]] = {}
+    for name, content in sorted(manifests.items()):
+        libraries = content.get("libraries")
+        if name != REPORT and isinstance(libraries, dict):
+            for library, number in libraries.items():
+                versions.setdefault(str(library), {}).setdefault(str(number), []).append(name)
+    return [
+        f"run {run}: tables made with {library} {_versions_text(by)}; check the numbers with 'tumbleline rerun {run} --check'"
+        for library, by in sorted(versions.items())
+        if len(by) > 1
+    ]
+
+
+def _versions_text(by: Mapping[str, list[str]]) -> str:
+    return " and ".join(f"{number} ({', '.join(names)})" for number, names in sorted(by.items()))

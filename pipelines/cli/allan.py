@@ -77,8 +77,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.cli.allan_documents import allan_document, allan_of_run, statistic_of_run
-    from pipelines.cli.series_options import even_series
-    from pipelines.cli.series_pictures import write_pictures
+    from pipelines.cli.series_options import even_series, write_pictures
 
     if spacing not in SPACINGS:
         raise WrongUse(f"--spacing: found '{spacing[:40]}', octave or decade is needed; correct it")

@@ -47,8 +47,8 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
-    from pipelines.cli.adequacy_text import judged, print_adequacy
     from pipelines.cli.summary import exit_status, print_summary, summary
+    from pipelines.cli.text.verdict_text import judged, print_adequacy
     from pipelines.jobs.job import job_of_run
 
     if Path(run).is_file():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,11 +13,18 @@ from pipelines.cli.options import (
     GroupOption,
     JoinOption,
     JsonOption,
+    console,
     print_json,
+    print_table,
+    short,
 )
 from pipelines.cli.text.import_text import print_import, print_transfers
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 from schemas.foreign import shown
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
 
 PART = "Measure"
 ORDER = 160
@@ -151,8 +158,6 @@ def command(
 
     limited.start()
     if procedure and (columns or procedure != "sweep"):
-        from pipelines.cli.waveform_import import import_and_print
-
         stated = (columns, units, rate, group)
         raise typer.Exit(import_and_print(files, procedure, part, unit, stated, archive, as_json=as_json))
     if procedure:
@@ -228,3 +233,42 @@ def _refuse_unknown_fit(fit: str) -> None:
         raise WrongUse(
             f"--fit: found '{shown(fit)}', one of {', '.join(METHODS)} is needed; {did_you_mean(fit, METHODS)}"
         )
+
+
+def import_and_print(
+    paths: list[Path],
+    procedure: str,
+    part: Path | None,
+    unit: str,
+    stated: tuple[str, str, float | None, str],
+    archive: str | None,
+    *,
+    as_json: bool,
+) -> int:
+    """Reduce, keep and print the recordings of one unit; the exit status: part failed where a figure is not determined.
+
+    Parameters
+    ----------
+    stated : columns and units as the options have them, rate in Hz, group
+    """
+    from pipelines.importers.mapping import pairs
+    from pipelines.importers.waveforms import RecordingLayout, import_waveforms
+
+    if not unit:
+        raise WrongUse("import: no serial number, the recordings of a test need one; add --unit SN")
+    columns, units, rate, group = stated
+    layout = RecordingLayout(pairs(columns, "--map"), pairs(units, "--units"), rate, group)
+    imported = import_waveforms(paths, procedure, part, unit, layout, archive)
+    if as_json:
+        print_json(dict(imported))
+    else:
+        out = console()
+        out.print(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}", markup=False)
+        rows = [
+            [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
+            for one in imported["figures"]
+        ]
+        print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
+        for line in imported["text"]:
+            out.print(f"  {line}", markup=False, soft_wrap=True)
+    return DONE if all(one["identified"] for one in imported["figures"]) else PART_FAILED

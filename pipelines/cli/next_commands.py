@@ -9,9 +9,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from rich.console import Console
+
+    from pipelines.archive import Run
+
 
 PROGRAM = "tumbleline"
 MEASURE_AGAIN = (
@@ -74,7 +78,6 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
         return JudgedData(source, history, fresh, history_beside(fresh) if fresh and history else "", archive)
     from pipelines.archive import Archive
     from pipelines.chain.runner import decisive
-    from pipelines.cli.fit_refusal import fit_refusal
     from pipelines.jobs.fresh_run import fresh_repeat, fresh_run_of, repeatable
     from pipelines.jobs.job import OF_RUN, job_of_run, measured_again
 
@@ -159,3 +162,24 @@ def free_name() -> str:
 
     names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
     return next(name for name in names if not Path(name).exists())
+
+
+def fit_refusal(run: Run, effects: Sequence[str]) -> str:
+    """What a run's recipe lacks to fit a model, and why its dwells show the model none the less; empty where it lacks nothing."""
+    from pipelines.jobs.job import job_of_run
+    from pipelines.planning.plan import missing
+    from pipelines.planning.shown_by_verification import OF_VERIFICATION, REMEDY, shown_by_verification
+    from pipelines.schedule.planned_state import state_of
+    from pipelines.schedule.steps import steps
+    from pipelines.schedule.timing import schedule
+
+    job = job_of_run(run)
+    recipe = job.recipe.model_copy(update={"effects": list(effects)})
+    activities = schedule(steps(recipe), job.station, recipe)
+    text = missing(state_of(activities, job.station, recipe, history=True), effects)
+    if not text:
+        return ""
+    named = [effect for effect in effects if f"{effect} cannot be identified" in text]
+    checked = sorted(shown_by_verification(activities, job.station, recipe, named))
+    also = f"; {', '.join(checked)}: {OF_VERIFICATION}; {REMEDY}" if checked else ""
+    return f"Recipe {recipe.name} cannot fit this model: {text}{also}."

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
+    from pipelines.archive import Run
+
+
 ArchiveOption = Annotated[
     str | None,
     typer.Option(
@@ -288,3 +291,11 @@ def short_values(value: float | Sequence[float] | None) -> str:
     if isinstance(value, list | tuple):
         return " / ".join(short(float(v)) for v in value)
     return short(value)  # pyright: ignore[reportArgumentType]  # not a sequence any more
+
+
+def print_remarks(run: Run, serials: Sequence[str]) -> None:
+    """Print missing or foreign signatures and differing library versions on standard error."""
+    from pipelines.certificates.coefficient_remarks import library_remarks, signature_remarks
+
+    for line in (*signature_remarks(run, serials), *library_remarks(run)):
+        error_console().print(f"show: {line}", markup=False, soft_wrap=True)

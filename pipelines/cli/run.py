@@ -74,10 +74,10 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import library_remarks
-    from pipelines.cli.adequacy_text import judged, print_adequacy
     from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
+    from pipelines.cli.text.verdict_text import judged, print_adequacy
     from pipelines.jobs.job import OF_RUN, Request
     from pipelines.jobs.seating import SCAN, read_seating
     from schemas.station import load_station

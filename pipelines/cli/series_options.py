@@ -1,9 +1,9 @@
-"""The input of ``allan`` and ``psd``: a file of samples, or a run of the archive."""
+"""The input of ``allan`` and ``psd``, a file of samples or a run of the archive, and their pictures and page."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import error_console
 from schemas.errors import WrongUse
@@ -45,3 +45,20 @@ def even_series(
         )
     run = Archive(archive).run(source)
     return None if run.about.get("capture") else series_of_run(run, stretch)
+
+
+def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | None) -> None:
+    """Draw a document of ``allan`` or ``psd`` as a picture, and as a page with its tables."""
+    if plot is None and page is None:
+        return
+    from pipelines.archive import files
+    from pipelines.drawing.picture import picture, refuse_ending
+    from pipelines.report.noise_page import noise_chart, noise_page
+
+    if plot is not None:
+        refuse_ending(plot, "--plot")
+        files.publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot", files.ELSEWHERE)
+        error_console().print(f"plot: {plot}", markup=False, soft_wrap=True)
+    if page is not None:
+        files.publish(page, noise_page(document).encode(), "page", files.ELSEWHERE)
+        error_console().print(f"page: {page}", markup=False, soft_wrap=True)

@@ -12,11 +12,11 @@ from pipelines.cli.options import (
     JsonOption,
     console,
     print_json,
+    print_remarks,
     print_table,
     rows,
     short,
 )
-from pipelines.cli.remarks import print_remarks
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import console, print_json, print_table
@@ -9,6 +11,7 @@ from pipelines.cli.options import console, print_json, print_table
 if TYPE_CHECKING:
     from pipelines.archive import Archive
     from pipelines.certificates import Calibration
+
 
 MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "who", "where", "when")
 
@@ -41,8 +44,7 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
     """The coefficients of a calibration, with the code, libraries and data that made them."""
     from pipelines.archive import Run
     from pipelines.certificates.certified_coefficients import coefficients_of
-    from pipelines.cli.arrow_alone import import_arrow_alone
-    from pipelines.cli.remarks import print_remarks
+    from pipelines.cli.options import print_remarks
 
     run = Run(archive, valid.run)
     if not (run.path / "run.json").is_file():
@@ -84,3 +86,32 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
 
 def _why(one: Calibration) -> str:
     return one.ended_by.reason or f"by {one.ended_by.certificate}" if one.ended_by else one.event.reason
+
+
+NOT_NEEDED = (
+    "numpy",
+    *(
+        "pyarrow._azurefs",
+        "pyarrow._gcsfs",
+        "pyarrow._hdfs",
+        "pyarrow._s3fs",
+    ),  # the archive has opened its own store before
+)
+"""Modules that Arrow imports where they are there."""
+
+
+def import_arrow_alone() -> None:
+    """Import Arrow and its Parquet reader without numpy, which is two fifths of the time of both, and without remote stores.
+
+    Arrow looks for numpy once, when it is imported; only its conversions to arrays and data frames need it. So this is for a
+    process that ends with its answer, and does nothing where either library is there already, as with an archive in an object
+    store.
+    """
+    if not {"numpy", "pyarrow"} & sys.modules.keys():
+        for name in NOT_NEEDED:
+            sys.modules[name] = None  # type: ignore[assignment] - how a process says that a library is not there
+        try:
+            import_module("pyarrow.parquet")
+        finally:
+            for name in NOT_NEEDED:
+                del sys.modules[name]

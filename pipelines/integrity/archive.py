@@ -6,20 +6,23 @@ import os
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import Archive, Run
-from pipelines.archive.listing import SEALED
+from pipelines.archive import Archive, Run, derived, files
+from pipelines.archive.listing import SEALED, agrees, info_of, stamp_of, stored_lines
+from pipelines.archive.packs import CONTAINER, CONTENTS, Contents
+from pipelines.archive.packs import FOLDER as PACKS
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
 from pipelines.archive.store import ObjectPath
-from pipelines.integrity.caches import check_ledger_index, check_list
+from pipelines.certificates.entries import FOLDER as LEDGER
+from pipelines.certificates.ledger_index import DIGITS, INDEX_FOLDER, all_read, indexed_events, stamps_of
 from pipelines.integrity.calibrations import check_shard
 from pipelines.integrity.captures import check_capture, check_strangers
 from pipelines.integrity.causes import by_cause
 from pipelines.integrity.chain import check_chain
-from pipelines.integrity.findings import MISSING, SIGNATURE, IntegrityFinding, VerifiedPart
-from pipelines.integrity.packs import check_packs
+from pipelines.integrity.findings import CHANGED, MISSING, SIGNATURE, UNREADABLE, IntegrityFinding, VerifiedPart
 from pipelines.integrity.runs import check_run
 from pipelines.integrity.seals import check_seals
 from pipelines.integrity.surroundings import SHOWN, check_links, check_mark, check_surroundings
@@ -32,7 +35,10 @@ if TYPE_CHECKING:
 
     from pipelines.archive.store import Place
 
+
 NEEDED = "a signature by the own key, or by one given with --key, is needed"
+MADE_AGAIN = "remove the file, it is made again automatically"
+FROM_A_COPY = "restore it from a copy"
 READERS = min(8, 2 * (os.cpu_count() or 1))
 READERS_OF_OBJECTS = 32  # an object store answers slowly, but many requests at once
 
@@ -239,3 +245,64 @@ def _trust(total: VerifiedPart) -> str:
     )
     unsigned = [f"{signatures[UNSIGNED]} unsigned"] if signatures[UNSIGNED] else []
     return ", ".join([*signed, *unknown, *unsigned])
+
+
+def check_list(archive: Archive, checked: VerifiedPart) -> None:
+    """Lines of the list must agree with the runs, where these were not changed since."""
+    place = archive.root / "index" / "list.json"
+    lines, state = stored_lines(place)
+    if state == derived.EDITED:
+        checked.wrong(CHANGED, place, f"was edited since it was made: {MADE_AGAIN}")
+    for name, (stamp, line) in lines.items():
+        run = Run(archive, name)
+        if stamp_of(run) != stamp:
+            continue
+        try:
+            info = info_of(run)
+        except (ArchiveUnusable, KeyError, TypeError):  # the check of the run reports it
+            continue
+        if info is None or not agrees(info, line):
+            checked.wrong(CHANGED, place, f"disagrees with the files of run {name}: {MADE_AGAIN}")
+
+
+def check_ledger_index(archive: Archive, checked: VerifiedPart) -> None:
+    """Events of the index must agree with the files of the ledger, where these were not changed since."""
+    stamps = stamps_of(archive.root / LEDGER)
+    for digit in DIGITS:
+        place = archive.root / INDEX_FOLDER / f"{digit}.noted"
+        stored, state = indexed_events(place)
+        if state == derived.EDITED:
+            checked.wrong(CHANGED, place, f"was edited since it was made: {MADE_AGAIN}")
+        own = stamps.get(digit, {})
+        held = [name for name, one in stored.items() if own.get(name) == one.stamp]
+        if any(stored[name].event != event for name, event in all_read(archive.root / LEDGER, held).items()):
+            checked.wrong(CHANGED, place, f"disagrees with the files of the ledger: {MADE_AGAIN}")
+
+
+def check_packs(archive: Archive, checked: VerifiedPart) -> None:
+    """The findings about the packs of an archive; those in an object store have none."""
+    if not isinstance(archive.root, Path):
+        return
+    known = set[str]()
+    top = archive.root / PACKS
+    for place in sorted(top.glob(f"*{CONTENTS}")) if top.is_dir() else ():
+        pack = place.with_suffix(CONTAINER)
+        known.add(pack.name)
+        if not pack.is_file():
+            checked.wrong(MISSING, pack, f"is missing, its table of contents is there: {FROM_A_COPY}")
+            continue
+        try:
+            state, about = derived.unframed(place)[1], Contents(place).about()
+            changed = files.sha256(pack) != about.get("sha256")
+        except (OSError, ValueError):
+            checked.wrong(UNREADABLE, place, f"is no table of contents of a pack: {FROM_A_COPY}")
+            continue
+        if state == derived.EDITED:
+            checked.wrong(CHANGED, place, f"was edited since the pack was made: {FROM_A_COPY}")
+        if changed:
+            checked.wrong(CHANGED, pack, f"has changed since it was made: {FROM_A_COPY}")
+    for place in sorted(top.glob(f"*{CONTAINER}")) if top.is_dir() else ():
+        if place.name not in known:
+            checked.remarks.append(
+                f"{checked.name(place)} has no table of contents: a compaction was killed; the next one removes it"
+            )

@@ -10,7 +10,7 @@ from pipelines.archive.packed_path import member_of
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import START
 from pipelines.archive.store import ObjectPath
-from pipelines.certificates.libraries import differing_libraries
+from pipelines.certificates.coefficient_remarks import differing_libraries
 from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, VerifiedPart
 
 if TYPE_CHECKING:

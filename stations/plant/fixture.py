@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from stations.plant.chamber import STEP_S, Chamber
 from stations.plant.device import stream
-from stations.plant.grid import Grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from schemas.simulation import Simulation
     from stations.plant.hidden import HiddenEffect
     from stations.plant.moisture import Moisture
+
 
 Array = NDArray[np.float64]
 
@@ -80,3 +80,30 @@ class Fixture:
         self.temperature.append(elements)
         self.air.append(np.array(self.chamber.air))
         self.vibration.append(np.array(self.chamber.vibration()))
+
+
+class Grid:
+    """A table with one row of ``shape`` per step."""
+
+    def __init__(self, first: Array) -> None:
+        self._rows = np.zeros((1024, *first.shape))
+        self._rows[0] = first
+        self.length = 1
+
+    def append(self, row: Array) -> None:
+        """Appends the row of the next step."""
+        if self.length == len(self._rows):
+            self._rows = np.concatenate((self._rows, np.zeros_like(self._rows)))
+        self._rows[self.length] = row
+        self.length += 1
+
+    @property
+    def last(self) -> Array:
+        """The newest row."""
+        return self._rows[self.length - 1]
+
+    def at(self, steps: Array) -> Array:
+        """Rows (n, *shape) at ``steps`` (n,), integer or fractional."""
+        left = np.minimum(np.floor(steps).astype(np.int64), self.length - 2)
+        part = (steps - left).reshape(-1, *(1,) * (self._rows.ndim - 1))
+        return self._rows[left] + part * (self._rows[left + 1] - self._rows[left])

@@ -185,7 +185,7 @@ def test_an_effect_that_only_the_verification_poses_show_is_refused_with_the_rea
 
     from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
-    from pipelines.cli.fit_refusal import fit_refusal
+    from pipelines.cli.next_commands import fit_refusal
     from pipelines.jobs.job import Request
 
     source = Path(__file__).resolve().parents[2] / "deploy" / "recipes"

@@ -44,7 +44,7 @@ from inertial.uncertainty.risk import (
     process_for,
 )
 from inertial.uncertainty.rounding import rounded
-from schemas.gravity import formula_gravity
+from schemas.uncertainty import formula_gravity
 
 BASE = ("bias", "scale", "misalignment")
 WARM = ("bias_temperature", "bias_temperature_quadratic", "scale_temperature", "scale_temperature_quadratic")

@@ -14,10 +14,9 @@ from typer.testing import CliRunner
 from inertial.uncertainty.rounding import chance
 from pipelines.archive import Run
 from pipelines.cli import app
-from pipelines.cli.adequacy_text import judged, print_adequacy
 from pipelines.cli.run import _next
 from pipelines.cli.summary import summary
-from pipelines.cli.text.verdict_text import verdict
+from pipelines.cli.text.verdict_text import judged, print_adequacy, verdict
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.jobs.adequacy import adequacy, adequacy_of
 from pipelines.report.context import ReportContext

@@ -22,7 +22,7 @@ from pipelines.audit.exchanged_serials import strangers
 from pipelines.audit.findings import findings
 from pipelines.audit.parameters import NAMES
 from pipelines.audit.rules import load_rules
-from pipelines.audit.serials import twice
+from pipelines.audit.unit_findings import twice
 
 RULES = load_rules()
 

@@ -27,12 +27,12 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive
 from pipelines.archive.signatures import make_key
 from pipelines.cli import app
-from pipelines.doctor import host, software
+from pipelines.doctor import examine as host
+from pipelines.doctor import software
 from pipelines.doctor.archive import archive_checks, key_checks
 from pipelines.doctor.check import PROBE_BYTES, Check, clock_check, offset
-from pipelines.doctor.host import host_checks
+from pipelines.doctor.examine import host_checks, station_checks
 from pipelines.doctor.orchestrator import orchestrator_checks
-from pipelines.doctor.station import station_checks
 from stations.safety.lease_parts import addresses
 from stations.safety.leases import Leases, new_holder
 
@@ -149,7 +149,7 @@ def test_an_archive_that_may_not_be_looked_into_is_a_fault(open_folder: Path) ->
 FULL = """
 import json, resource, signal, sys
 from pipelines.doctor.archive import archive_checks
-from pipelines.doctor.host import host_checks
+from pipelines.doctor.examine import host_checks
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
 print(json.dumps([archive_checks(sys.argv[1], 0.0), host_checks()]))

@@ -13,7 +13,7 @@ from inertial.noise.allan import overlapping
 from inertial.noise.terms import fit_terms
 from inertial.population.change_points import change_points
 from inertial.population.comparison import holm
-from pipelines.audit.exchanged_pairs import _fits
+from pipelines.audit.exchanged_serials import _fits
 from pipelines.procedures.base import FigureValue, worst
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures

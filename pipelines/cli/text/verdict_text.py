@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from inertial.uncertainty.rounding import equal
-from pipelines.cli.options import short
+from pipelines.cli.options import console, error_console, short
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from pipelines.archive import Run
+    from pipelines.jobs.adequacy import AdequacyDocument
+
 
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
 """Style of a verdict; None: it cannot be judged."""
@@ -61,3 +65,20 @@ def class_text(group: dict[str, Any]) -> str:
     units, dwells = group.get("units") or [], group.get("dwells") or []
     where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
     return f"{' or '.join(group['effects'])} ({where})"
+
+
+def judged(document: dict[str, Any], run: Run) -> dict[str, Any]:
+    """The result of a run with the verdict on its model."""
+    from pipelines.jobs.adequacy import adequacy_of
+
+    with error_console().status("judging the model"):
+        return {**document, "adequacy": adequacy_of(run)}
+
+
+def print_adequacy(verdict: AdequacyDocument | None) -> None:
+    """Print whether the model of a run is adequate; nothing where there is no multi-position test."""
+    if verdict is None:
+        return
+    faulty = f"; left out because of a data fault: {', '.join(verdict['faulty'])}" if verdict["faulty"] else ""
+    text = f"model   {plain_verdict(verdict)}{faulty}"
+    console().print(text, style=STYLE_OF[verdict["adequate"]], markup=False, soft_wrap=True)
