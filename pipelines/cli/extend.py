@@ -68,7 +68,7 @@ def command(
     """
     from pipelines.cli.inputs import add_effect_files
     from pipelines.cli.standard_output import is_standard_output, print_text
-    from pipelines.jobs.model_files import extended, publish_model, reduced
+    from pipelines.jobs.model_files import extended, model_step, publish_model, reduced
 
     printed = is_standard_output(output, "extend", as_json=as_json)
     _refuse_contradiction(model, effect, remove, why)
@@ -119,18 +119,6 @@ def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> No
         )
     if remove and not model.exists():
         raise WrongUse(f"extend: {model} does not exist, --remove needs a model file; correct the name")
-
-
-def model_step(effect: str, why: str, by: str, run: str) -> ModelStep:
-    """The change to make, missing values are filled in from the run."""
-    import getpass
-    from datetime import UTC, datetime
-
-    from pipelines.jobs.model_files import ModelStep
-
-    reason = why.strip() or (f"the diagnosis of {run} names the effect" if run else "no reason given")
-    at = datetime.now(UTC).replace(microsecond=0)
-    return ModelStep(effect.strip(), by.strip() or getpass.getuser(), at, reason, run)
 
 
 def _start(model: Path, effects: str, step: ModelStep) -> tuple[str, bool]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.improve_steps import ImprovedTables, Improvement
 from pipelines.cli.options import (
     ArchiveOption,
     ByOption,
@@ -18,9 +19,14 @@ from pipelines.cli.options import (
     HistoryOption,
     JsonOption,
     LeaveOutOption,
+    error_console,
     print_json,
 )
+from pipelines.improvement.improvement import ImprovedTables, Improvement
 from schemas.errors import DONE, PART_FAILED, WrongUse
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 215
@@ -29,6 +35,8 @@ EXAMPLES = (
     "tumbleline improve latest",
     "tumbleline improve dwells.csv --model model.toml --fresh fresh.csv --yes",
 )
+CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
+UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
 
 
 def command(
@@ -78,6 +86,8 @@ def command(
     the resulting model is adequate and no fresh run refutes it; 1: otherwise; 2: the input cannot be used.
     """
     from pipelines.cli.inputs import add_effect_files, both_runs, judged_effects
+    from pipelines.cli.next_commands import judged_data
+    from pipelines.cli.text.improve_text import next_lines, print_improvement
     from pipelines.diagnosis.inputs import history_beside
     from pipelines.importers.files import is_file
     from pipelines.tables.leave_out import leave_out as without_dwells
@@ -91,15 +101,68 @@ def command(
     tables = ImprovedTables(dwells, temperatures, again, again_temperatures)
     beside = history or (history_beside(data) if is_file(data) else "")
     may_measure = True if yes and measure is None else measure
-    improvement = Improvement(data, tables, model, target, beside, by, as_json, archive, fresh, may_measure)
+    attendant = _Terminal(data, model, archive, quiet=as_json, measure=may_measure)
+    improvement = Improvement(data, tables, model, target, beside, by, fresh, attendant)
     document = improvement.run(judged, _names(choose), yes=yes)
+    find = partial(judged_data, data, beside, archive)
+    document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
     if as_json:
         print_json(document)
     else:
-        from pipelines.cli.text.improve_text import print_improvement
-
         print_improvement(document)
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
+
+
+class _Terminal:
+    """Shows an improvement at the terminal and asks its questions there.
+
+    quiet : no diagnosis is printed · measure : whether the station measures a fresh run; None: it is asked
+    """
+
+    def __init__(
+        self, data: str, model: Path | None, archive: str | None, *, quiet: bool, measure: bool | None
+    ) -> None:
+        self._data, self._model, self._archive, self._quiet, self._measure = data, model, archive, quiet, measure
+
+    def working(self, what: str) -> AbstractContextManager[Any]:
+        """A line that stands while something is computed."""
+        return error_console().status(what)
+
+    def begins_again(self, added: list[str]) -> None:
+        """Prints the heading of the second diagnosis."""
+        from pipelines.cli.text.improve_text import print_heading
+
+        print_heading(f"Diagnosis with {', '.join(added)}", quiet=self._quiet)
+
+    def diagnosed(self, document: dict[str, Any], *, first: bool) -> None:
+        """Prints a diagnosis with all its tables the first time, as its verdict alone later."""
+        from pipelines.cli.text.diagnosis_text import print_diagnosis
+        from pipelines.cli.text.improve_text import print_verdict
+
+        if self._quiet:
+            return
+        if first:
+            print_diagnosis(document, data=None, model=self._model)
+        else:
+            print_verdict(document)
+
+    def agrees(self, effect: str, others: list[str], target: Path) -> bool:
+        """The answer of the operator, who is told what these data do not separate from the effect."""
+        from pipelines.cli.terminal import agreed
+
+        question = f"Add {effect} to {target}?"
+        if others:
+            alike = ", ".join(others)
+            question = f"These data do not separate {effect} from {alike}. Add the first, {effect}, to {target}?"
+        return agreed(question, CHOICES, UNATTENDED)
+
+    def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
+        """A fresh run of the archive, or one that the station measures now."""
+        from pipelines.cli.improve_fresh import fresh_run
+        from pipelines.cli.inputs import dwells_and_history
+
+        name = fresh_run(self._data, self._archive, measure=self._measure)
+        return (name, *dwells_and_history(name, "", self._archive)) if name else None
 
 
 def _target(model: Path | None, output: Path | None) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import tomlkit
@@ -20,7 +21,6 @@ from schemas.toml_files import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-    from datetime import datetime
     from pathlib import Path
 
     from tomlkit.items import Array, Table
@@ -251,3 +251,12 @@ def _table(content: Mapping[str, object]) -> Table:
     for key, value in content.items():
         table.add(key, value)
     return table
+
+
+def model_step(effect: str, why: str, by: str, run: str) -> ModelStep:
+    """The change to make, missing values are filled in from the run."""
+    import getpass
+
+    reason = why.strip() or (f"the diagnosis of {run} names the effect" if run else "no reason given")
+    at = datetime.now(UTC).replace(microsecond=0)
+    return ModelStep(effect.strip(), by.strip() or getpass.getuser(), at, reason, run)

@@ -1,21 +1,19 @@
-"""The steps of tumbleline improve: diagnosis, choice of effects, new versions of the model, errors of each version."""
+"""Diagnosis, choice of effects, new versions of the model, error of each version; whoever asks and shows is handed in."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     import pandas as pd
 
     from pipelines.jobs.model_files import Version
-
-CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
-UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
 
 
 @dataclass(frozen=True)
@@ -28,13 +26,37 @@ class ImprovedTables:
     fresh_history: pd.DataFrame | None
 
 
+class Attendant(Protocol):
+    """Who sees an improvement and answers its questions: a terminal, or pages."""
+
+    def working(self, what: str) -> AbstractContextManager[Any]:
+        """Shows what is computed, until it is done."""
+        ...
+
+    def begins_again(self, added: list[str]) -> None:
+        """Is told that the model with some more effects is diagnosed next."""
+        ...
+
+    def diagnosed(self, document: dict[str, Any], *, first: bool) -> None:
+        """Sees a diagnosis: of the model that is judged, or of the last version."""
+        ...
+
+    def agrees(self, effect: str, others: list[str], target: Path) -> bool:
+        """Whether an effect is added, which the data do not separate from others."""
+        ...
+
+    def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
+        """Name, dwells and temperatures of a fresh run that is there or is measured now; None without one."""
+        ...
+
+
 @dataclass(frozen=True)
 class Improvement:
     """Diagnosis, choice, new versions of the model, error of each version, diagnosis of the last one.
 
     model : the file that is judged; None for a list of effects · target : the file to write
     used_history : file of temperatures against time; empty where there is none · by : author of the change
-    fresh : the fresh run as it was given; empty: it is looked for, or measured as ``measure`` says
+    fresh : the fresh run as it was given; empty: the attendant is asked for one
     """
 
     data: str
@@ -43,26 +65,22 @@ class Improvement:
     target: Path
     used_history: str
     by: str
-    quiet: bool
-    archive: str | None
     fresh: str
-    measure: bool | None
+    attendant: Attendant
 
     def run(self, judged: list[str] | None, named: list[str], *, yes: bool) -> dict[str, Any]:
-        """The document of the command; the model file is written last, after all checks."""
-        from pipelines.cli.next_commands import judged_data
-        from pipelines.cli.text.improve_text import next_lines, print_heading
+        """The document of the improvement; the model file is written last, after all checks."""
         from pipelines.jobs.model_files import publish_model
 
-        before = self._diagnosis(judged, full=True)
+        before = self._diagnosis(judged, first=True)
         choices = self._choices(before, named, yes=yes)
         added = [choice["effect"] for choice in choices if choice["added"]]
         versions, text = self._versions(before["effects"], added, choices)
         after = before
         if added:
-            print_heading(f"Diagnosis with {', '.join(added)}", quiet=self.quiet)
-            after = self._diagnosis(list(versions[-1].effects), full=False)
-        tables, fresh = self._with_fresh(bool(added))
+            self.attendant.begins_again(added)
+            after = self._diagnosis(list(versions[-1].effects), first=False)
+        tables, fresh = self._with_fresh(changed=bool(added))
         rows = self._rows(versions, after["error"]["floor_ug"], tables)
         if text:
             publish_model(self.target, text)
@@ -80,38 +98,33 @@ class Improvement:
             "warnings": list(dict.fromkeys(text for row in rows for text in row["warnings"])),
         }
         document["fresh"] = fresh or None
-        data = partial(judged_data, self.data, self.used_history, self.archive)
-        document["next"] = next_lines(document, self.target, data, after=after)
         return document
 
-    def _with_fresh(self, changed: bool) -> tuple[ImprovedTables, str]:
+    def _with_fresh(self, *, changed: bool) -> tuple[ImprovedTables, str]:
         """The tables with those of a fresh run, and its name; a changed model is judged by one where there may be one."""
-        from pipelines.cli.improve_fresh import fresh_run
-        from pipelines.cli.inputs import dwells_and_history
-
-        fresh = self.fresh
-        if fresh or not changed:
-            return self.tables, fresh
-        fresh = fresh_run(self.data, self.archive, measure=self.measure)
-        if not fresh:
+        if self.fresh or not changed:
+            return self.tables, self.fresh
+        found = self.attendant.fresh_run()
+        if found is None:
             return self.tables, ""
-        again, temperatures = dwells_and_history(fresh, "", self.archive)
-        return replace(self.tables, fresh=again, fresh_history=temperatures), fresh
+        name, again, temperatures = found
+        return ImprovedTables(self.tables.dwells, self.tables.history, again, temperatures), name
 
-    def _diagnosis(self, effects: list[str] | None, *, full: bool) -> dict[str, Any]:
-        """The diagnosis of a model, printed with all its tables or as its verdict alone."""
-        from pipelines.cli.diagnose import diagnosed
-        from pipelines.cli.text.diagnosis_text import print_diagnosis
-        from pipelines.cli.text.improve_text import print_verdict
+    def _diagnosis(self, effects: list[str] | None, *, first: bool) -> dict[str, Any]:
+        """The diagnosis of a model, as the attendant sees it."""
+        from threadpoolctl import threadpool_limits
 
-        tables = self.tables
-        document, _ = diagnosed(tables.dwells, tables.history, effects, self.data, with_report=False)
+        from pipelines.parallel import keep_memory
+
+        keep_memory()
+        with threadpool_limits(1), self.attendant.working("looking for missing effects"):
+            from pipelines.diagnosis.examination import (
+                examination,  # loads the search for effects: after the first line
+            )
+
+            document = examination(self.tables.dwells, self.tables.history, effects).document
         document["history"] = self.used_history or None
-        if not self.quiet:
-            if full:
-                print_diagnosis(document, data=None, model=self.model)
-            else:
-                print_verdict(document)
+        self.attendant.diagnosed(document, first=first)
         return document
 
     def _choices(self, diagnosis: dict[str, Any], named: list[str], *, yes: bool) -> list[dict[str, Any]]:
@@ -148,24 +161,17 @@ class Improvement:
 
     def _answer(self, effect: str, others: list[str], *, chosen: bool, named: bool, yes: bool) -> tuple[str, bool]:
         """What decided on an effect, and whether it is added."""
-        from pipelines.cli.terminal import agreed
-
         if named:
             return "--effect", chosen
         if yes:
             return ("undecided", False) if others else ("--yes", True)
-        question = f"Add {effect} to {self.target}?"
-        if others:
-            alike = ", ".join(others)
-            question = f"These data do not separate {effect} from {alike}. Add the first, {effect}, to {self.target}?"
-        return "question", agreed(question, CHOICES, UNATTENDED)
+        return "question", self.attendant.agrees(effect, others, self.target)
 
     def _versions(
         self, effects: list[str], added: list[str], choices: list[dict[str, Any]]
     ) -> tuple[list[Version], str]:
         """The model that was judged and one version per added effect; the text of the model file, empty without a change."""
-        from pipelines.cli.extend import model_step
-        from pipelines.jobs.model_files import Version, extended, model_text, new_model, versions
+        from pipelines.jobs.model_files import Version, extended, model_step, model_text, new_model, versions
 
         judged = Version(1, tuple(effects), (), (), None)
         if not added:
@@ -197,12 +203,20 @@ class Improvement:
 
     def _rows(self, versions: list[Version], noise: float | None, given: ImprovedTables) -> list[dict[str, Any]]:
         """Errors of each version; none where no unit can be judged."""
-        from pipelines.cli.compare import compared
+        from threadpoolctl import threadpool_limits
+
         from pipelines.diagnosis.model_history import JUDGED, evolution
 
         if noise is None:
             return []
-        tables = (given.dwells, given.history, given.fresh, given.fresh_history)
-        rows = evolution(versions, lambda effects, before: compared(effects, *tables, before=before))
+        tables = (given.history, given.fresh, given.fresh_history)
+
+        def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
+            from pipelines.diagnosis.diagnose import compare
+
+            with threadpool_limits(1), self.attendant.working("fitting"):
+                return compare(given.dwells, effects, *tables, before)
+
+        rows = evolution(versions, compared)
         keys = ("version", "added", "fitted_ug", "heldout_ug", "fresh_ug", *JUDGED, "text")
         return [{key: row[key] for key in keys} | {"noise_ug": noise, "warnings": row["warnings"]} for row in rows]

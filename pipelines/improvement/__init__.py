@@ -1,0 +1,1 @@
+"""Improvement of a model: diagnosis, choice of effects, new versions, and the error of each version."""
