@@ -239,7 +239,7 @@ def lines() -> list[str]:
 
 
 def test_every_start_of_a_server_or_worker_is_one_that_is_there() -> None:
-    matches = [re.search(r"-m pipelines\.flows\.(server|worker) ([^&]*)", text) for text in lines()]
+    matches = [re.search(r"-m pipelines\.orchestrator\.(server|worker) ([^&]*)", text) for text in lines()]
     given = [(match[1], match[2].split()) for match in matches if match]
     assert [module for module, _ in given].count("worker") >= 4
     for module, arguments in given:

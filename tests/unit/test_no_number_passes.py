@@ -13,7 +13,7 @@ from inertial.noise.allan import overlapping
 from inertial.noise.terms import fit_terms
 from inertial.population.change_points import change_points
 from inertial.population.comparison import holm
-from pipelines.audit.exchanged_serials import _fits
+from pipelines.audit.exchanged_serials import _within
 from pipelines.procedures.base import FigureValue, worst
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures
@@ -56,7 +56,7 @@ def test_a_unit_of_which_nothing_is_known_fits_nobodys_past() -> None:
     for new, error, fits in ((0.5, 0.1, True), (5.0, 0.1, False), (np.nan, 0.1, False), (0.5, np.nan, False)):
         values = np.array([[0.0, 0.0], [new, 3.0]])
         errors = np.array([[0.1, 0.1], [error, 0.1]])
-        assert _fits(SimpleNamespace(values=values, errors=errors), 1, 0, bound) is fits
+        assert _within(SimpleNamespace(values=values, errors=errors), 1, 0, bound) is fits
 
 
 def test_a_comparison_that_could_not_be_made_spoils_no_other() -> None:
