@@ -84,9 +84,8 @@ def test_an_error_of_the_references_moves_the_whole_lot(rng: np.random.Generator
         risk = lot_risk(mean, process, u, shared, (-1.0, 1.0), (-accept, accept))
         assert risk.pfa == pytest.approx(np.mean((np.abs(true) > 1.0) & (np.abs(read) <= accept)), abs=2e-3)
         assert risk.pfr == pytest.approx(np.mean((np.abs(true) <= 1.0) & (np.abs(read) > accept)), abs=2e-3)
-    alone, same = (
-        one(0.0, 0.5, 0.25, *more, (-1.0, 1.0), (-1.0, 1.0)) for one, more in ((global_risk, ()), (lot_risk, (0.0,)))
-    )
+    alone = global_risk(0.0, 0.5, 0.25, (-1.0, 1.0), (-1.0, 1.0))
+    same = lot_risk(0.0, 0.5, 0.25, 0.0, (-1.0, 1.0), (-1.0, 1.0))
     assert same.pfa == pytest.approx(alone.pfa, abs=1e-12)
 
 
