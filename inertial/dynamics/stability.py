@@ -130,6 +130,11 @@ def _drift_error(means: Array, white: float, identified: IdentifiedNoise | None)
     return error, replace(mixtures, walk=mixtures.walk / size)
 
 
+def dof_of_means(means: Array, white: float) -> float:
+    """Effective degrees of freedom of the standard deviation of means of 100 s, each with white noise of a variance."""
+    return dof_of_sd(_drift_error(means, white, None)[1], white, means.size)
+
+
 def deviation_interval(deviation: float, dof: float) -> tuple[float, float]:
     """95 % interval of a standard deviation that is known with ``dof`` degrees of freedom: σ²·ν/χ²."""
     low, high = (deviation * float(np.sqrt(dof / chi2.ppf(p, dof))) for p in (0.975, 0.025))

@@ -14,6 +14,7 @@ from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
 from inertial.uncertainty.risk import global_risk, lot_risk
 from pipelines.procedures.base import FigureValue
 from pipelines.procedures.worst import worst
+from pipelines.stages.bias_stability import bias_stability
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures
 from pipelines.stages.lot_risks import lot_risks
@@ -181,3 +182,19 @@ def test_the_intervals_of_a_gauge_study_hold(
         ends = study.gauge_interval, study.percent_interval
         held += [low <= true <= high for (low, high), true in zip(ends, (gauge, percent), strict=True)]
     assert np.all(held / runs > 0.91)
+
+
+@pytest.mark.parametrize("walk", [0.0, 1.0])
+def test_the_stability_of_the_static_record_has_the_freedoms_of_its_noise(
+    walk: float, rng: np.random.Generator
+) -> None:
+    at, held, runs = np.arange(36), 0, 200
+    covariance = np.eye(36) + 100.0 * walk**2 * (
+        np.minimum.outer(at, at) + np.where(np.equal.outer(at, at), 1 / 3, 0.5)
+    )
+    true = float(np.sqrt((np.trace(covariance) - covariance.mean() * 36.0) / 35.0))
+    for _ in range(runs):
+        found = bias_stability(10.0 * rng.normal(size=3600) + walk * np.cumsum(rng.normal(size=3600)), 1.0)
+        assert found is not None
+        held += found[1] <= true <= found[2]
+    assert held / runs > 0.9  # as of 36 independent means it holds in 42 % of a walk
