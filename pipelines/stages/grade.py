@@ -107,6 +107,7 @@ def grade(
     )
     figure_rows: list[dict[str, object]] = []
     grade_rows: list[dict[str, object]] = []
+    squares: dict[str, list[float]] = {}
     for verdict in evidence.verdicts.to_dict("records"):
         unit = str(verdict["unit"])
         if verdict["refused"] or (coefficients is None and tumbles):
@@ -127,21 +128,24 @@ def grade(
             own_figures += figures_of(own)
         own_figures += _of_procedures(evidence.procedure_figures, unit, limits)
         decisions = [
-            decide(limits, f.name, f.value, f.uncertainty)
+            decide(limits, f.name, f.value, f.uncertainty, f.law)
             for f in own_figures
             if f.name in limits.figures and not f.why_not
         ]
         if figures:
             figure_rows += [_figure_row(unit, one, decisions, limits) for one in own_figures if not one.why_not]
+            for one in own_figures:
+                squares.setdefault(one.name, []).append(one.shared**2)
         grade_rows.append(_decided(verdict, own_figures, decisions, limits, evidence.basis))
     grades = _table(grade_rows).assign(rule=rule, basis=evidence.basis)
     if not figures:
         return {"grades": grades}
+    shared = {name: float(np.sqrt(np.mean(own))) for name, own in squares.items()}
     figure_table = _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS)
     return {
         "figures": figure_table,
         "grades": grades,
-        "lot_risks": lot_risks(figure_table, limits, evidence.uncertainties),
+        "lot_risks": lot_risks(figure_table, limits, shared),
     }
 
 
@@ -182,7 +186,15 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         why = "" if row["identified"] else f"axis {row['axis']}: {row['note']}"
         value = float(row["value"]) if row["identified"] else np.inf
         name = str(row["figure"])
-        one = Figure(name, str(row["unit_text"]), value, float(row["uncertainty"]) if not why else 0.0, why)
+        one = Figure(
+            name,
+            str(row["unit_text"]),
+            value,
+            float(row["uncertainty"]) if not why else 0.0,
+            why,
+            dof=float(row.get("dof", np.nan)),  # runs of earlier versions have none
+            removed=float(row.get("removed", 0.0)),
+        )
         before = figures.get(name)
         least = name in limits.figures and limits.figures[name].min is not None
         if before is None or _badness(one, guard, least=least) > _badness(before, guard, least=least):
