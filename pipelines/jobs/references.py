@@ -142,10 +142,15 @@ def contradiction(judged: ReferencesDocument) -> str:
 
 def _found(one: SeenReference) -> str:
     unit, high = UNITS.get(one["unit"], one["unit"]), one["high"]
-    interval = f"above {one['low']:.3g}" if high is None else f"{one['low']:.3g} to {high:.3g}"
+    interval = f"above {_digits(one['low'])}" if high is None else f"{_digits(one['low'])} to {_digits(high)}"
     names = " or ".join(LABELS[name] for name in (one["entry"], *one["rivals"]))
-    values = f"stated u {one['stated']:.3g} {unit}, found {one['found']:.3g} {unit} (95 %: {interval} {unit})"
+    values = f"stated u {_digits(one['stated'])} {unit}, found {_digits(one['found'])} {unit} (95 %: {interval} {unit})"
     return f"{names}: {values}"
+
+
+def _digits(value: float, count: int = 3) -> str:
+    """A value to so many digits, without an exponent up to a million."""
+    return f"{float(f'{value:.{count}g}'):g}"
 
 
 def unseen(judged: ReferencesDocument) -> str:
@@ -158,5 +163,5 @@ def unseen(judged: ReferencesDocument) -> str:
 
 def _from(one: SeenReference) -> str:
     unit = UNITS.get(one["unit"], one["unit"])
-    size = "no size" if one["told_from"] is None else f"u {one['told_from']:.2g} {unit}"
-    return f"{size} (stated {one['stated']:.3g})"
+    size = "no size" if one["told_from"] is None else f"u {_digits(one['told_from'], 2)} {unit}"
+    return f"{size} (stated {_digits(one['stated'])})"

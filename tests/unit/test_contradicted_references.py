@@ -123,14 +123,14 @@ def test_a_run_on_a_worse_table_says_what_is_stated_and_what_was_found(
 
 
 def test_the_report_shows_stated_and_found(runs: dict[float, Run]) -> None:
-    html = stated_references.render(ReportContext(runs[200.0], None))
+    html = stated_references.render(ReportContext(runs[200.0], {}))
     assert html is not None
     assert "the table is worse than stated" in html
     assert "not contradicted" not in html.lower()
     assert all(
         html.count(f"<{tag}>") + html.count(f"<{tag} ") == html.count(f"</{tag}>") for tag in ("table", "tr", "td", "p")
     )
-    assert "Not contradicted" in str(stated_references.render(ReportContext(runs[50.0], None)))
+    assert "Not contradicted" in str(stated_references.render(ReportContext(runs[50.0], {})))
 
 
 def test_a_contradicted_run_is_not_certified_and_a_weaker_finding_stands_in_the_certificate(
