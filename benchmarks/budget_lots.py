@@ -67,9 +67,11 @@ def plan_of(recipe: str) -> Plan:
     )
 
 
-def measured(plan: Plan, preset: Preset, rng: np.random.Generator) -> tuple[pd.DataFrame, list[Truth], Array]:
+def measured(
+    plan: Plan, preset: Preset, rng: np.random.Generator, drawn_as: ReferenceErrors = DRAWN
+) -> tuple[pd.DataFrame, list[Truth], Array]:
     """Dwells of a lot on a station with errors of its own, the truth of its units, and the noise that they had, g."""
-    station = StationErrors(DRAWN, rng)
+    station = StationErrors(drawn_as, rng)
     scatter = np.radians(station.pose_deg) * rng.standard_normal((2, plan.outer.size))
     outer, inner = station.table(plan.outer, plan.inner)
     up = station.up(np.array([0.0, 0.0, 1.0]))

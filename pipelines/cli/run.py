@@ -74,7 +74,7 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import library_remarks
-    from pipelines.cli.adequacy_text import judged, print_adequacy
+    from pipelines.cli.adequacy_text import judged, print_adequacy, print_references
     from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
@@ -110,6 +110,7 @@ def command(
         for document in documents:
             print_summary(document)
             print_adequacy(document["adequacy"])
+            print_references(document["references"])
         print_next(
             console(),
             [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
