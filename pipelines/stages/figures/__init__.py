@@ -37,7 +37,7 @@ class IncompleteFigure(Exception):
 class Figure(NamedTuple):
     """Value and standard uncertainty of one figure of one unit, in the figure's unit.
 
-    why_not : why there is no value, where there is none; the value is then infinite and passes no limit
+    why_not, median : as of :class:`pipelines.stages.figures.base.Value`
     """
 
     name: str
@@ -45,6 +45,7 @@ class Figure(NamedTuple):
     value: float
     uncertainty: float
     why_not: str = ""
+    median: float = float("nan")
 
 
 def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:

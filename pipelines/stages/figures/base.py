@@ -26,11 +26,13 @@ class Value(NamedTuple):
     """Value and standard uncertainty of a figure of one unit, in the figure's unit.
 
     why_not : why there is no value, where there is none; the value is then infinite and passes no limit
+    median : of a value that is a 95 % bound of an error, the median of that error
     """
 
     value: float
     uncertainty: float
     why_not: str = ""
+    median: float = float("nan")
 
     def reach(self, guard: float) -> float:
         """Magnitude with the guard band: the value that is compared with a limit."""
