@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -39,7 +40,11 @@ GRADES: Mapping[str, float] = {
 }
 GRADE_FIGURE = "bias_error_ug"
 PERIOD_FIGURE = "bias_error_period_ug"
-"""The figure that a grade rests on where it is known: the error over the period of validity."""
+"""The figure that a grade rests on where it is known: the 95 % bound of the largest error over the period of validity."""
+LARGEST_ERROR, MEDIAN, BOUND = "bias_error_largest", "median", "95 %"
+"""The quantity of a budget that it is read from, and the names of its quantiles, at the place of an axis."""
+BOUND_SHARE = 0.95
+"""Probability of a figure that is a bound: the error stays below it."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,14 @@ class Decision:
         return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
 
 
-def decide(limits: Limits, figure: str, value: float, standard_uncertainty: float, law: Law | None = None) -> Decision:
+def decide(
+    limits: Limits,
+    figure: str,
+    value: float,
+    standard_uncertainty: float,
+    law: Law | None = None,
+    median: float = float("nan"),
+) -> Decision:
     """The decision on a figure by the limits' rule.
 
     Parameters
@@ -106,7 +118,11 @@ def decide(limits: Limits, figure: str, value: float, standard_uncertainty: floa
     figure : a key of ``limits.figures``.
     value, standard_uncertainty : in the figure's unit; the rule's coverage factor is applied here.
     law : of the figure where it is not normal; the guard band then ends where the risk is that of the normal one.
+    median : of a figure that is a 95 % bound; it passes where the probability of more than the limit is within the rule's, 5 %
+        where that states none
     """
+    if median == median:  # noqa: PLR0124 - not a nan
+        return _decide_bound(limits, figure, value, median)
     guard = limits.guard_factor * standard_uncertainty
     expanded = limits.coverage_factor * standard_uncertainty
     own = limits.figures[figure]
@@ -135,6 +151,36 @@ def decide(limits: Limits, figure: str, value: float, standard_uncertainty: floa
         accept=outer if least else inner,
         least=least,
     )
+
+
+def _decide_bound(limits: Limits, figure: str, bound: float, median: float) -> Decision:
+    limit = limits.figures[figure].max or 0.0
+    risk = exceedance(median, bound, limit)
+    allowed = (limits.pfa_max or LARGEST_PFA) if limits.rule == "allowed_pfa" else 1.0 - BOUND_SHARE
+    accept = limit if limits.rule != "allowed_pfa" else float("nan")
+    return Decision(
+        figure=figure,
+        value=bound,
+        uncertainty=0.0,
+        limit=limit,
+        unit=limits.figures[figure].unit,
+        rule=describe_rule(limits),
+        outcome="pass" if risk <= allowed else "fail",
+        risk=risk,
+        accept=accept,
+    )
+
+
+def exceedance(median: float, bound: float, limit: float) -> float:
+    """Probability that an error with this median and 95 % bound exceeds a limit.
+
+    Its logarithm is taken as normal: of the root of a sum of squares, whose tail is Gaussian, this states more than is met beyond
+    the bound.
+    """
+    if not (median > 0.0 and bound > median and limit > 0.0):
+        return float(not bound <= limit)
+    score = NormalDist().inv_cdf(BOUND_SHARE) * log(limit / median) / log(bound / median)
+    return NormalDist().cdf(-score)
 
 
 def outside(value: float, u: float, limit: float) -> float:

@@ -32,6 +32,12 @@ class UnitDocument(TypedDict):
     slot: int
     outcome: Literal["pass", "fail", "refused"]
     grade: str
+    grade_risk: NotRequired[
+        Annotated[
+            float | None,
+            "probability that the RMS error of any axis exceeds the limit of the grade at the end of the period; null: not known",
+        ]
+    ]
     reasons: Annotated[str, "separated by `; `; empty if it passed"]
     rule: str
     figures: Annotated[dict[str, FigureDocument], "by [name](../reference/figures.md); empty if refused"]

@@ -41,6 +41,7 @@ class Figure(NamedTuple):
     why_not : why there is no value, where there is none; the value is then infinite and passes no limit
     dof, removed : degrees of freedom of a standard deviation, nan of other figures, and the known part that was taken out of it
     shared : part of the uncertainty that the units of a lot have in common
+    median : of a value that is a 95 % bound of an error, the median of that error
     """
 
     name: str
@@ -50,6 +51,7 @@ class Figure(NamedTuple):
     why_not: str = ""
     dof: float = float("nan")
     shared: float = 0.0
+    median: float = float("nan")
     removed: float = 0.0
 
     @property

@@ -30,6 +30,7 @@ class Value(NamedTuple):
     why_not : why there is no value, where there is none; the value is then infinite and passes no limit
     dof : degrees of freedom of a standard deviation, nan of other figures
     shared : part of the uncertainty that the units of a lot have in common, that of the references
+    median : of a value that is a 95 % bound of an error, the median of that error
     """
 
     value: float
@@ -37,6 +38,7 @@ class Value(NamedTuple):
     why_not: str = ""
     dof: float = float("nan")
     shared: float = 0.0
+    median: float = float("nan")
 
     def reach(self, guard: float) -> float:
         """Magnitude with the guard band: the value that is compared with a limit."""
