@@ -260,7 +260,6 @@ TABLES: dict[str, Table] = {
             "slot": whole(),
             "outcome": text(*OUTCOMES),
             "grade": any_text(),
-            **gaps(("grade_risk",)),
             "reasons": any_text(),
             "rule": any_text(),
         },

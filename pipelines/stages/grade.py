@@ -253,7 +253,7 @@ def _decided(
             risk = exceedance(figure.median, figure.value, GRADES[best])
         if not known and _good_enough(best, BEST_OF_NOISE):
             best = BEST_OF_NOISE
-        if not _good_enough(best, limits.grade):
+        if limits.grade != NO_GRADE and not _good_enough(best, limits.grade):
             reasons.append(f"grade {best}{_why(figure, best, basis)}: grade {limits.grade} is needed")
     return _grade_row(verdict, "fail" if reasons else "pass", best, "; ".join(reasons), risk)
 

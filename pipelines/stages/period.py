@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,19 +58,21 @@ def period_of(tables: BudgetTables, terms: BudgetTerms, unit: str, axis: str, sp
     }
     walk = walk_of(tables, unit, axis)
     if walk > 0.0:
-        parts["random_walk"] = walk * walk_later(carried(windows, stability.flicker_slowest_s))
+        parts["random_walk"] = walk * walk_carried(windows, stability.flicker_slowest_s)
     if stability.ageing is not None:
         parts["ageing"] = ageing_u(stability.ageing, windows)
     return Period({name: value for name, value in parts.items() if value > 0.0 or name == "flicker"})
 
 
-def carried(windows: Windows, slowest: float | None) -> Windows:
-    """Times over which the random walk of a run goes on: over the run, and after it as long as changes are known to go on.
+def walk_carried(windows: Windows, slowest: float | None) -> float:
+    """Standard deviation of the random walk of a run at a use after it, for K = 1/√s.
 
-    That is the slowest time constant that the history of the device shows, or the length of the run where it is longer. Carried
-    on for a year, K of an hour would grow by a factor of a hundred, to more than devices do; slower changes are ageing.
+    It goes on over the run and the period, but is bounded: by the slowest time constant that the history of the device shows,
+    and no less than calibration and a use as long as it show themselves, each by a third of its length. Carried on for a year,
+    K of an hour would grow by a factor of a hundred, to more than devices do; slower changes are ageing.
     """
-    return replace(windows, gap=min(windows.gap, max(slowest or 0.0, windows.calibration)))
+    bound = max(slowest or 0.0, 2.0 * windows.calibration / 3.0)
+    return min(walk_later(windows), float(np.sqrt(bound)))
 
 
 def walk_of(tables: BudgetTables, unit: str, axis: str) -> float:

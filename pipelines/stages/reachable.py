@@ -202,7 +202,7 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
         one = worst[quantity]
         needed = limits.figures[figure].max if figure in limits.figures else None
         if quantity == LARGEST_ERROR:
-            needed = min(needed or GRADES[limits.grade], GRADES[limits.grade])
+            needed = min((limit for limit in (needed, GRADES.get(limits.grade)) if limit is not None), default=None)
         if one is None or needed is None:
             continue
         period = quantity == LARGEST_ERROR
