@@ -3,7 +3,9 @@
 Lots are measured on a station that draws every stated contribution at random for each lot (gravity, level, axes, encoders,
 poses, seat, thermometer, gradient, gain, reader), with devices and flicker of a preset, and go through the chain's own fit,
 verify and budget. Reported are the shares of coefficients, and of corrected outputs at random forces and temperatures, whose
-error lies within the stated 95 % interval, and wrong acceptances against the probability of false acceptance that was stated.
+error lies within the stated 95 % interval, and wrong acceptances against the probability of false acceptance that was stated;
+below each row, for every certified coefficient, the share within its expanded uncertainty U = k·u as a certificate states it
+(95.45 %), with a 95 % interval by lots, as units of a lot share the errors of their station.
 The station is the simulated plant's own geometry; it does not know the budget.
 """
 
@@ -34,7 +36,7 @@ from schemas.validity import CertificateTerms, Stability  # noqa: E402
 from stations.plant.preset import Preset, load_preset  # noqa: E402
 
 Array = np.ndarray
-PRESETS = ("adxl355", "sf1500", "qa700")
+PRESETS = ("adxl355", "sf1500", "qa700", "analogue")
 STATED = Uncertainty.model_validate(
     {
         "grade_source": "certificates",
@@ -92,6 +94,10 @@ def one_lot(plan: Plan, preset: Preset, rng: np.random.Generator) -> dict[str, l
             .to_numpy()
             .reshape(3, width)
         )
+        for name, inside in _certified(
+            sums[sums["unit"] == own], estimate, true_coefficients(truth, plan.effects)
+        ).items():
+            out.setdefault(f"U of {name}", []).extend(inside)
         by_noise = _triangle(
             fitted["covariance"][fitted["covariance"]["unit"] == own]["value"].to_numpy().reshape(3, -1), width
         )
@@ -108,6 +114,32 @@ def one_lot(plan: Plan, preset: Preset, rng: np.random.Generator) -> dict[str, l
         out["outputs"] += _outputs(estimate, error, whole, width, plan, rng)
         _verified(out, plan, noise[unit], estimate, error, sums[sums["unit"] == own], width)
     return out
+
+
+PLACES = {"bias": (0,), "scale": (1,), "misalignment": (2, 3), "bias_temperature": (4,), "scale_temperature": (6,)}
+"""Columns of the certified coefficients of an axis."""
+
+
+def _certified(stated: pd.DataFrame, estimate: Array, true: Array) -> dict[str, list[bool]]:
+    """Whether the error of each certified coefficient of a unit is within the U that is stated for it."""
+    relative = 1e6 * (estimate - true) / estimate[:, [1]]
+    inside: dict[str, list[bool]] = {}
+    for name, places in PLACES.items():
+        for axis, letter in enumerate("xyz"):
+            own = stated[(stated["quantity"] == name) & (stated["axis"].str[0] == letter)]
+            errors = [relative[axis, place] for place in places[: len(own)]]
+            inside.setdefault(name, []).extend(np.abs(errors) <= own["expanded"].to_numpy())
+    angles = stated[stated["quantity"] == "orthogonality"].set_index("axis")["expanded"]
+    pairs = {"xy": (0, 2, 1, 3), "yz": (1, 2, 2, 3), "zx": (2, 2, 0, 3)}
+    inside["orthogonality"] = [abs(relative[i, a] + relative[j, b]) <= angles[k] for k, (i, a, j, b) in pairs.items()]
+    return {name: values for name, values in inside.items() if values}
+
+
+def _covered(inside: Array) -> str:
+    """Share of ``inside`` (lots, values of a lot) with a 95 % interval by the scatter of the lots."""
+    of_lots = np.asarray(inside, dtype=float).reshape(len(inside), -1).mean(axis=1)
+    share, half = of_lots.mean(), 1.96 * of_lots.std(ddof=1) / np.sqrt(len(of_lots)) if len(of_lots) > 1 else np.nan
+    return f"{share:.3f} [{share - half:.3f}, {min(share + half, 1.0):.3f}]"
 
 
 def _triangle(values: Array, size: int) -> Array:
@@ -197,6 +229,8 @@ def main() -> int:
                 cells.append(f"{wrong} of {accepted} ({expected:.1f})")
             row = (recipe, name, lots * LOT, *shares, *cells, round(time.perf_counter() - start))
             print("{:18} {:8} {:5} {:>12} {:>8} {:>10} {:>22} {:>22} {:5}".format(*row), flush=True)
+            for key in (key for key in whole if key.startswith("U of ")):
+                print(f"    {key:22} {_covered(np.reshape(whole[key], (lots, -1)))}, n = {len(whole[key])}", flush=True)
     return 0
 
 

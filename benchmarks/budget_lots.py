@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,9 +68,20 @@ def plan_of(recipe: str) -> Plan:
     )
 
 
-def measured(plan: Plan, preset: Preset, rng: np.random.Generator) -> tuple[pd.DataFrame, list[Truth], Array]:
-    """Dwells of a lot on a station with errors of its own, the truth of its units, and the noise that they had, g."""
-    station = StationErrors(DRAWN, rng)
+def measured(
+    plan: Plan,
+    preset: Preset,
+    rng: np.random.Generator,
+    drawn_as: ReferenceErrors = DRAWN,
+    noise_of: Callable[[], Array] | None = None,
+) -> tuple[pd.DataFrame, list[Truth], Array]:
+    """Dwells of a lot on a station with errors of its own, the truth of its units, and the noise that they had, g.
+
+    Parameters
+    ----------
+    noise_of : draws the noise of the dwells of a unit, (n, 3), g; white noise and flicker of the preset where not given
+    """
+    station = StationErrors(drawn_as, rng)
     scatter = np.radians(station.pose_deg) * rng.standard_normal((2, plan.outer.size))
     outer, inner = station.table(plan.outer, plan.inner)
     up = station.up(np.array([0.0, 0.0, 1.0]))
@@ -94,7 +106,7 @@ def measured(plan: Plan, preset: Preset, rng: np.random.Generator) -> tuple[pd.D
             * (1.0 + theta * truth.scale_tempco)
             * (force @ seat.T @ truth.misalignment.T)
         )
-        own = root @ rng.standard_normal((plan.outer.size, 3))
+        own = noise_of() if noise_of else root @ rng.standard_normal((plan.outer.size, 3))
         out = out * (1.0 + GAIN * rng.standard_normal()) + OFFSET * rng.standard_normal(3) + own
         frames.append(_table(plan, serial, unit, read, out, noise.white(DWELL_S)))
         truths.append(truth)

@@ -115,8 +115,8 @@ def supplies(units: int, seed: int) -> None:
         for name, (value, error) in zip(
             names,
             (
-                largest_departure(one.supply, one.sensitivity, one.own_error),
-                largest_departure(one.supply, one.zero_g, one.own_zero_error),
+                largest_departure(one.supply, one.sensitivity, one.own_error)[:2],
+                largest_departure(one.supply, one.zero_g, one.own_zero_error)[:2],
                 (one.slope_g_V, one.slope_error_g_V),
             ),
             strict=True,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from schemas.limits import LARGEST_PFA, Limits, Rule
 
@@ -12,6 +13,23 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
+
+
+class Law(Protocol):
+    """What is known of a figure that is far from normal, a standard deviation of few degrees of freedom."""
+
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom."""
+        ...
+
+    def beyond(self, limit: float) -> float:
+        """Probability that the figure exceeds a limit."""
+        ...
+
+    def threshold(self, limit: float, guard: float) -> float:
+        """The value at which the figure exceeds the limit with the probability 1 − Φ(guard)."""
+        ...
 
 
 # The notes give the grades by the bias that is left: consumer to 1000 µg, industrial to 200 µg, navigation under 50 µg.
@@ -22,7 +40,11 @@ GRADES: Mapping[str, float] = {
 }
 GRADE_FIGURE = "bias_error_ug"
 PERIOD_FIGURE = "bias_error_period_ug"
-"""The figure that a grade rests on where it is known: the error over the period of validity."""
+"""The figure that a grade rests on where it is known: the 95 % bound of the largest error over the period of validity."""
+LARGEST_ERROR, MEDIAN, BOUND = "bias_error_largest", "median", "95 %"
+"""The quantity of a budget that it is read from, and the names of its quantiles, at the place of an axis."""
+BOUND_SHARE = 0.95
+"""Probability of a figure that is a bound: the error stays below it."""
 
 
 @dataclass(frozen=True)
@@ -81,31 +103,84 @@ class Decision:
         return f"{self.figure} {self.outcome}: {what}, margin {self.margin:.3g}{unit}"
 
 
-def decide(limits: Limits, figure: str, value: float, standard_uncertainty: float) -> Decision:
+def decide(
+    limits: Limits,
+    figure: str,
+    value: float,
+    standard_uncertainty: float,
+    law: Law | None = None,
+    median: float = float("nan"),
+) -> Decision:
     """The decision on a figure by the limits' rule.
 
     Parameters
     ----------
     figure : a key of ``limits.figures``.
     value, standard_uncertainty : in the figure's unit; the rule's coverage factor is applied here.
+    law : of the figure where it is not normal; the guard band then ends where the risk is that of the normal one.
+    median : of a figure that is a 95 % bound; it passes where the probability of more than the limit is within the rule's, 5 %
+        where that states none
     """
+    if median == median:  # noqa: PLR0124 - not a nan
+        return _decide_bound(limits, figure, value, median)
     guard = limits.guard_factor * standard_uncertainty
     expanded = limits.coverage_factor * standard_uncertainty
     own = limits.figures[figure]
     least = own.min is not None
     limit = own.min or own.max or 0.0  # a limit has one of both
+    if law is None:
+        inner, outer, risk = (
+            limit - guard,
+            limit + guard,
+            (below if least else outside)(value, standard_uncertainty, limit),
+        )
+        rule = describe_rule(limits)
+    else:
+        inner, outer = (law.threshold(limit, sign * limits.guard_factor) for sign in (1.0, -1.0))
+        risk = 1.0 - law.beyond(limit) if least else law.beyond(limit)
+        rule = f"{describe_rule(limits)}; standard deviation: risk and guard band by χ² with {law.dof:.3g} degrees of freedom"
     return Decision(
         figure=figure,
         value=value,
         uncertainty=expanded,
         limit=limit,
         unit=own.unit,
-        rule=describe_rule(limits),
-        outcome=_outcome(-value, -limit, guard) if least else _outcome(abs(value), limit, guard),
-        risk=(below if least else outside)(value, standard_uncertainty, limit),
-        accept=limit + guard if least else limit - guard,
+        rule=rule,
+        outcome=_outcome(-value, -limit, (-outer, -inner)) if least else _outcome(abs(value), limit, (inner, outer)),
+        risk=risk,
+        accept=outer if least else inner,
         least=least,
     )
+
+
+def _decide_bound(limits: Limits, figure: str, bound: float, median: float) -> Decision:
+    limit = limits.figures[figure].max or 0.0
+    risk = exceedance(median, bound, limit)
+    allowed = (limits.pfa_max or LARGEST_PFA) if limits.rule == "allowed_pfa" else 1.0 - BOUND_SHARE
+    accept = limit if limits.rule != "allowed_pfa" else float("nan")
+    return Decision(
+        figure=figure,
+        value=bound,
+        uncertainty=0.0,
+        limit=limit,
+        unit=limits.figures[figure].unit,
+        rule=describe_rule(limits),
+        outcome="pass" if risk <= allowed else "fail",
+        risk=risk,
+        accept=accept,
+    )
+
+
+def exceedance(median: float, bound: float, limit: float) -> float:
+    """Probability that an error with this median and 95 % bound exceeds a limit.
+
+    Its logarithm is taken as normal: of the root of a sum of squares, whose tail is Gaussian, this states more than is met beyond
+    the bound.
+    """
+    if not (median > 0.0 and bound > median and limit > 0.0):
+        return float(not bound <= limit)
+    score = NormalDist().inv_cdf(BOUND_SHARE) * log(limit / median) / log(bound / median)
+    return NormalDist().cdf(-score)
 
 
 def outside(value: float, u: float, limit: float) -> float:
@@ -121,10 +196,10 @@ def below(value: float, u: float, least: float) -> float:
     return NormalDist().cdf((least - value) / u) if u > 0.0 else float(not value >= least)
 
 
-def _outcome(magnitude: float, limit: float, guard: float) -> Outcome:
-    if magnitude <= limit - guard:
+def _outcome(magnitude: float, limit: float, guard_band: tuple[float, float]) -> Outcome:
+    if magnitude <= guard_band[0]:
         return "pass"
-    if magnitude > limit + guard:
+    if magnitude > guard_band[1]:
         return "fail"
     return "conditional pass" if magnitude <= limit else "conditional fail"
 
@@ -150,6 +225,6 @@ def grade_of(value_ug: float, expanded_ug: float, rule: Rule) -> str | None:
 def grade_with(value_ug: float, guard_ug: float) -> str | None:
     """The best grade whose bias limit accepts the value with a guard band; None where not even the lowest does."""
     for name, limit in GRADES.items():
-        if _outcome(abs(value_ug), limit, guard_ug) == "pass":
+        if abs(value_ug) <= limit - guard_ug:
             return name
     return None

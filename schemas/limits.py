@@ -71,6 +71,7 @@ class Limits(Strict):
 
     Parameters
     ----------
+    grade : least grade that a unit needs; ``none``: the limits of the figures alone decide.
     validity_months : longest that a certificate by these limits may hold; :data:`VALIDITY_MONTHS` where it is not stated.
     pfa_max : probability of false acceptance that the rule ``allowed_pfa`` allows; 2 % where it is not stated.
     adequacy_p_min : least p of the model's residual with which a run is certified; :data:`ADEQUACY_P_MIN` where it is not stated.
@@ -79,7 +80,7 @@ class Limits(Strict):
     name: Name
     rule: Rule = "guarded_acceptance"
     coverage_factor: Annotated[Number, Field(ge=1.0, le=4.0)] = 2.0
-    grade: Literal["navigation", "industrial", "consumer"] = "consumer"
+    grade: Literal["navigation", "industrial", "consumer", "none"] = "consumer"
     validity_months: Annotated[int, Field(strict=True, ge=1, le=MOST_MONTHS)] | None = None
     pfa_max: Annotated[Number, Field(gt=0.0, le=LARGEST_PFA)] | None = None
     adequacy_p_min: Annotated[Number, Field(ge=ADEQUACY_P_MIN, le=0.05)] | None = None

@@ -27,8 +27,11 @@ READY = """() => Boolean(document.body.dataset.ready) && !document.querySelector
         return !e.checkVisibility() || r.top > innerHeight + 150
             || e.dataset.drawn === e.dataset.figure || e.querySelector('p.note'); })"""
 
-WAITING = """() => JSON.stringify({state: document.readyState, ready: document.body.dataset.ready ?? null,
+WAITING = """async () => JSON.stringify({state: document.readyState, ready: document.body.dataset.ready ?? null,
     progress: document.querySelector('.work progress')?.closest('.work').innerText ?? null,
+    jobs: await Promise.all([...document.querySelectorAll('[data-job]')].map(
+        async (e) => `${e.dataset.job}: ${await (await fetch('/jobs/' + e.dataset.job)).text()}`)),
+    places: [...document.querySelectorAll('[data-job-kind]')].map((e) => ({...e.dataset})),
     undrawn: [...document.querySelectorAll('[data-figure]')].filter((e) => e.dataset.drawn !== e.dataset.figure)
         .map((e) => e.dataset.figure)})"""
 """What a page that is not ready waits for."""

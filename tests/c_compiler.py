@@ -40,7 +40,8 @@ FIXED = """
         const int32_t output[3] = {tumbleline_from_counts(c, (int32_t)x), tumbleline_from_counts(c, (int32_t)y),
                                    tumbleline_from_counts(c, (int32_t)z)};
         int32_t force[3];
-        tumbleline_correct(c, output, (int32_t)(1000.0 * t + (t < 0 ? -0.5 : 0.5)), force);
+        int32_t mC = (int32_t)(1000.0 * t + (t < 0 ? -0.5 : 0.5));
+        if (tumbleline_correct(c, output, mC, force) != (mC < c->low_mC || mC > c->high_mC)) return 4;
         printf("%.17g %.17g %.17g\\n", force[0] / 16777216.0, force[1] / 16777216.0, force[2] / 16777216.0);
 """
 

@@ -11,6 +11,10 @@ from inertial.distributions import chi2_tail
 from inertial.dynamics.goodness import ADEQUATE_P
 
 Array = NDArray[np.float64]
+FEWEST_OF_PARABOLA = 3  # supplies: a parabola through the first has two coefficients
+CLEAR_SQUARE_TERM = (
+    2.58  # standard uncertainties of a parabola's square term, 1 % by chance, from which on no line is a slope
+)
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,7 @@ class Follows:
     supply : (n,), V
     sensitivity, sensitivity_error : (n,), share of the sensitivity at the first supply, and its standard uncertainty
     zero_g, zero_error_g : (n,), g
-    slope_g_V, slope_error_g_V : of the zero over the supply, by weighted least squares through the first point
+    slope_g_V, slope_error_g_V : of the zero over the supply, see :func:`slope_over`
     scale : sensitivity at the first supply, output per g, positive
     own_error, own_zero_error : (n,), share and g, of each supply without that of the first, which departures have in common
     """
@@ -73,36 +77,83 @@ def departures(
     spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own, own[0]))
     own_zero = own if zero_error is None else zero_error / ratio / scale
     zero_spread = np.where(np.arange(len(supply)) == 0, 0.0, np.hypot(own_zero, own_zero[0]))
-    slope, slope_error, _ = _line(supply, level, own_zero)
+    slope, slope_error = slope_over(supply, level, own_zero)
     return Follows(supply, gain, spread, level, zero_spread, slope, slope_error, scale, own, own_zero)
 
 
-def largest_departure(supply: Array, departure: Array, own: Array) -> tuple[float, float]:
-    """Largest departure over the supplies and its standard uncertainty, unit of the departures.
+def largest_departure(supply: Array, departure: Array, own: Array) -> tuple[float, float, int]:
+    """Largest departure over the supplies, its standard uncertainty, unit of the departures, and the number of its supply.
 
     The largest of several departures within the noise is that of the noise: for four of no true departure it is 1.6 standard
-    uncertainties on average. So where a straight line through the first supply is adequate (χ², p ≥ 0.005), the departure is the
-    line's at the supply that is farthest from the first, which noise does not choose. Else some departure is significant, and the
-    largest is taken.
+    uncertainties on average. So where a straight line through the first supply is adequate (χ², p ≥ 0.005) and a parabola no
+    better (its square term below one standard uncertainty), the departure is the line's at the supply that is farthest from the
+    first, which noise does not choose; its uncertainty is the parabola's there, which a curve within the noise does not exceed.
+    Where the parabola is adequate its largest departure is taken: one that is symmetric about the first supply leaves no slope.
+    Else some departure is significant, and the largest is taken.
 
     Parameters
     ----------
     supply, departure : (n,), that of the first supply is 0; own : (n,), standard uncertainties without the first one's share
     """
-    slope, error, square = _line(supply, departure, own)
-    if chi2_tail(square, max(1, len(supply) - 2)) >= ADEQUATE_P:
-        step = float(max(supply - supply[0], key=abs))
-        return slope * step, error * abs(step)
+    step, enough = supply - supply[0], len(supply) >= FEWEST_OF_PARABOLA
+    line = _curve(supply, departure, own, 1)
+    bent = _curve(supply, departure, own, 2) if enough else line
+    square_term = bent.square_term() if enough else 0.0
+    if chi2_tail(line.square, max(1, len(supply) - 2)) >= ADEQUATE_P and square_term <= 1.0:
+        k = int(np.argmax(np.abs(step)))
+        return float(line.at(step)[k]), float(bent.error_at(step)[k]), k
+    if enough and chi2_tail(bent.square, max(1, len(supply) - 3)) >= ADEQUATE_P:
+        k = int(np.argmax(np.abs(bent.at(step))))
+        return float(bent.at(step)[k]), float(bent.error_at(step)[k]), k
     k = int(np.argmax(np.abs(departure)))
-    return float(departure[k]), float(np.hypot(own[k], own[0]))
+    return float(departure[k]), float(np.hypot(own[k], own[0])), k
 
 
-def _line(supply: Array, departure: Array, own: Array) -> tuple[float, float, float]:
-    """Slope of a straight line through the first supply, its standard uncertainty, and χ²; departures share the first's error."""
-    step = (supply - supply[0])[1:]
-    covariance = np.diag(own[1:] ** 2) + own[0] ** 2
-    weight = np.linalg.solve(covariance, step)
-    norm = float(step @ weight)
-    slope = float(weight @ departure[1:]) / norm
-    left = departure[1:] - slope * step
-    return slope, float(norm**-0.5), float(left @ np.linalg.solve(covariance, left))
+@dataclass(frozen=True)
+class _Curve:
+    """Coefficients (p,) of the powers of the step from the first supply, from the first on, their covariance, and χ²."""
+
+    coefficients: Array
+    covariance: Array
+    square: float
+
+    def _rows(self, step: Array) -> Array:
+        return step[:, None] ** np.arange(1, len(self.coefficients) + 1)
+
+    def square_term(self) -> float:
+        """Size of the last coefficient in standard uncertainties."""
+        return float(abs(self.coefficients[-1]) / np.sqrt(self.covariance[-1, -1]))
+
+    def at(self, step: Array) -> Array:
+        return np.asarray(self._rows(step) @ self.coefficients, dtype=np.float64)
+
+    def error_at(self, step: Array) -> Array:
+        rows = self._rows(step)
+        return np.asarray(np.sqrt(np.sum(rows @ self.covariance * rows, axis=1)), dtype=np.float64)
+
+
+def _curve(supply: Array, departure: Array, own: Array, order: int) -> _Curve:
+    """A polynomial through the first supply by weighted least squares; departures share the first's error."""
+    rows = (supply - supply[0])[1:, None] ** np.arange(1, order + 1)
+    weighted = np.linalg.solve(np.diag(own[1:] ** 2) + own[0] ** 2, np.column_stack([rows, departure[1:]]))
+    covariance = np.linalg.inv(rows.T @ weighted[:, :-1])
+    c = covariance @ (rows.T @ weighted[:, -1])
+    left = departure[1:] - rows @ c
+    return _Curve(c, covariance, float(left @ (weighted[:, -1] - weighted[:, :-1] @ c)))
+
+
+def slope_over(supply: Array, departure: Array, own: Array) -> tuple[float, float]:
+    """Slope over the supply and its standard uncertainty: of the straight line, or to the supply of the largest departure.
+
+    A curve that is symmetric about the first supply has a line without a slope, however far the output departs: the mean slope on
+    the way to the largest departure is stated where the output is clearly no line.
+    """
+    line = _curve(supply, departure, own, 1)
+    straight = chi2_tail(line.square, max(1, len(supply) - 2)) >= ADEQUATE_P
+    if straight and (
+        len(supply) < FEWEST_OF_PARABOLA or _curve(supply, departure, own, 2).square_term() <= CLEAR_SQUARE_TERM
+    ):
+        return float(line.coefficients[0]), float(np.sqrt(line.covariance[0, 0]))
+    value, error, k = largest_departure(supply, departure, own)
+    step = float(supply[k] - supply[0])
+    return value / step, error / abs(step)

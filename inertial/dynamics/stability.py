@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 from scipy.stats import chi2, norm
 
-from inertial.dynamics.wander import logarithmic_kernel, stated_error, wander, wander_posterior, wander_variance
+from inertial.dynamics.wander import Posterior, logarithmic_kernel, stated_error, wander, wander_posterior
+from inertial.dynamics.wandering_means import (
+    IdentifiedNoise,
+    dof_of_allan,
+    dof_of_sd,
+    kernels_of,
+    line_of,
+    remainders_of,
+)
 from inertial.errors import NotIdentified
 from inertial.noise.allan import overlapping
-from inertial.noise.flicker import flicker_kernel
 
 Array = NDArray[np.float64]
 NOISE_MEANS = 40  # of a short record, for its flicker
+MEAN_S, MOST_MEANS = 100.0, 144  # of the means of a stability; of those whose noise is told
 
 
 @dataclass(frozen=True)
@@ -24,12 +32,14 @@ class StabilityFigures:
 
     Attributes
     ----------
-    sd_100s, sd_100s_error : standard deviation of 100 s means, and its standard uncertainty for white and 1/f noise
+    sd_100s, sd_100s_error : standard deviation of 100 s means, and its standard uncertainty for white noise, 1/f noise and walk
     sd_1s, range_1s, range_100s : standard deviation and range of 1 s means, range of 100 s means
     allan_100s, allan_100s_error : Allan deviation at 100 s
-    drift_h, drift_h_error : slope per hour and its standard uncertainty for white and 1/f noise, which looks like drift
+    drift_h, drift_h_error : slope per hour and its standard uncertainty for white and 1/f noise and random walk, which look like
+        drift
+    sd_100s_dof, allan_100s_dof : effective degrees of freedom
     sd_100s_interval, allan_100s_interval, drift_h_interval : ends (2,) of 95 % intervals: by χ² with the effective degrees of
-        freedom of correlated means for the deviations, over the probable strengths of the 1/f noise for the drift
+        freedom of correlated means for the deviations, over the probable strengths of 1/f noise and walk for the drift
     """
 
     sd_100s: float
@@ -44,6 +54,8 @@ class StabilityFigures:
     sd_100s_interval: tuple[float, float]
     allan_100s_interval: tuple[float, float]
     drift_h_interval: tuple[float, float]
+    sd_100s_dof: float
+    allan_100s_dof: float
 
 
 def block_means(record: Array, size: int) -> Array:
@@ -58,28 +70,33 @@ def error_of_mean(record: Array, parts: int = 10) -> Array:
     return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(float(parts)))
 
 
-def stability(record: Array, rate_hz: float) -> StabilityFigures:
+def stability(record: Array, rate_hz: float, identified: IdentifiedNoise | None = None) -> StabilityFigures:
     """The figures of a bias record (n,).
+
+    Parameters
+    ----------
+    identified : noise that the run's static record shows. An hour alone hardly tells a walk from 1/f noise, and a walk is
+        a slope of any size
 
     Raises
     ------
     NotIdentified
         The record is shorter than ten means of 100 s.
     """
-    hundred = block_means(record, round(100.0 * rate_hz))
+    hundred = block_means(record, round(MEAN_S * rate_hz))
     if hundred.size < 10:
         msg = f"stability: {hundred.size} means of 100 s, 10 or more are needed; record at least 1000 s"
         raise NotIdentified(msg)
     second = block_means(record, max(1, round(rate_hz)))
-    time: Array = np.asarray(100.0 * np.arange(hundred.size) / 3600.0, dtype=np.float64)
+    time: Array = np.asarray(MEAN_S * np.arange(hundred.size) / 3600.0, dtype=np.float64)
     rows: Array = np.asarray(np.column_stack([np.ones_like(time), time - time.mean()]), dtype=np.float64)
     c = np.linalg.lstsq(rows, hundred, rcond=None)[0]
-    noise = float(np.var(np.diff(second), ddof=1)) / 2.0 / 100.0  # white part of a mean of 100 s
-    drift_error = _error_of_slope(rows, hundred, noise)
+    noise = float(np.var(np.diff(second), ddof=1)) / 2.0 / MEAN_S  # white part of a mean of 100 s
+    drift_error, mixtures = _drift_error(hundred, noise, identified)
     rate = rate_hz / max(1, round(rate_hz))
-    curve = overlapping(second, rate, np.array([1, 3, 10, 30, round(100.0 * rate)]))
+    curve = overlapping(second, rate, np.array([1, 3, 10, 30, round(MEAN_S * rate)]))
     allan, sd = float(curve.deviation[-1]), float(hundred.std(ddof=1))
-    dof, allan_dof = _dof_of_sd(hundred, time, noise), float(curve.edf[-1])
+    dof, allan_dof = (of(mixtures, noise, hundred.size) for of in (dof_of_sd, dof_of_allan))
     reach = float(norm.ppf(0.975)) * drift_error
     return StabilityFigures(
         sd_100s=sd,
@@ -94,36 +111,34 @@ def stability(record: Array, rate_hz: float) -> StabilityFigures:
         sd_100s_interval=deviation_interval(sd, dof),
         allan_100s_interval=deviation_interval(allan, allan_dof),
         drift_h_interval=(float(c[1]) - reach, float(c[1]) + reach),
+        sd_100s_dof=dof,
+        allan_100s_dof=allan_dof,
     )
+
+
+def _drift_error(means: Array, white: float, identified: IdentifiedNoise | None) -> tuple[float, Posterior]:
+    """Standard uncertainty of the slope per hour of means of 100 s, and the probable mixtures of their noise."""
+    size = -(-means.size // MOST_MEANS)  # a long record is told by fewer, longer means
+    coarse, lasting = block_means(means, size), size * MEAN_S
+    known = () if identified is None else identified.strengths(lasting)
+    mixtures, of_line = (
+        wander_posterior(remainders_of(coarse.size, terms), coarse, white / size, known) for terms in (1, 2)
+    )
+    weights = line_of(coarse.size)[:, 1] / (lasting / 3600.0)
+    shares = [float(weights @ kernel @ weights) for kernel in kernels_of(coarse.size)]
+    error = of_line.error_of(white / size * float(weights @ weights), *shares)
+    return error, replace(mixtures, walk=mixtures.walk / size)
+
+
+def dof_of_means(means: Array, white: float) -> float:
+    """Effective degrees of freedom of the standard deviation of means of 100 s, each with white noise of a variance."""
+    return dof_of_sd(_drift_error(means, white, None)[1], white, means.size)
 
 
 def deviation_interval(deviation: float, dof: float) -> tuple[float, float]:
     """95 % interval of a standard deviation that is known with ``dof`` degrees of freedom: σ²·ν/χ²."""
     low, high = (deviation * float(np.sqrt(dof / chi2.ppf(p, dof))) for p in (0.975, 0.025))
     return low, high
-
-
-def _error_of_slope(rows: Array, means: Array, white: float) -> float:
-    """Standard uncertainty of the slope by least squares in white noise and 1/f noise, which is itself estimated.
-
-    1/f noise goes on below one period of the record, and is a slope there: the kernel is that of the logarithm.
-    """
-    n = means.size
-    kernel = toeplitz(logarithmic_kernel(n) + np.log(n) + 1.0)
-    weights = np.linalg.pinv(rows)[1]
-    own = wander_posterior(rows, means, white, kernel)
-    return own.error_of(white * float(weights @ weights), float(weights @ kernel @ weights))
-
-
-def _dof_of_sd(means: Array, time: Array, white: float) -> float:
-    """Effective degrees of freedom of the variance of correlated means: (tr CV)²/tr((CV)²), with C the centring."""
-    n = means.size
-    known, kernel = white * np.eye(n), flicker_kernel(time)
-    centred = known + wander_variance(np.ones((n, 1)), means, known, kernel) * kernel
-    centred = centred - centred.mean(axis=0)
-    centred = centred - centred.mean(axis=1)[:, None]
-    squares = float(np.sum(centred * centred.T))
-    return float(np.trace(centred)) ** 2 / squares if squares > 0.0 else float(n - 1)
 
 
 @dataclass(frozen=True)

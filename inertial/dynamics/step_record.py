@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 ALIGNMENTS = 3
 FEWEST = 7  # points of a local fit
 CENTRINGS = 3  # fits about a crossing, each about what the last one found
+OTHER_CROSSING = 0.5  # of the rise time: the nearest other crossing of a band is a rise time away
+MARGIN = 4.0  # standard uncertainties by which the band is moved: the largest of a dozen means about an extremum
+FLATTENED = 0.005  # of an extremum, by which the moving mean lowers it at most: (ω·0.12·rise)²/24 = 0.002 for ζ = 0.6
 RISE_POINTS = 6.0  # samples within the rise time that are needed to resolve a tenth of 1/f_n
 
 
@@ -24,7 +27,7 @@ RISE_POINTS = 6.0  # samples within the rise time that are needed to resolve a t
 class StepFigures:
     """Overshoot as a share of the step; times in s from the edge of the drive. ``…_error`` are standard uncertainties.
 
-    settling_low_s, settling_high_s : settling times for a band that is wider and narrower by three standard uncertainties; they
+    settling_low_s, settling_high_s : settling times for a band that is wider and narrower by four standard uncertainties; they
     lie far apart where an extremum of the response is near the edge of the band
     """
 
@@ -40,8 +43,13 @@ class StepFigures:
 
     @property
     def settling_identified(self) -> bool:
-        """Whether the settling time is the same for an extremum on either side of the band's edge."""
-        return self.settling_high_s - self.settling_low_s <= 12.0 * self.settling_error_s
+        """Whether the settling time is the same for an extremum on either side of the band's edge.
+
+        On the flank of an extremum a crossing is uncertain by as much as the next crossing is away: its own uncertainty does not
+        tell them apart, so that the time between the bands is compared with the rise time too.
+        """
+        apart = self.settling_high_s - self.settling_low_s
+        return apart <= min(4.0 * MARGIN * self.settling_error_s, OTHER_CROSSING * self.rise_s)
 
 
 def step_figures(
@@ -84,7 +92,7 @@ def step_figures(
     )
     top, top_error = _maximum(time, response, error, last[0], rise, blur)
     smooth, left = _smoothed(time, response, error, width)
-    margin = 3.0 * left
+    margin = MARGIN * left + FLATTENED * band
     settled = [_last_outside(time, smooth, size) for size in (band, band + margin, max(band - margin, 0.1 * band))]
     at, spread = _settling(time, response, error, band, settled[0], width, blur)
     return StepFigures(

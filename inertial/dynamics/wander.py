@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,13 @@ from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import norm, t
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 Array = NDArray[np.float64]
 FEWEST_DOF = 1.0
 GRID = 120  # variances of wander of a posterior
+WALK_SHARES = np.array([0.0, 0.15, 0.4, 0.65, 0.85, 0.95, 0.985, 1.0])  # of the random walk in it
 REACHED, FARTHEST = 0.99, 30.0  # bracket of a 95 % interval: the deviation at this probability, times this
 
 
@@ -101,49 +105,101 @@ def stated_error(variance: float, slope: float, error: float, scatter: float = 0
 
 @dataclass(frozen=True)
 class Posterior:
-    """Variances of wander (g,), squares of the output's unit, with their probabilities (g,)."""
+    """Mixtures of 1/f noise and random walk with their probabilities.
 
-    variance: Array
+    flicker, walk : (g,), factors of the two kernels, squares of the output's unit; probability : (g,)
+    """
+
+    flicker: Array
+    walk: Array
     probability: Array
 
-    def error_of(self, known: float, slope: float) -> float:
-        """Standard uncertainty u, half of whose U (k = 2) has 95 %, of an estimate of the variance known + slope·wander.
+    def error_of(self, known: float, of_flicker: float, of_walk: float) -> float:
+        """Standard uncertainty u, half of whose U (k = 2) has 95 %, of an estimate of the variance known + the shares of both.
 
-        The estimate is normal for each variance of the wander; the 95 % are those of the mixture.
+        The estimate is normal for each mixture; the 95 % are those of all of them.
         """
-        each = np.sqrt(known + slope * self.variance)
-        top = float(each[np.cumsum(self.probability) <= REACHED].max(initial=each[0]))
+        each = np.sort(np.sqrt(known + of_flicker * self.flicker + of_walk * self.walk))
+        order = np.argsort(known + of_flicker * self.flicker + of_walk * self.walk)
+        probability = self.probability[order]
+        top = float(each[np.cumsum(probability) <= REACHED].max(initial=each[0]))
         if top <= 0.0:
             return 0.0
 
         def outside(half: float) -> float:
-            return float(2.0 * self.probability @ norm.cdf(-half / np.maximum(each, 1e-300)) - 0.05)
+            return float(2.0 * probability @ norm.cdf(-half / np.maximum(each, 1e-300)) - 0.05)
 
         half_width: Any = brentq(outside, 0.0, FARTHEST * top)
         return float(half_width / norm.ppf(0.975))
 
 
-def wander_posterior(rows: Array, output: Array, white: float, kernel: Array) -> Posterior:
-    """Probabilities of the variance of wander beside white noise, by restricted likelihood and the prior of Jeffreys.
+@dataclass(frozen=True)
+class KnownStrength:
+    """Root of the factor of a kernel by another record of the device: value, nan where it is only limited, and 95 % ends."""
 
-    A short record knows the variance to a third at best: what one value of it says of an interval is too little where it is
-    estimated low. Student's t is the case without white noise.
+    value: float
+    low: float
+    high: float
+
+    def log_likelihood(self, strength: Array) -> Array:
+        """Of strengths (g,), of the estimate: its logarithm is normal; a limit stands for an estimate of zero."""
+        if np.isfinite(self.value) and self.low > 0.0:
+            width = np.log(self.high / self.low) / (2.0 * float(norm.ppf(0.975)))
+            apart = np.log(np.maximum(strength, 1e-6 * self.low) / self.value) / width
+            return np.asarray(-0.5 * apart**2, dtype=np.float64)
+        if np.isfinite(self.high) and self.high > 0.0:
+            return np.asarray(-0.5 * (strength * float(norm.ppf(0.975)) / self.high) ** 2, dtype=np.float64)
+        return np.zeros_like(strength)
+
+
+@dataclass(frozen=True)
+class Remainders:
+    """What is left of outputs beside fitted terms, and the two kinds of wander in it.
+
+    free : (n, n − terms); sizes : mean variance (2,) of 1/f noise and walk of unit factor
+    shares : variances (n − terms,) along principal axes, and these axes, for each of :data:`WALK_SHARES`
+    """
+
+    free: Array
+    sizes: tuple[float, float]
+    shares: list[tuple[Array, Array]]
+
+    @classmethod
+    def of(cls, rows: Array, flicker: Array, walk: Array) -> Remainders:
+        """Of terms (n, terms), and kernels (n, n)."""
+        free = null_space(rows.T)
+        kernels = [free.T @ kernel @ free for kernel in (flicker, walk)]
+        one, other = (float(np.trace(kernel)) / free.shape[1] for kernel in kernels)
+        mixed = ((1.0 - share) / one * kernels[0] + share / other * kernels[1] for share in WALK_SHARES)
+        return cls(free, (one, other), [(values, axes) for values, axes in map(np.linalg.eigh, mixed)])
+
+
+def wander_posterior(
+    remainders: Remainders, output: Array, white: float, known: Sequence[KnownStrength] = ()
+) -> Posterior:
+    """Probabilities of the variances of 1/f noise and random walk beside white noise, by restricted likelihood.
+
+    A short record knows each variance to a third at best: what one value of it says of an interval is too little where it is
+    estimated low. Student's t is the case without white noise. The prior of the variance is that of Jeffreys, that of the walk's
+    share in it (of the variance about the fitted terms) is even.
 
     Parameters
     ----------
-    rows : (n, terms); output : (n,), any unit
+    output : (n,), any unit
     white : known variance of each value, square of the output's unit
-    kernel : (n, n), of the wander
+    known : strengths of 1/f noise and walk by another record
     """
-    free = null_space(rows.T)
-    share, turn = np.linalg.eigh(free.T @ kernel @ free)
-    square = (turn.T @ (free.T @ output)) ** 2
-    size = float(square.mean())
-    if size <= 0.0:
-        return Posterior(np.zeros(1), np.ones(1))
-    variance = np.geomspace(1e-5 * size, 1e4 * size, GRID)
-    whole = white + variance[:, None] * share
-    prior = np.log(variance) + 0.5 * np.log(np.sum((share / whole) ** 2, axis=1))  # over ln of the variance
-    log = prior - 0.5 * np.sum(np.log(whole) + square / whole, axis=1)
+    own, sizes = remainders.free.T @ output, remainders.sizes
+    if not float(own @ own) > 0.0:
+        return Posterior(np.zeros(1), np.zeros(1), np.ones(1))
+    variance = np.geomspace(1e-5, 1e4, GRID) * float(np.mean(own**2))
+    logs = np.empty((WALK_SHARES.size, GRID))
+    for k, (part, turn) in enumerate(remainders.shares):
+        whole = white + variance[:, None] * part
+        prior = np.log(variance) + 0.5 * np.log(np.sum((part / whole) ** 2, axis=1))  # over ln of the variance
+        logs[k] = prior - 0.5 * np.sum(np.log(whole) + (turn.T @ own) ** 2 / whole, axis=1)
+    shares = WALK_SHARES[:, None] * variance
+    sides = ((variance - shares) / sizes[0]).ravel(), (shares / sizes[1]).ravel()
+    log = logs.ravel() + sum(one.log_likelihood(np.sqrt(side)) for one, side in zip(known, sides, strict=False))
     weight = np.exp(log - log.max())
-    return Posterior(variance, np.asarray(weight / weight.sum(), dtype=np.float64))
+    return Posterior(*sides, np.asarray(weight / weight.sum(), dtype=np.float64))

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     Codes = NDArray[np.int64]
 
 CONFIDENCE = 0.95
+HALF_NORMAL, PRIOR_VALUES = (0.9953, 3.8692), 30.0
+"""Skewness and kurtosis of a half-normal, and the values that they are worth beside those of a sample."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,15 @@ def cp(sigma: float, width: float, n: int) -> Index:
     return Index(value, value * low, value * high)
 
 
-def cpk(mean: float, sigma: float, low: float, high: float, n: float, dof: float | None = None) -> Index:
+def cpk(
+    mean: float,
+    sigma: float,
+    low: float,
+    high: float,
+    n: float,
+    dof: float | None = None,
+    shape: tuple[float, float] = (0.0, 3.0),
+) -> Index:
     """Distance of the nearer limit in units of 3σ, with Bissell's interval (Montgomery, eq. 8.21).
 
     It is Cpk where σ is that inside the lots and Ppk where it is that of all values (AIAG SPC, 2nd ed.). A limit may be
@@ -43,11 +53,34 @@ def cpk(mean: float, sigma: float, low: float, high: float, n: float, dof: float
     Parameters
     ----------
     n, dof : independent values behind the mean, and degrees of freedom of σ, n − 1 where None
+    shape : skewness and kurtosis of the values, (0, 3) of normal ones. Of folded values σ is less known than Bissell's interval
+        says, and large where the mean is large: it held in 86 %
     """
     value = min(high - mean, mean - low) / (3.0 * sigma)
-    error = float(np.sqrt(1.0 / (9.0 * n) + value**2 / (2.0 * (n - 1 if dof is None else dof))))
+    side = 1.0 if high - mean <= mean - low else -1.0
+    skew, kurtosis = shape
+    of_sigma = value**2 * (kurtosis - 1.0) / (4.0 * (n - 1 if dof is None else dof))
+    error = float(np.sqrt(max(1.0 / (9.0 * n) + of_sigma + side * value * skew / (3.0 * n), 0.0)))
     reach = float(norm.isf(0.5 * (1.0 - CONFIDENCE))) * error
     return Index(value, value - reach, value + reach)
+
+
+def shape_of(values: Array) -> tuple[float, float]:
+    """Skewness and kurtosis of magnitudes (n,), drawn towards those of a half-normal by as much as some values would be worth.
+
+    Few values show too small moments: with those of 20 half-normal values alone the interval of Ppk holds in 88 %.
+    """
+    n = float(values.size)
+    left = values - values.mean()
+    second = float(np.mean(left**2))
+    skew, kurtosis = float(np.mean(left**3)) / second**1.5, float(np.mean(left**4)) / second**2
+    skew *= np.sqrt(n * (n - 1.0)) / (n - 2.0)
+    kurtosis = 3.0 + (n - 1.0) / ((n - 2.0) * (n - 3.0)) * ((n + 1.0) * (kurtosis - 3.0) + 6.0)
+    skew, kurtosis = (
+        (n * own + PRIOR_VALUES * prior) / (n + PRIOR_VALUES)
+        for own, prior in zip((skew, kurtosis), HALF_NORMAL, strict=True)
+    )
+    return float(skew), float(max(kurtosis, 1.0 + skew**2))
 
 
 def sigma_within(values: Array, groups: Codes) -> tuple[float, int]:

@@ -15,12 +15,16 @@ if TYPE_CHECKING:
 
 POOL_ABOVE = 0.25  # p-value above which the interaction is pooled with repeatability (AIAG MSA, 4th ed., appendix A)
 
+DRAWS, DRAW_SEED = 4000, 1
+
 
 @dataclass(frozen=True)
 class Gauge:
     """Standard deviations of the parts of a measurement system, the values' unit.
 
     repeatability : of one unit mounted again on one station; reproducibility : between stations, interaction included
+    gauge_interval, percent_interval : ends of 95 % intervals of ``gauge`` and ``percent``; two stations tell next to nothing of
+        what lies between stations
     percent : of the total variation that the gauge takes; categories : that it can tell apart (ndc)
     """
 
@@ -33,6 +37,8 @@ class Gauge:
     part: float
     interaction_p: float
     pooled: bool
+    gauge_interval: tuple[float, float]
+    percent_interval: tuple[float, float]
 
     @property
     def gauge(self) -> float:
@@ -76,9 +82,10 @@ def gauge_study(values: Array) -> Gauge:
     if pooled:
         ms_error = (ss_error + ss_cross) / (df_error + df_cross)
     ms_cross = ms_error if pooled else ss_cross / df_cross
-    interaction = max(0.0, (ms_cross - ms_error) / r)
-    station = max(0.0, (ss_station / (o - 1) - ms_cross) / (p * r)) if o > 1 else 0.0
-    part = max(0.0, (ss_part / (p - 1) - ms_cross) / (o * r))
+    squares = np.array([ss_part / (p - 1), ss_station / (o - 1) if o > 1 else 0.0, ms_cross, ms_error])
+    dof = (p - 1, o - 1, df_cross, df_error + df_cross if pooled else df_error)
+    part, station, interaction = (float(one) for one in _components(squares, values.shape))
+    gauge_interval, percent_interval = _intervals(squares, dof, values.shape, pooled=pooled)
     return Gauge(
         parts=p,
         stations=o,
@@ -89,7 +96,39 @@ def gauge_study(values: Array) -> Gauge:
         part=float(np.sqrt(part)),
         interaction_p=p_value,
         pooled=pooled,
+        gauge_interval=gauge_interval,
+        percent_interval=percent_interval,
     )
+
+
+def _components(squares: Array, shape: tuple[int, ...]) -> Array:
+    """Variances (3, ...) of parts, stations and their interaction, none negative, from mean squares (4, ...).
+
+    squares : of parts, stations, interaction and error
+    """
+    p, o, r = shape
+    parts, stations, cross, error = squares
+    station = (stations - cross) / (p * r) if o > 1 else np.zeros_like(cross)
+    return np.maximum(np.stack([(parts - cross) / (o * r), station, (cross - error) / r]), 0.0)
+
+
+def _intervals(
+    squares: Array, dof: tuple[int, ...], shape: tuple[int, ...], *, pooled: bool
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Generalised 95 % intervals of gauge and of its share in %: each mean square S²·ν/χ² (Burdick et al., 2005, 3.4).
+
+    The draws of χ² are the same for every study, so that a study has one result.
+    """
+    draws = np.random.default_rng(DRAW_SEED).chisquare(np.maximum(dof, 1)[:, None], size=(4, DRAWS))
+    drawn = (squares * np.array(dof))[:, None] / draws
+    if pooled:
+        drawn[2] = drawn[3]
+    part, station, interaction = _components(drawn, shape)
+    gauge = station + interaction + drawn[3]
+    total = gauge + part
+    percent = 100.0 * np.sqrt(np.divide(gauge, total, out=np.zeros_like(total), where=total > 0.0))
+    ends = [np.quantile(one, [0.025, 0.975]) for one in (np.sqrt(gauge), percent)]
+    return (float(ends[0][0]), float(ends[0][1])), (float(ends[1][0]), float(ends[1][1]))
 
 
 def _p_value(ss_cross: float, df_cross: int, ms_error: float, df_error: int) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inertial.population.capability import Index as Capability
-from inertial.population.capability import cpk, fraction_interval, independent, sigma_within
+from inertial.population.capability import cpk, fraction_interval, independent, shape_of, sigma_within
 from inertial.population.comparison import Comparison, compare, holm, outlier_limit, robust_z, unlike
 from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
@@ -192,11 +192,12 @@ def _ability(device: str, figure: str, figures: Figures, own: Numbers, lot: Numb
     low = -limit if two_sided else -np.inf
     mean, sigma = float(values.mean()), float(values.std(ddof=1))
     within, dof = sigma_within(values, lot[own])
+    shape = (0.0, 3.0) if two_sided else shape_of(values)
     outside = int(np.count_nonzero(np.abs(values) > figures.limit[own]))
     return Ability(
         device, figure, str(figures.unit_text[own[0]]), limit, two_sided, own.size, float(np.median(values)),
-        cpk(mean, sigma, low, limit, *independent(values, lot[own])),
-        cpk(mean, within, low, limit, dof + 1) if dof >= FEWEST and within > 0.0 else None,
+        cpk(mean, sigma, low, limit, *independent(values, lot[own]), shape),
+        cpk(mean, within, low, limit, dof + 1, None, shape) if dof >= FEWEST and within > 0.0 else None,
         fraction_interval(outside, own.size),
     )  # fmt: skip
 

@@ -13,6 +13,7 @@ from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.measured import END, measured_span
 from pipelines.integrity import verify
 from pipelines.jobs.adequacy import adequacy_of
+from pipelines.jobs.references import contradiction, references_of
 from pipelines.jobs.terms import archived_terms
 from pipelines.stages.grade import BUDGET
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -130,6 +131,25 @@ def _verdict(run: Run) -> tuple[bool | None, str | None, float | None, bool] | N
     verdict = diagnose(run.table("dwells"), past, effects or None)
     named = bool(verdict["classes"] or verdict["unexplained"] or verdict["removed"])
     return verdict["adequate"], verdict["reason"], verdict["error"]["p_value"], named
+
+
+REFUTED_BELOW = 0.001
+"""p of the stated table below which nothing is certified; above it the certificate states the finding."""
+
+
+def refuse_contradicted(run: Run) -> str:
+    """The finding that the table is worse than stated, for the certificate; empty where there is none.
+
+    Refused where chance does not explain it: a U from the stated references would be smaller than the run has shown.
+    """
+    judged = references_of(run)
+    told = "" if judged is None else contradiction(judged)
+    if judged is not None and told and not passes(judged["p_value"] or 0.0, REFUTED_BELOW):
+        raise WrongUse(
+            f"certify: run {run.id}: {told}; a U from the stated values would be too small, references that hold are needed; "
+            "have the table examined, state in [uncertainty] at least what was found, and measure again"
+        )
+    return told
 
 
 def refuse_unstated(run: Run) -> None:

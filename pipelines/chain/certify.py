@@ -13,6 +13,7 @@ from pipelines.certificates.entries import FOLDER, LedgerEntry
 from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
 from pipelines.chain.certifiable import (
+    refuse_contradicted,
     refuse_inadequate,
     refuse_meanwhile,
     refuse_overdue,
@@ -116,6 +117,8 @@ def _proposals(
     refuse_overdue(run)
     adequacy = refuse_inadequate(run)
     refuse_unstated(run)
+    if told := refuse_contradicted(run):
+        adequacy += f"{'; ' if adequacy else ''}{told}"
     about, result = run.about, Certified()
     evidence = tuple(sorted((name, files.sha256(run.path / f"{name}.json")) for name in EVIDENCE))
     station = (about.get("station") or {}).get("name", IMPORTED)

@@ -158,7 +158,7 @@ def _grade(job: Job, run: Run) -> Tables:
 
 
 def _procedures(job: Job, run: Run) -> Tables:
-    tables = (run.table(name) for name in ("readings", "verdicts", "coefficients", "covariance"))
+    tables = (run.table(name) for name in ("readings", "verdicts", "coefficients", "covariance", "noise"))
     return procedures(job.recipe, _records(run).samples, *tables)
 
 
@@ -229,7 +229,7 @@ STAGES: tuple[Stage, ...] = (
     ),
     Stage(
         name="procedures",
-        inputs=(RECORDS, "readings", "verdicts", "coefficients", "covariance"),
+        inputs=(RECORDS, "readings", "verdicts", "coefficients", "covariance", "noise"),
         outputs=("procedure_points", "procedure_figures", "procedure_findings"),
         parameters=_listed,
         call=_procedures,

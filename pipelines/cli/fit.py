@@ -48,7 +48,7 @@ def command(
     from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
     from pipelines.cli.summary import exit_status, print_summary, summary
-    from pipelines.cli.text.verdict_text import judged, print_adequacy
+    from pipelines.cli.text.verdict_text import judged, print_adequacy, print_references
     from pipelines.jobs.job import job_of_run
 
     if Path(run).is_file():
@@ -82,4 +82,5 @@ def command(
     else:
         print_summary(document)
         print_adequacy(document["adequacy"])
+        print_references(document["references"])
     raise typer.Exit(exit_status(document))

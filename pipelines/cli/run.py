@@ -77,7 +77,7 @@ def command(
     from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import exit_status, print_summary, summary
     from pipelines.cli.terminal import attended, scanned
-    from pipelines.cli.text.verdict_text import judged, print_adequacy
+    from pipelines.cli.text.verdict_text import judged, print_adequacy, print_references
     from pipelines.jobs.job import OF_RUN, Request
     from pipelines.jobs.seating import SCAN, read_seating
     from schemas.station import load_station
@@ -110,6 +110,7 @@ def command(
         for document in documents:
             print_summary(document)
             print_adequacy(document["adequacy"])
+            print_references(document["references"])
         print_next(
             console(),
             [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],

@@ -38,7 +38,7 @@ LEGEND = {
     "residual_rms_ug": "fit: rms residual",
     "verification_norm_ug": "verify: largest | |a| − g | of a pose not used, mean of its dwells",
     "bias_error_ug": "error: rms of the worst axis in these poses",
-    "bias_error_period_ug": "period: the same, expected over the period of validity",
+    "bias_error_period_ug": "period: 95 % bound of the largest rms error of an axis at the end of the period of validity",
 }
 NOISE_LEGEND = "N, B: noise of the worst axis, an upper limit where a term is not identified"
 

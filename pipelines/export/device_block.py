@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from pipelines.export.fixed_point import FixedPoint, fixed_point
+from pipelines.export.fixed_point import FixedPoint, fixed_point, thousandths
 from pipelines.export.polynomials import ORDER
 from schemas.errors import WrongUse
 
@@ -70,7 +70,8 @@ class CoefficientBlock:
     def correct(self, output: Array, temperature: float) -> Array:
         """Specific force (n, 3) in g of outputs (n, 3), as firmware computes it from the block."""
         if self.form == "q24":
-            whole = FixedPoint(self.scale, self.bias.astype(np.int64), self.matrix.astype(np.int64))
+            parts = self.bias.astype(np.int64), self.matrix.astype(np.int64)
+            whole = FixedPoint(self.scale, *parts, thousandths(self.temperatures))
             return whole.correct(output, temperature)
         powers = (temperature - 25.0) ** np.arange(ORDER)
         bias = np.einsum("k,ki->i", powers, self.bias)

@@ -1,4 +1,7 @@
-"""Calibration in fixed point: a = M(x)·(u − β(x)), u the output over a nominal scale, x = θ/64 K, in units of 2⁻²⁴."""
+"""Calibration in fixed point: a = M(x)·(u − β(x)), u the output over a nominal scale, x = θ/64 K, in units of 2⁻²⁴.
+
+M is a polynomial that was fitted over the measured temperatures alone: beyond them the coefficients of the nearest one hold.
+"""
 
 from __future__ import annotations
 
@@ -31,16 +34,19 @@ class FixedPoint:
 
     scale : output per g by which the output is divided
     bias : (4, 3), g, of x⁰ … x³; inverse : (4, 3, 3), of x⁰ … x³
+    range_mC : lowest and highest temperature that it holds for, thousandths of a degree Celsius
     """
 
     scale: float
     bias: Integers
     inverse: Integers
+    range_mC: tuple[int, int]
 
     def correct(self, output: Array, temperature: float) -> Array:
         """Specific force (n, 3) in g of outputs (n, 3) in the unit of the output, digit by digit as the C code computes it."""
         u = np.rint(output / self.scale * ONE).astype(np.int64)
-        x = np.int64(_truncated(round(1000.0 * (temperature - 25.0)) * 32768, 125))
+        low, high = self.range_mC
+        x = np.int64(_truncated((min(max(round(1000.0 * temperature), low), high) - 25000) * 32768, 125))
         d = u - _horner(self.bias, x)
         return _shifted((_horner(self.inverse, x) * d[:, None, :]).sum(axis=-1)) / ONE
 
@@ -71,7 +77,13 @@ def fixed_point(unit: UnitCalibration) -> FixedPoint:
             "range; export with --arithmetic float"
         )
     bias, matrix = (v.astype(np.int64) for v in values)
-    return FixedPoint(scale, bias, matrix)
+    return FixedPoint(scale, bias, matrix, thousandths(unit.temperatures))
+
+
+def thousandths(temperatures: tuple[float, float]) -> tuple[int, int]:
+    """A range of temperatures, °C, in thousandths of a degree."""
+    low, high = (round(1000.0 * value) for value in temperatures)
+    return low, high
 
 
 def _horner(coefficients: Integers, x: np.int64) -> Integers:

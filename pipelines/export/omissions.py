@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Applied = Callable[[Array, float], Array]
 
-TEMPERATURES = 9
+TEMPERATURES = 33  # what is left of a fitted cubic has its largest values between the ends
 LEAST_UG = 1e-3
 _CUBE = np.array([corner for corner in product((-1.0, 0.0, 1.0), repeat=3) if any(corner)])
 DIRECTIONS = _CUBE / np.linalg.norm(_CUBE, axis=1)[:, None]
@@ -31,16 +31,23 @@ SCALE, SCALE_T = "scale", "temperature dependence of the scale"
 ACROSS, ACROSS_T = "misalignment", "temperature dependence of the misalignment"
 
 
-def outputs(unit: UnitCalibration, temperature: float) -> Array:
-    """Output (26, 3) of the unit by its full calibration, under 1 g in :data:`DIRECTIONS`."""
+def outputs(unit: UnitCalibration, temperature: float, size_g: float = 1.0) -> Array:
+    """Output (26, 3) of the unit by its full calibration, under a force of this size in :data:`DIRECTIONS`."""
     powers = (temperature - 25.0) ** np.arange(len(unit.bias))
-    return np.einsum("k,ki->i", powers, unit.bias) + DIRECTIONS @ np.einsum("k,kij->ij", powers, unit.response).T
+    force = size_g * DIRECTIONS
+    return np.einsum("k,ki->i", powers, unit.bias) + force @ np.einsum("k,kij->ij", powers, unit.response).T
 
 
-def largest_error_ug(unit: UnitCalibration, applied: Applied) -> float:
-    """Largest error of an axis, µg, of ``applied(output (n, 3), temperature)`` in g against the full calibration."""
+def largest_error_ug(unit: UnitCalibration, applied: Applied, size_g: float = 1.0) -> float:
+    """Largest error of an axis, µg, of ``applied(output (n, 3), temperature)`` in g against the full calibration.
+
+    Parameters
+    ----------
+    size_g : of the force; over the measured temperatures
+    """
     grid = np.linspace(*unit.temperatures, TEMPERATURES)
-    return max(float(np.abs(applied(outputs(unit, t), t) - DIRECTIONS).max()) for t in grid) * MICRO
+    errors = (applied(outputs(unit, t, size_g), t) - size_g * DIRECTIONS for t in grid)
+    return max(float(np.abs(error).max()) for error in errors) * MICRO
 
 
 def omitted(unit: UnitCalibration, parts: Sequence[str], nominal: float = 0.0) -> list[tuple[str, float]]:

@@ -47,6 +47,7 @@ NEEDED = (
     "prefect.flow_engine",
     "pipelines.capture.capture",
     "pipelines.jobs.adequacy",
+    "pipelines.jobs.references",
     "pipelines.report.run_page",
     "stations.opening",
 )

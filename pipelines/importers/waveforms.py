@@ -288,7 +288,7 @@ def _keep(
         {
             "unit": unit, "procedure": procedure, "number": 0, "figure": f.figure, "axis": f.axis, "value": f.value,
             "uncertainty": f.uncertainty, "low": f.low, "high": f.high, "identified": bool(f.identified and np.isfinite(f.value)),
-            "unit_text": units[f.figure], "note": f.note,
+            "unit_text": units[f.figure], "note": f.note, "dof": f.dof, "removed": f.removed,
         }
         for f in values
     ]  # fmt: skip

@@ -86,7 +86,11 @@ class PlannedBias(TypedDict):
 class ReachableQuantity(TypedDict):
     """What can be reached of one quantity."""
 
-    quantity: Annotated[str, "`bias_error`: by the references alone; `bias_error_period`: RMS expected over the period"]
+    quantity: Annotated[
+        str,
+        "`bias_error`: by the references alone; `bias_error_period`: RMS expected over the period; "
+        "`bias_error_largest`: 95 % bound of the largest of the three",
+    ]
     axis: str
     unit: str
     u: Annotated[float, "standard uncertainty, in `unit`"]

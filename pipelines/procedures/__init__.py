@@ -62,7 +62,7 @@ SHARED = (
         "sweep_plan",
         "sweep_points",
     ),
-    *("transfer_figures", "transfer_chart", "wording"),
+    *("transfer_figures", "transfer_chart", "wording", "worst"),
 )
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from inertial.dynamics.wandering_means import IdentifiedNoise
     from pipelines.drawing.chart import Chart
     from schemas.poses import Pose
     from schemas.recipe import Recipe
@@ -102,7 +103,8 @@ class FigureValue:
     """A figure of one unit and axis.
 
     ``low`` and ``high`` are the ends of a 95 % interval. Where ``identified`` is False the value passes no limit, and ``note``
-    states why, and a measurement that determines it.
+    states why, and a measurement that determines it. A standard deviation has ``dof`` degrees of freedom, nan for other figures,
+    and ``removed`` is the known part that was taken out of it; see :class:`inertial.uncertainty.deviation_law.DeviationLaw`.
     """
 
     figure: str
@@ -113,6 +115,8 @@ class FigureValue:
     high: float = float("nan")
     identified: bool = True
     note: str = ""
+    dof: float = float("nan")
+    removed: float = 0.0
 
     @classmethod
     def not_determined(
@@ -170,12 +174,14 @@ class Device:
 
     scale : (3,) output per g of each axis, by unit; full_scale, out_unit : of the lot
     scale_error : (3,) standard uncertainty of the scale as a share
+    noise : that the static record of the run shows, µg, by unit and axis; none where it has no such record
     """
 
     scale: Mapping[str, Array]
     scale_error: Mapping[str, Array]
     full_scale: float
     out_unit: str
+    noise: Mapping[tuple[str, str], IdentifiedNoise] = field(default_factory=dict[tuple[str, str], "IdentifiedNoise"])
 
 
 @dataclass(frozen=True)
@@ -275,17 +281,6 @@ def refuse_unknown_effects(names: Sequence[str], known: Collection[str], test: s
     for name in names:
         if name not in known:
             raise ValueError(f"effects: no effect '{name}' of {test}; {did_you_mean(name, known)}")
-
-
-def worst(values: Sequence[FigureValue]) -> FigureValue:
-    """The deciding axis: one that is not identified, or no number, else the largest magnitude with twice its uncertainty."""
-    missing = [one for one in values if not one.identified]
-
-    def size(one: FigureValue) -> float:
-        bound = abs(one.value) + 2.0 * one.uncertainty
-        return bound if np.isfinite(bound) else np.inf  # max() passes over a nan that is not the first
-
-    return missing[0] if missing else max(values, key=size)
 
 
 def scale_of(part: NominalScale, device: Device, unit: str) -> Array:

@@ -22,10 +22,10 @@ from pipelines.procedures.base import (
     ProcedureRecord,
     ProcedureStep,
     scale_of,
-    worst,
 )
 from pipelines.procedures.columns import points
 from pipelines.procedures.wording import with_uncertainty
+from pipelines.procedures.worst import worst
 from schemas.bounds import Positive
 from schemas.poses import Pose
 from schemas.units import AXES, MICRO
@@ -94,13 +94,14 @@ class BiasStability(InG, Evaluated):
 
     def evaluate(self, part: BiasStabilityPart, points: pd.DataFrame, device: Device) -> Outcome:
         """Figures of the worst axis; every definition as a finding, so that numbers of others can be compared."""
-        del device
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):
             seconds = round(part.rate_hz) / part.rate_hz
             by_axis = {
-                str(axis): stability(own["value"].to_numpy(dtype=float), 1.0 / seconds)
+                str(axis): stability(
+                    own["value"].to_numpy(dtype=float), 1.0 / seconds, device.noise.get((str(unit), str(axis)))
+                )
                 for axis, own in rows.groupby("axis", sort=False)
             }
             figures[str(unit)] = [
@@ -112,6 +113,7 @@ class BiasStability(InG, Evaluated):
                             getattr(one, key),
                             getattr(one, f"{key}_error"),
                             *getattr(one, f"{key}_interval"),
+                            dof=getattr(one, f"{key}_dof", float("nan")),
                         )
                         for axis, one in by_axis.items()
                     ]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
 POINT_TEXTS, POINT_NUMBERS, POINT_WHOLE = "unit procedure axis series", "setting value uncertainty", "number point"
-FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "value uncertainty low high"
+FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "value uncertainty low high dof removed"
 
 
 def points(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:

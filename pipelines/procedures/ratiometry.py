@@ -21,11 +21,11 @@ from pipelines.procedures.base import (
     ProcedureRecord,
     ProcedureStep,
     SetsEquipment,
-    worst,
 )
 from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
 from pipelines.procedures.wording import with_uncertainty
+from pipelines.procedures.worst import worst
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
 from schemas.poses import Pose
@@ -250,11 +250,11 @@ def _figure(name: str, axis: str, one: Follows, device: Device) -> FigureValue:
         note = "a face was not recorded at a voltage; measure again"
         return FigureValue.not_determined(name, axis, note)
     if name == SENSITIVITY:
-        value, error = largest_departure(one.supply, one.sensitivity, one.own_error)
+        value, error, _ = largest_departure(one.supply, one.sensitivity, one.own_error)
         return FigureValue(name, axis, 100.0 * value, 100.0 * error)
     if name == SLOPE:
         return FigureValue(name, axis, MICRO * one.slope_g_V, MICRO * one.slope_error_g_V)
-    value, error = largest_departure(one.supply, one.zero_g, one.own_zero_error)
+    value, error, _ = largest_departure(one.supply, one.zero_g, one.own_zero_error)
     share = 100.0 * one.scale / device.full_scale
     return FigureValue(name, axis, share * value, share * error)
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
-from pipelines.procedures.base import FigureValue, worst
+from pipelines.procedures.base import FigureValue
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
+from pipelines.procedures.worst import worst
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:

@@ -23,9 +23,9 @@ from pipelines.procedures.base import (
     ProcedureRecord,
     ProcedureStep,
     UnitRecord,
-    worst,
 )
 from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.worst import worst
 from schemas.bounds import Positive
 from schemas.poses import Pose
 from schemas.units import AXES

@@ -20,9 +20,9 @@ from pipelines.procedures.base import (
     Part,
     ProcedureRecord,
     ProcedureStep,
-    worst,
 )
 from pipelines.procedures.columns import points
+from pipelines.procedures.worst import worst
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.units import AXES

@@ -21,9 +21,9 @@ from pipelines.procedures.base import (
     ProcedureRecord,
     ProcedureStep,
     scale_of,
-    worst,
 )
 from pipelines.procedures.columns import points
+from pipelines.procedures.worst import worst
 from schemas.bounds import Positive, Wait
 from schemas.poses import Pose
 from schemas.units import AXES, MICRO
@@ -108,7 +108,18 @@ class TurnOn(InG, Evaluated):
                 within = float(np.sqrt(np.mean(own["uncertainty"].to_numpy(dtype=float) ** 2)))
                 one = repeatability(mean, within)
                 spread = float(np.std(mean, ddof=1)) / np.sqrt(2.0 * (one.cycles - 1))
-                value.append(FigureValue("turn_on_repeatability_ug", str(axis), one.value, spread, one.low, one.high))
+                value.append(
+                    FigureValue(
+                        "turn_on_repeatability_ug",
+                        str(axis),
+                        one.value,
+                        spread,
+                        one.low,
+                        one.high,
+                        dof=one.cycles - 1.0,
+                        removed=within,
+                    )
+                )
                 upper.append(FigureValue("turn_on_upper_limit_ug", str(axis), one.upper, 0.0))
             figures[str(unit)] = [worst(value), worst(upper)]
         return Outcome(figures)

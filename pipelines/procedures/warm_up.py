@@ -24,9 +24,9 @@ from pipelines.procedures.base import (
     ProcedureRecord,
     ProcedureStep,
     scale_of,
-    worst,
 )
 from pipelines.procedures.columns import points
+from pipelines.procedures.worst import worst
 from schemas.bounds import Positive
 from schemas.poses import Pose
 from schemas.units import AXES, MICRO

@@ -9,6 +9,7 @@ from pipelines.report.budget_plots import shares_plot
 from pipelines.report.numbers import scientific, significant
 from pipelines.report.plan_pictures import alias_chart, sight_chart, sphere_chart, temperature_chart
 from pipelines.report.templates import template
+from schemas.decisions import LARGEST_ERROR
 
 if TYPE_CHECKING:
     from pipelines.planning.plan import PlanContext
@@ -55,6 +56,7 @@ def _budget(reach: dict[str, Any] | None) -> str:
         if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
             worst[row["quantity"]] = row
     titles = {"bias_error": "error by the references", "bias_error_period": "error over the period"}
+    worst.pop(LARGEST_ERROR, None)  # made of the same contributions
     return shares_plot(
         {f"{titles.get(q, q)}, {row['axis']}": row["shares"] for q, row in worst.items() if row["shares"]}
     )

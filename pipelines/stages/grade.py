@@ -14,7 +14,16 @@ from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.uncertainty.lot_risks import lot_risks
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import ByUnit, empty_table
-from schemas.decisions import GRADE_FIGURE, GRADES, PERIOD_FIGURE, Decision, decide, describe_rule, grade_with
+from schemas.decisions import (
+    GRADE_FIGURE,
+    GRADES,
+    PERIOD_FIGURE,
+    Decision,
+    decide,
+    describe_rule,
+    exceedance,
+    grade_with,
+)
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits
 
@@ -107,6 +116,7 @@ def grade(
     )
     figure_rows: list[dict[str, object]] = []
     grade_rows: list[dict[str, object]] = []
+    squares: dict[str, list[float]] = {}
     for verdict in evidence.verdicts.to_dict("records"):
         unit = str(verdict["unit"])
         if verdict["refused"] or (coefficients is None and tumbles):
@@ -127,21 +137,24 @@ def grade(
             own_figures += figures_of(own)
         own_figures += _of_procedures(evidence.procedure_figures, unit, limits)
         decisions = [
-            decide(limits, f.name, f.value, f.uncertainty)
+            decide(limits, f.name, f.value, f.uncertainty, f.law, f.median)
             for f in own_figures
             if f.name in limits.figures and not f.why_not
         ]
         if figures:
             figure_rows += [_figure_row(unit, one, decisions, limits) for one in own_figures if not one.why_not]
+            for one in own_figures:
+                squares.setdefault(one.name, []).append(one.shared**2)
         grade_rows.append(_decided(verdict, own_figures, decisions, limits, evidence.basis))
     grades = _table(grade_rows).assign(rule=rule, basis=evidence.basis)
     if not figures:
         return {"grades": grades}
+    shared = {name: float(np.sqrt(np.mean(own))) for name, own in squares.items()}
     figure_table = _table(figure_rows) if figure_rows else empty_table(texts=FIGURE_TEXTS, numbers=FIGURE_NUMBERS)
     return {
         "figures": figure_table,
         "grades": grades,
-        "lot_risks": lot_risks(figure_table, limits, evidence.uncertainties),
+        "lot_risks": lot_risks(figure_table, limits, shared),
     }
 
 
@@ -182,7 +195,15 @@ def _of_procedures(table: pd.DataFrame | None, unit: str, limits: Limits) -> lis
         why = "" if row["identified"] else f"axis {row['axis']}: {row['note']}"
         value = float(row["value"]) if row["identified"] else np.inf
         name = str(row["figure"])
-        one = Figure(name, str(row["unit_text"]), value, float(row["uncertainty"]) if not why else 0.0, why)
+        one = Figure(
+            name,
+            str(row["unit_text"]),
+            value,
+            float(row["uncertainty"]) if not why else 0.0,
+            why,
+            dof=float(row.get("dof", np.nan)),  # runs of earlier versions have none
+            removed=float(row.get("removed", 0.0)),
+        )
         before = figures.get(name)
         least = name in limits.figures and limits.figures[name].min is not None
         if before is None or _badness(one, guard, least=least) > _badness(before, guard, least=least):
@@ -216,7 +237,7 @@ def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
 def _decided(
     verdict: dict, figures: list[Figure], decisions: list[Decision], limits: Limits, basis: str
 ) -> dict[str, object]:
-    best = NO_GRADE
+    best, risk = NO_GRADE, float("nan")
     reasons = [decision.sentence for decision in decisions if not decision.passed]
     reasons += [
         f"{figure.name}: not determined ({figure.why_not}), limit {limits.figures[figure.name].text}"
@@ -226,20 +247,21 @@ def _decided(
     by_name = {figure.name: figure for figure in figures}
     figure = by_name.get(PERIOD_FIGURE, by_name.get(GRADE_FIGURE))
     if figure is not None:
-        best = grade_with(figure.value, limits.guard_factor * figure.uncertainty) or NO_GRADE
         known = figure.name == PERIOD_FIGURE
+        best = grade_with(figure.value, limits.guard_factor * figure.uncertainty) or NO_GRADE
+        if known and best in GRADES:
+            risk = exceedance(figure.median, figure.value, GRADES[best])
         if not known and _good_enough(best, BEST_OF_NOISE):
             best = BEST_OF_NOISE
-        if not _good_enough(best, limits.grade):
-            reasons.append(f"grade {best}{_why(figure, best, basis, limits)}: grade {limits.grade} is needed")
-    return _grade_row(verdict, "fail" if reasons else "pass", best, "; ".join(reasons))
+        if limits.grade != NO_GRADE and not _good_enough(best, limits.grade):
+            reasons.append(f"grade {best}{_why(figure, best, basis)}: grade {limits.grade} is needed")
+    return _grade_row(verdict, "fail" if reasons else "pass", best, "; ".join(reasons), risk)
 
 
-def _why(figure: Figure, best: str, basis: str, limits: Limits) -> str:
+def _why(figure: Figure, best: str, basis: str) -> str:
     """The reason that limits a grade, in brackets."""
     if figure.name == PERIOD_FIGURE:
-        expanded = limits.coverage_factor * figure.uncertainty
-        return f" (error expected over the period of validity {float(f'{figure.value:.3g}'):g} ± {float(f'{expanded:.2g}'):g} µg)"
+        return f" (95 % bound of the largest error over the period of validity {float(f'{figure.value:.3g}'):g} µg)"
     if best != BEST_OF_NOISE:
         return ""
     if basis == NOISE_ONLY:
@@ -252,12 +274,14 @@ def _good_enough(grade: str, required: str) -> bool:
     return grade in order and order.index(grade) <= order.index(required)
 
 
-def _grade_row(verdict: dict, outcome: str, best: str, reasons: str) -> dict[str, object]:
+def _grade_row(verdict: dict, outcome: str, best: str, reasons: str, risk: float = float("nan")) -> dict[str, object]:
+    """A row of the table ``grades``; ``grade_risk``: probability that any axis exceeds the limit of the grade."""
     return {
         "unit": str(verdict["unit"]),
         "slot": int(verdict["slot"]),
         "outcome": outcome,
         "grade": best,
+        "grade_risk": risk,
         "reasons": reasons,
     }
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inertial.dynamics.wandering_means import IdentifiedNoise
 from inertial.errors import InertialError
 from pipelines.procedures import PROCEDURES, parts_of, steps_of
 from pipelines.procedures.base import Evaluated, FigureValue, Outcome
@@ -30,12 +31,14 @@ def procedures(
     verdicts: pd.DataFrame,
     coefficients: pd.DataFrame,
     covariance: pd.DataFrame,
+    noise: pd.DataFrame | None = None,
 ) -> dict[str, pd.DataFrame]:
     """Tables ``procedure_points``, ``procedure_figures`` and ``procedure_findings``; without rows where the recipe has no list.
 
     Parameters
     ----------
     samples : gives the samples of some records, by their numbers
+    noise : terms of the static record of the run
     """
     if not recipe.procedures:
         return {
@@ -43,7 +46,7 @@ def procedures(
             "procedure_figures": figure_table([]),
             "procedure_findings": finding_table([]),
         }
-    device = _device(readings, coefficients, covariance)
+    device = replace(_device(readings, coefficients, covariance), noise=identified_noise(noise))
     accepted = verdicts.loc[~verdicts["refused"], "unit"].tolist()
     points: list[tuple[int, str, pd.DataFrame]] = []
     figures: list[dict[str, Any]] = []
@@ -128,6 +131,17 @@ def _device(readings: pd.DataFrame, coefficients: pd.DataFrame, covariance: pd.D
     )
 
 
+def identified_noise(terms: pd.DataFrame | None) -> dict[tuple[str, str], IdentifiedNoise]:
+    """Bias instability and random walk of the static record, by unit and axis."""
+    if terms is None:
+        return {}
+    of: dict[tuple[str, str], dict[str, tuple[float, float, float]]] = {}
+    for row in terms[terms["term"].isin(["B", "K"])].to_dict("records"):
+        ends = float(row["value"]), float(row["low"]), float(row["high"])
+        of.setdefault((str(row["unit"]), str(row["axis"])), {})[str(row["term"])] = ends
+    return {key: IdentifiedNoise(one["B"], one["K"]) for key, one in of.items()}
+
+
 def _figure_row(number: int, procedure: str, unit: str, one: FigureValue, unit_text: str) -> dict[str, Any]:
     return {
         "unit": unit,
@@ -142,4 +156,6 @@ def _figure_row(number: int, procedure: str, unit: str, one: FigureValue, unit_t
         "identified": one.identified,
         "unit_text": unit_text,
         "note": one.note,
+        "dof": one.dof,
+        "removed": one.removed,
     }

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+OF_UNITS = ("rms_uncertainty_{}_ug", "rms_expected_{}_ug", "rms_dof_{}")
+"""Columns that are the same in all rows of a unit, for each axis."""
+
 
 def verify(
     dwells: pd.DataFrame,
@@ -32,7 +35,8 @@ def verify(
     ``error_ug`` is |a_corr| − g, which needs no angle; ``error_x_ug`` … compare with the table's angles too.
     ``uncertainty_ug`` (k = 1) is the error expected of a correct model: white noise, wander since the dwells of the fit, and the
     effect of both on the coefficients. ``reading_ug`` (k = 1) is the white noise of the dwell alone.
-    ``rms_uncertainty_x_ug`` … (k = 1), the same in all rows of a unit, belong to the RMS of ``error_x_ug`` … over its dwells.
+    ``rms_uncertainty_x_ug`` … (k = 1), the same in all rows of a unit, belong to the RMS of ``error_x_ug`` … over its dwells;
+    ``rms_expected_x_ug`` … is that RMS of a correct model, and ``rms_dof_x`` … the degrees of freedom of its square.
 
     In ``verification_poses`` the error is the mean over the dwells of one pose: the error that the calibration leaves; wander,
     which no calibration removes, is partly averaged out. Its uncertainty is that of this mean, with the correlation of its
@@ -68,13 +72,20 @@ def verify_tables(
     by_axis = MICRO * (corrected - truth)[:, unseen]
     spread = predictions if isinstance(predictions, np.ndarray) else _expected(predictions, lot.units)
     expected = np.einsum("uja,uajk,uka->ujk", toward, spread, toward)
-    of_rms = rms_uncertainty(np.swapaxes(by_axis, 1, 2), spread)[:, None, :] + np.zeros_like(by_axis)
+    of_rms = rms_uncertainty(np.swapaxes(by_axis, 1, 2), spread)
+    trace = np.einsum("uajj->ua", spread)
+    freedom = trace**2 / np.maximum(np.einsum("uajk,uajk->ua", spread, spread), np.finfo(float).tiny)
+    of_units = dict(zip(OF_UNITS, (of_rms, np.sqrt(trace / spread.shape[-1]), freedom), strict=True))
     columns = {
         "norm_g": norm[:, unseen],
         "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1))[:, unseen],
         "uncertainty_ug": np.sqrt(np.diagonal(expected, axis1=-2, axis2=-1)),
         "reading_ug": MICRO * np.sqrt(np.sum((toward * reading) ** 2, axis=-1)),
-        **{f"rms_uncertainty_{letter}_ug": of_rms[..., axis] for axis, letter in enumerate(AXES)},
+        **{
+            name.format(letter): values[:, None, axis] + np.zeros_like(by_axis[..., axis])
+            for name, values in of_units.items()
+            for axis, letter in enumerate(AXES)
+        },
     }
     return {
         "verification": _rows(lot, unseen, columns, by_axis),
@@ -133,7 +144,7 @@ def _rows(lot: LotArrays, unseen: NDArray[np.bool_], columns: dict[str, Array], 
 def nothing_verified() -> dict[str, pd.DataFrame]:
     """The tables of a verification without a row."""
     numbers = "norm_g error_ug uncertainty_ug reading_ug error_x_ug error_y_ug error_z_ug unit_C"
-    numbers += " rms_uncertainty_x_ug rms_uncertainty_y_ug rms_uncertainty_z_ug"
+    numbers += "".join(f" {name.format(letter)}" for name in OF_UNITS for letter in AXES)
     return {
         "verification": empty_table(texts="unit pose", whole="dwell", numbers=numbers),
         "verification_poses": empty_table(texts="unit pose", whole="dwells", numbers="error_ug uncertainty_ug"),

@@ -20,6 +20,7 @@ ONE = 'ORDER = {order}\nTITLE = "Own"\n\n\ndef render(report):\n    return f"<p>
 FOUND = [*panels(PANELS), *panels(UNIT_PANELS)]
 
 NOT_OF_OLD_RUNS = {  # the kept archive has no such columns, and states no uncertainty
+    "pipelines.report.panels.stated_references",
     "pipelines.report.unit_panels.bias",
     "pipelines.report.unit_panels.budget",
     "pipelines.report.unit_panels.procedures",
@@ -43,8 +44,8 @@ def test_a_panel_explains_itself_and_is_in_the_guide(one) -> None:
 @pytest.mark.parametrize("one", panels(PANELS), ids=lambda module: module.__name__)
 def test_a_panel_of_the_run_is_whole_html(one, report: ReportContext) -> None:
     html = one.render(report)
-    assert html
-    assert closed(html)
+    assert html or one.__name__ in NOT_OF_OLD_RUNS
+    assert closed(html or "")
 
 
 @pytest.mark.parametrize("one", panels(UNIT_PANELS), ids=lambda module: module.__name__)
@@ -67,7 +68,7 @@ def closed(html: str) -> bool:
 def test_the_page_has_the_panels_in_their_order(report: ReportContext) -> None:
     page = render(report.run)
     headings = re.findall(r"<h2>(.*?)</h2>", page)
-    assert headings == [one.TITLE for one in panels(PANELS) if one.TITLE]
+    assert headings == [one.TITLE for one in panels(PANELS) if one.TITLE and one.__name__ not in NOT_OF_OLD_RUNS]
 
 
 def made(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> str:

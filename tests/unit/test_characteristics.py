@@ -10,7 +10,7 @@ import pytest
 from inertial import decisions
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "benchmarks"))
+sys.path.append(str(ROOT / "benchmarks"))  # last: tests have modules of the same names
 
 from characteristics import COMMANDS, DERIVED, how
 

@@ -242,6 +242,37 @@ def test_compiled_c_computes_the_calibration(arithmetic: str, call: str, within:
         assert np.max(np.abs(computed - wanted)) < 1.5e-6 * stated_ug(header) + 2e-7
 
 
+def test_compiled_fixed_point_beyond_its_temperatures_holds_the_nearest_one_and_says_so(tmp_path: Path) -> None:
+    """The program of the test ends with 4 where the function does not tell that the temperature was beyond the range."""
+    c = unit(scale_t=1e-3)
+    header = export_text("c", [c], "run-1", ExportSettings(arithmetic="q24"))
+    output = NOMINAL * np.array([7.5, -6.0, 8.0])
+    rows = np.array([(*output, t) for t in (-10.0, -10.001, -60.0, 60.0, 60.001, 125.0)])
+    computed = compiled(header, FIXED, rows, tmp_path)
+    assert np.array_equal(computed[:3], np.repeat(computed[:1], 3, axis=0))
+    assert np.array_equal(computed[3:], np.repeat(computed[3:4], 3, axis=0))
+    edges = np.array([c.correct(output[None], t)[0] for t in c.temperatures])
+    assert np.max(np.abs(computed[[0, 3]] - edges)) < 8.0 * (1e-6 * stated_ug(header) + 2e-7)
+
+
+@pytest.mark.parametrize("full_scale", [2.0, 8.0])
+def test_fixed_point_states_its_error_at_full_scale_and_keeps_it(full_scale: float, tmp_path: Path) -> None:
+    c = replace(unit(scale_t=1e-3, low=-40.0, high=85.0), full_scale=full_scale * NOMINAL)
+    header = export_text("c", [c], "run-1", ExportSettings(arithmetic="q24"))
+    match = re.search(r"from -40 to 85 degrees Celsius, .*at full scale \(([\d.]+) g\): ([\d.e+-]+) ug", header)
+    assert match is not None
+    size, stated = float(match[1]), float(match[2])
+    assert size == pytest.approx(full_scale, rel=0.02)
+    points = [
+        (size * f, t, y + (size - 1.0) * (y - c.bias.T @ (t - 25.0) ** np.arange(ORDER)))
+        for f, t, y in readings(c, 2000)
+    ]
+    rows = np.array([(*np.rint(y), np.round(t, 3)) for _, t, y in points])
+    wanted = np.array([c.correct(np.array([row[:3]]), row[3])[0] for row in rows])
+    worst = 1e6 * np.max(np.abs(compiled(header, FIXED, rows, tmp_path) - wanted))
+    assert 0.5 * stated < worst < 1.2 * stated + 0.2
+
+
 def test_a_header_has_the_crc_of_zlib() -> None:
     import struct
 

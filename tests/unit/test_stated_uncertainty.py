@@ -231,8 +231,9 @@ def test_plan_refuses_a_limit_that_cannot_be_reached(tmp_path: Path) -> None:
     (tmp_path / "nav.toml").write_text(recipe.replace("qa700.limits.toml", "navigation"), encoding="utf-8")
     planned = CliRunner().invoke(app, ["plan", str(tmp_path / "nav.toml")])
     assert planned.exit_code == 1
-    assert "cannot be met: bias_error_period_ug: limit 50 µg, error expected over 12 months" in planned.output.replace(
-        "\n", " "
+    assert (
+        "cannot be met: bias_error_period_ug: limit 50 µg, 95 % bound of the error over 12 months"
+        in planned.output.replace("\n", " ")
     )
     refused = (
         CliRunner().invoke(app, ["run", str(tmp_path / "nav.toml"), "--archive", str(tmp_path / "archive")]).exception

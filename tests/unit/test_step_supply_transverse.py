@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from inertial.dynamics import settling
-from inertial.dynamics.ratiometry import departures, largest_departure, zero_and_sensitivity
+from inertial.dynamics.ratiometry import departures, largest_departure, slope_over, zero_and_sensitivity
 from inertial.dynamics.sine_fit import fit_tone
 from inertial.dynamics.step_record import aligned, step_figures
 from inertial.dynamics.transverse import fit_transverse, relative_phase
@@ -190,18 +190,37 @@ def test_distortion_is_no_noise_of_a_tone() -> None:
     assert whole.value[0] == pytest.approx(1.0, abs=1e-12)
 
 
-def test_the_largest_of_departures_within_noise_is_not_chosen_by_the_noise(rng: np.random.Generator) -> None:
+def test_a_departure_within_the_noise_is_held_by_its_interval(rng: np.random.Generator) -> None:
     supply, own = np.array([12.0, 10.0, 11.0, 12.5, 13.0]), np.full(5, 1e-4)
     true = 5e-5 * (supply - 12.0) / -2.0  # 0.35 standard uncertainties at the farthest supply
-    pulls, largest = [], []
+    held, sizes, largest = 0, [], []
     for _ in range(2000):
         noise = 1e-4 * rng.normal(size=5)
         shifts = true + noise - noise[0]
-        value, error = largest_departure(supply, shifts, own)
-        pulls.append((value - 5e-5) / error)
-        largest.append((max(shifts, key=abs) - 5e-5) / (np.sqrt(2.0) * 1e-4))
-    assert np.std(pulls) == pytest.approx(1.0, abs=0.08)
-    assert abs(np.mean(pulls)) < 0.08
-    assert np.std(largest) > 1.2
+        value, error, _ = largest_departure(supply, shifts, own)
+        held += abs(abs(value) - 5e-5) <= 1.96 * error
+        sizes.append(abs(value))
+        largest.append(max(np.abs(shifts)))
+    assert held >= 0.89 * 2000
+    assert np.mean(sizes) < 0.7 * np.mean(largest)  # noise alone is not taken for a departure
     bent = np.array([0.0, 5e-3, 0.0, 0.0, 0.0])  # the sensitivity falls where the supply is too low: no line
-    assert largest_departure(supply, bent, own) == (5e-3, pytest.approx(np.sqrt(2.0) * 1e-4))
+    assert largest_departure(supply, bent, own) == (5e-3, pytest.approx(np.sqrt(2.0) * 1e-4), 1)
+
+
+@pytest.mark.parametrize("supplies", [(12.0, 10.0, 11.0, 13.0, 14.0), (12.0, 11.0, 13.0)])
+def test_a_curve_symmetric_about_the_first_supply_has_its_departure_and_a_slope(
+    supplies: tuple[float, ...], rng: np.random.Generator
+) -> None:
+    supply, own = np.array(supplies), np.full(len(supplies), 1.0)
+    for size in (2.0, 3.0, 8.0):
+        true = size * (supply - 12.0) ** 2 / np.max((supply - 12.0) ** 2)
+        held, steep = 0, 0
+        for _ in range(1000):
+            noise = rng.normal(size=supply.size)
+            shifts = true + noise - noise[0]
+            value, error, _ = largest_departure(supply, shifts, own)
+            held += abs(value - size) <= 1.96 * error
+            slope, of_slope = slope_over(supply, shifts, own)
+            steep += abs(slope) > 2.0 * of_slope
+        assert held >= 900
+    assert steep >= 950  # the line alone has no slope: it is told in 5 %

@@ -51,7 +51,7 @@ def planned(folder: Path, monkeypatch: pytest.MonkeyPatch, temperatures: str, li
 
 
 def test_a_plan_says_what_run_would_refuse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    status, text = planned(tmp_path, monkeypatch, "298.0", "consumer")
+    status, text = planned(tmp_path, monkeypatch, "298.0", "production")
     assert status == 0
     assert "'tumbleline run' refuses this recipe" in text
     assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in " ".join(text.split())
@@ -60,7 +60,7 @@ def test_a_plan_says_what_run_would_refuse(tmp_path: Path, monkeypatch: pytest.M
     (tmp_path / "mine.toml").write_text('name = "m"\n[figures.residual_rms]\nmax = 1\nunit = "µg"\n', encoding="utf-8")
     _, text = planned(tmp_path, monkeypatch, "25.0", "mine.toml")
     assert "unknown figure 'residual_rms'" in " ".join(text.split())
-    _, text = planned(tmp_path, monkeypatch, "25.0", "consumer")
+    _, text = planned(tmp_path, monkeypatch, "25.0", "production")
     assert "refuses" not in text
 
 

@@ -17,6 +17,7 @@ from pipelines.certificates.document.content import (
     ReferenceStandard,
     Result,
 )
+from pipelines.certificate_document.numbers import probability, significant
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, stated_budget
 from pipelines.certificates.statement import stated
@@ -24,6 +25,7 @@ from pipelines.stages.figures import FIGURES
 from pipelines.stages.uncertainty.contributions import left_out
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
+from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.uncertainty import Uncertainty
 
@@ -108,12 +110,13 @@ def compose(run: Run, calibration: Calibration, known: list[Calibration], who: L
         conditions=tuple(_conditions(run, serial, recipe)),
         references=references,
         traceability=_traceability(budget, {**(station.get("uncertainty") or {}), **(recipe.get("uncertainty") or {})}),
-        results=tuple(_result(one, coefficients) for one in budget["quantities"]),
+        results=tuple(_result(one, coefficients) for one in budget["quantities"] if one["quantity"] != LARGEST_ERROR),
         budgets=tuple(_budget(one) for one in budget["quantities"] if one["quantity"] in BUDGETS),
         coefficients=tuple(coefficients),
         conformity=tuple(_conformity(one) for one in budget["decisions"]),
         decision_rule="; ".join(dict.fromkeys(one["rule"] for one in budget["decisions"])),
         limits=str((about.get("limits") or {}).get("name", "")),
+        grade_statement=_grade_statement(budget, event.grade),
         adjustment=adjustment(run, calibration, known),
         amendment=_amendment(calibration, known),
         interval=_interval(calibration, agreed=budget["customer_agreed"]),
@@ -212,6 +215,19 @@ def _conformity(one: Any) -> Conformity:
     return Conformity(
         figure=f"{label} (least value, accepted from)" if one.get("least") else label,
         **{name: one[name] for name in ("value", "expanded", "limit", "accept", "unit", "outcome", "pfa")},
+    )
+
+
+def _grade_statement(budget: StatedBudget, grade: str) -> str:
+    """What the grade says of the item: a probability, by the distribution of its largest error."""
+    quantiles = {one["axis"]: one["value"] for one in budget["quantities"] if one["quantity"] == LARGEST_ERROR}
+    if not quantiles or grade not in GRADES:
+        return ""
+    risk = probability(exceedance(quantiles[MEDIAN], quantiles[BOUND], GRADES[grade]))
+    return (
+        f"Grade {grade}: in a use at the end of the stated period of {budget['validity_months']} months, switched on anew, the "
+        f"RMS error of the corrected output exceeds {GRADES[grade]:g} µg on any axis with a probability of {risk} (95 % bound of "
+        f"the largest axis: {significant(quantiles[BOUND])} µg)."
     )
 
 

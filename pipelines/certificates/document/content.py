@@ -122,6 +122,7 @@ class Amendment(Strict):
 class CertificateContent(Strict):
     """One certificate of one unit.
 
+    grade_statement : probability that the item exceeds the limit of its grade within the period; empty where it is not known
     adequacy : verdict on the model with its p, as certified; left_out : contributions that U does not contain
     statement_rule : rule of decision; interval : empty unless the customer agreed to have one printed
     software : release that computed the results; coefficients_sha256 : of the certified table
@@ -149,6 +150,7 @@ class CertificateContent(Strict):
     conformity: tuple[Conformity, ...]
     decision_rule: str
     limits: str
+    grade_statement: str
     adjustment: Adjustment
     amendment: Amendment
     interval: str

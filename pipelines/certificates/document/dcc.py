@@ -229,7 +229,7 @@ def _conformity(w: _Writer, parent: Any, one: Conformity, c: CertificateContent)
     w.add(parent, "norm", one_line(c.decision_rule))
     limit = f"limit {one.limit:g} {one.unit} of '{c.limits}'"
     text = f"{one.figure}: {limit}, specific probability of false acceptance {least_of(one.pfa)}"
-    w.text(parent, "declaration", text)
+    w.text(parent, "declaration", f"{text}. {c.grade_statement}".removesuffix(". "))
     w.add(parent, "conformity", OUTCOMES.get(one.outcome, "noPass"))
 
 

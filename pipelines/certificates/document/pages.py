@@ -178,6 +178,7 @@ def _conformity(c: CertificateContent) -> dict[str, Any]:
     verdict = "meets" if passed else "does not meet in every figure"
     before = [
         f"The item {verdict} the specification '{c.limits}' (grade {c.grade}) in the figures listed.",
+        *([c.grade_statement] if c.grade_statement else []),
         f"Decision rule: {c.decision_rule}. PFA: specific probability of false acceptance (JCGM 106, 7.4).",
     ]
     return {"title": "Conformity", "before": before, "tables": [table]}  # fmt: skip

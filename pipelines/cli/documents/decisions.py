@@ -8,6 +8,7 @@ from typing_extensions import TypedDict
 
 from pipelines.capture.interruptions import Interruptions
 from pipelines.jobs.adequacy import AdequacyDocument
+from pipelines.jobs.references import ReferencesDocument
 
 
 class FigureDocument(TypedDict):
@@ -31,6 +32,12 @@ class UnitDocument(TypedDict):
     slot: int
     outcome: Literal["pass", "fail", "refused"]
     grade: str
+    grade_risk: NotRequired[
+        Annotated[
+            float | None,
+            "probability that the RMS error of any axis exceeds the limit of the grade at the end of the period; null: not known",
+        ]
+    ]
     reasons: Annotated[str, "separated by `; `; empty if it passed"]
     rule: str
     figures: Annotated[dict[str, FigureDocument], "by [name](../reference/figures.md); empty if refused"]
@@ -53,6 +60,9 @@ RunDocument = TypedDict(
         "archive": str,
         "interruptions": NotRequired[Annotated[Interruptions | None, "null: the archive has no record of them"]],
         "adequacy": NotRequired[Annotated[AdequacyDocument | None, "null: no multi-position test; not in `show`"]],
+        "references": NotRequired[
+            Annotated[ReferencesDocument | None, "null: nothing is stated, or no table turned the units; not in `show`"]
+        ],
     },
 )
 RunDocument.__doc__ = "``run --json``: the decisions of a lot. ``fit`` prints the same."

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from pipelines.cli.options import console, print_table, short
+from schemas.decisions import LARGEST_ERROR
 
 RAISED = 3.0
 """Factor by which 1/f and random walk must raise a floor to be listed."""
@@ -162,6 +163,7 @@ TITLES = {
     "verification_norm": "magnitude in a verification pose",
     "bias_error": "error by the references alone",
     "bias_error_period": "error over the period, RMS",
+    LARGEST_ERROR: "largest error of an axis over the period, 95 % bound",
 }
 LEAST = 0.01
 """Smallest share of a contribution that is printed."""
@@ -194,5 +196,5 @@ def print_reach(reach: dict[str, Any] | None) -> None:
 
 
 def _line(row: dict[str, Any]) -> list[str]:
-    expanded = "" if row["quantity"] == "bias_error_period" else short(row["expanded"])
+    expanded = "" if row["quantity"] in {"bias_error_period", LARGEST_ERROR} else short(row["expanded"])
     return [TITLES[row["quantity"]], row["axis"], short(row["u"]), expanded, row["unit"]]

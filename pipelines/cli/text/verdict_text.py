@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from pipelines.archive import Run
     from pipelines.jobs.adequacy import AdequacyDocument
+    from pipelines.jobs.references import ReferencesDocument
 
 
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}
@@ -68,11 +69,12 @@ def class_text(group: dict[str, Any]) -> str:
 
 
 def judged(document: dict[str, Any], run: Run) -> dict[str, Any]:
-    """The result of a run with the verdict on its model."""
+    """The result of a run with the verdicts on its model and on its stated references."""
     from pipelines.jobs.adequacy import adequacy_of
+    from pipelines.jobs.references import references_of
 
     with error_console().status("judging the model"):
-        return {**document, "adequacy": adequacy_of(run)}
+        return {**document, "adequacy": adequacy_of(run), "references": references_of(run)}
 
 
 def print_adequacy(verdict: AdequacyDocument | None) -> None:
@@ -82,3 +84,19 @@ def print_adequacy(verdict: AdequacyDocument | None) -> None:
     faulty = f"; left out because of a data fault: {', '.join(verdict['faulty'])}" if verdict["faulty"] else ""
     text = f"model   {plain_verdict(verdict)}{faulty}"
     console().print(text, style=STYLE_OF[verdict["adequate"]], markup=False, soft_wrap=True)
+
+
+def print_references(judged: ReferencesDocument | None) -> None:
+    """Print whether the table is worse than stated, and what the run cannot show; nothing where nothing is stated."""
+    from pipelines.jobs.references import contradiction, unseen
+
+    if judged is None:
+        return
+    if judged["worse"] is None:
+        text = f"CANNOT BE JUDGED: {judged['reason']}"
+    else:
+        told = f"CONTRADICTED: {contradiction(judged)}" if judged["worse"] else "not contradicted by the residuals"
+        text = f"{told}; {unseen(judged)}"
+    console().print(
+        f"stated references   {text}", style="bold red" if judged["worse"] else "", markup=False, soft_wrap=True
+    )

@@ -76,16 +76,20 @@ def _real_unit(unit: UnitCalibration, kind: str) -> str:
 
 def _fixed_unit(unit: UnitCalibration) -> str:
     own = fixed_point(unit)
-    error = largest_error_ug(unit, own.correct)
+    errors = f"at 1 g: {largest_error_ug(unit, own.correct):.3g} ug"
+    if unit.full_scale is not None:
+        full = unit.full_scale / own.scale
+        errors += f", at full scale ({full:.3g} g): {largest_error_ug(unit, own.correct, full):.3g} ug"
     factor = round(2.0**_COUNTS_BITS / own.scale) if unit.out_unit == "LSB" else 0
-    low, high = (round(1000.0 * value) for value in unit.temperatures)
+    low, high = own.range_mC
     crc = checksum(unit.unit, "i", [low, high, *own.bias.ravel(), *own.inverse.ravel()])
     counts = (
         f"{factor} counts factor" if factor else f"output[] = value in {unit.out_unit} / {own.scale!r} * {ONE}, rounded"
     )
     return (
         f"/* {comment(unit.unit)}: {comment(unit.certified)}\n"
-        f" * largest error against the full calibration, at 1 g: {error:.3g} ug; {counts} */\n"
+        f" * largest error against the full calibration from {low / 1000:g} to {high / 1000:g} degrees Celsius, {errors};\n"
+        f" * beyond these temperatures the coefficients of the nearest one hold; {counts} */\n"
         f"static const tumbleline_calibration tumbleline_{_symbol(unit)} = {{\n"
         f'    "{unit.unit}", {low}, {high}, INT64_C({factor}),\n    {_braces(own.bias, str)},\n    {_braces(own.inverse, str)},\n'
         f"    0x{crc:08X}u\n}};\n"

@@ -1,6 +1,7 @@
 /* Accelerometer calibration in fixed point, run @RUN@. Every number is an integer in units of 2^-24.
  * specific force in g = M(x) * (u - b(x)), u = output / nominal scale (g), x = (temperature - 25 degrees Celsius) / 64,
  * b(x) = sum of bias[k] * x^k, M(x) = sum of inverse[k] * x^k: a polynomial fitted between low_mC and high_mC.
+ * Beyond low_mC and high_mC the temperature is taken to be the nearest of the two, and tumbleline_correct returns 1.
  * Right shifts of negative numbers are taken to be arithmetic, as every common compiler does. */
 #ifndef TUMBLELINE_CALIBRATION_H
 #define TUMBLELINE_CALIBRATION_H
@@ -29,11 +30,13 @@ static inline int32_t tumbleline_from_counts(const tumbleline_calibration *c, in
 
 static inline int64_t tumbleline_product(int64_t a, int64_t b) { return (a * b + ((int64_t)1 << 23)) >> 24; }
 
-/* Writes the specific force in units of 2^-24 g to force[3]; output in the same units, temperature in thousandths of a degree. */
-static inline void tumbleline_correct(const tumbleline_calibration *c, const int32_t output[3], int32_t temperature_mC,
-                                      int32_t force[3])
+/* Writes the specific force in units of 2^-24 g to force[3]; output in the same units, temperature in thousandths of a degree.
+ * Returns 0, or 1 where the temperature is beyond low_mC to high_mC: force is then that of the nearest temperature. */
+static inline int tumbleline_correct(const tumbleline_calibration *c, const int32_t output[3], int32_t temperature_mC,
+                                     int32_t force[3])
 {
-    int64_t x = ((int64_t)temperature_mC - 25000) * 32768 / 125, d[3];
+    int32_t t = temperature_mC < c->low_mC ? c->low_mC : temperature_mC > c->high_mC ? c->high_mC : temperature_mC;
+    int64_t x = ((int64_t)t - 25000) * 32768 / 125, d[3];
     for (int i = 0; i < 3; i++) {
         int64_t b = c->bias[@ORDER@ - 1][i];
         for (int n = @ORDER@ - 2; n >= 0; n--) b = c->bias[n][i] + tumbleline_product(b, x);
@@ -48,6 +51,7 @@ static inline void tumbleline_correct(const tumbleline_calibration *c, const int
         }
         force[i] = (int32_t)((sum + ((int64_t)1 << 23)) >> 24);
     }
+    return t != temperature_mC;
 }
 
 #endif

@@ -10,6 +10,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, NamedTuple
 
+from inertial.uncertainty.deviation_law import DeviationLaw
 from pipelines.procedures import FIGURES as PROCEDURE_FIGURES
 from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables
 
@@ -38,6 +39,9 @@ class Figure(NamedTuple):
     """Value and standard uncertainty of one figure of one unit, in the figure's unit.
 
     why_not : why there is no value, where there is none; the value is then infinite and passes no limit
+    dof, removed : degrees of freedom of a standard deviation, nan of other figures, and the known part that was taken out of it
+    shared : part of the uncertainty that the units of a lot have in common
+    median : of a value that is a 95 % bound of an error, the median of that error
     """
 
     name: str
@@ -45,6 +49,15 @@ class Figure(NamedTuple):
     value: float
     uncertainty: float
     why_not: str = ""
+    dof: float = float("nan")
+    shared: float = 0.0
+    median: float = float("nan")
+    removed: float = 0.0
+
+    @property
+    def law(self) -> DeviationLaw | None:
+        """The law of a standard deviation; None of other figures, which are normal."""
+        return DeviationLaw(self.value, self.dof, self.removed) if self.dof > 0.0 else None
 
 
 def find_figures(package: str, path: Iterable[str]) -> dict[str, FigureKind]:

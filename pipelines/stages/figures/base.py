@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from inertial.distributions import normal_tail
+from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
 from pipelines.stages.noise import B_BOUND
 
 if TYPE_CHECKING:
@@ -26,14 +28,22 @@ class Value(NamedTuple):
     """Value and standard uncertainty of a figure of one unit, in the figure's unit.
 
     why_not : why there is no value, where there is none; the value is then infinite and passes no limit
+    dof : degrees of freedom of a standard deviation, nan of other figures
+    shared : part of the uncertainty that the units of a lot have in common, that of the references
+    median : of a value that is a 95 % bound of an error, the median of that error
     """
 
     value: float
     uncertainty: float
     why_not: str = ""
+    dof: float = float("nan")
+    shared: float = 0.0
+    median: float = float("nan")
 
     def reach(self, guard: float) -> float:
         """Magnitude with the guard band: the value that is compared with a limit."""
+        if guard > 0.0 and self.dof > 0.0:
+            return DeviationLaw(self.value, self.dof).quantile(1.0 - float(normal_tail(guard)))
         return abs(self.value) + guard * self.uncertainty
 
 
@@ -53,6 +63,7 @@ class LotCoefficients:
         self._scale = np.abs(np.diagonal(calibration.response, axis1=-2, axis2=-1))[..., None]
         self._values: dict[str, NDArray[np.float64]] = {}
         self._errors: dict[str, NDArray[np.float64]] = {}
+        self._noise: dict[str, NDArray[np.float64]] = {}
 
     def of(self, unit: int) -> UnitCoefficients:
         """The coefficients of the unit at a place of the lot."""
@@ -64,6 +75,15 @@ class LotCoefficients:
             self._values[effect] = self._calibration.value(effect)
             self._errors[effect] = self._with_budget().standard_error(effect)
         return self._values[effect][unit], self._errors[effect][unit], self._scale[unit]
+
+    def shared(self, effect: str, unit: int) -> NDArray[np.float64]:
+        """Standard errors (3, columns) of an effect by the references alone, output unit; zero where nothing is stated."""
+        if self.stated is None:
+            return np.zeros_like(self.effect(effect, unit)[1])
+        if effect not in self._noise:
+            self._noise[effect] = self._calibration.standard_error(effect)
+        whole, noise = self.effect(effect, unit)[1], self._noise[effect][unit]
+        return np.sqrt(np.maximum(whole**2 - noise**2, 0.0))
 
     def _with_budget(self) -> Calibration:
         """The calibration with the budget's covariance of each axis added to that of the noise."""
@@ -114,7 +134,8 @@ class UnitCoefficients(NamedTuple):
             return None
         spread = (factor * errors / scale).ravel()
         place = int(np.argmax(np.abs(values) + guard * spread))
-        return Value(float(values[place]), float(spread[place]))
+        shared = (factor * self.lot.shared(effect, self.unit) / scale).ravel()[place]
+        return Value(float(values[place]), float(spread[place]), shared=abs(float(shared)))
 
 
 class BudgetRow(NamedTuple):
@@ -221,7 +242,7 @@ def _noise_term(place: int, rows: UnitRows) -> Value:
     value, low, high = (float(rows[column][place]) for column in ("value", "low", "high"))
     axis = rows["axis"][place]
     if rows["identified"][place]:
-        return Value(value, (high - low) / (2.0 * NORMAL_95))
+        return Value(value, (high - low) / (2.0 * NORMAL_95), dof=dof_of_upper(high / value) if value > 0.0 else np.nan)
     if rows["term"][place] == "B":  # two upper bounds: the smaller holds
         bound = rows["high"][(rows["term"] == B_BOUND) & (rows["axis"] == axis)]
         high = float(np.fmin(high, bound[0]))

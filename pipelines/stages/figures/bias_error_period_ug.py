@@ -1,21 +1,21 @@
-"""Error expected over the period of validity, root mean square, worst axis: run, references, flicker, switch-on, ageing."""
+"""95 % bound of the largest axis' RMS error in a use at the end of the period: run, references, walk, switch-on, ageing."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value
-from schemas.units import AXES
+from schemas.decisions import BOUND, LARGEST_ERROR, MEDIAN
 
 if TYPE_CHECKING:
     from schemas.recipe import Recipe
 
 
 def _value(tables: UnitTables) -> Value | None:
-    rows = [tables.budget[key] for key in (("bias_error_period", axis) for axis in AXES) if key in tables.budget]
-    if not rows:
+    if (LARGEST_ERROR, BOUND) not in tables.budget:
         return None
-    return max((Value(row.value, row.u) for row in rows), key=lambda value: value.reach(tables.guard))
+    bound, median = (tables.budget[LARGEST_ERROR, name].value for name in (BOUND, MEDIAN))
+    return Value(bound, 0.0, median=median)
 
 
 def _missing(recipe: Recipe) -> str:
@@ -31,7 +31,7 @@ def _missing(recipe: Recipe) -> str:
 FIGURE = FigureKind(
     name="bias_error_period_ug",
     unit="µg",
-    label="rms error of the worst axis expected over the period of validity",
+    label="95 % bound of the largest rms error of an axis at the end of the period of validity",
     order=55,
     value=_value,
     missing=_missing,

@@ -22,7 +22,8 @@ def _value(tables: UnitTables) -> Value | None:
 def _as_met(tables: UnitTables, axis: str) -> Value:
     """RMS error of one axis with its uncertainty for the user: that of the verification, and that of the references."""
     shown = _of_axis(tables.verification, axis)
-    return shown._replace(uncertainty=float(np.hypot(shown.uncertainty, tables.stated_u("bias_error", axis))))
+    shared = tables.stated_u("bias_error", axis)
+    return shown._replace(uncertainty=float(np.hypot(shown.uncertainty, shared)), shared=shared)
 
 
 def _of_axis(rows: UnitRows, axis: str) -> Value:

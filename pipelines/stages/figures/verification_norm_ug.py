@@ -11,7 +11,8 @@ def _value(tables: UnitTables) -> Value | None:
     if not len(tables.verification):
         return None
     shown = largest_error(tables.verification_poses, "uncertainty_ug", tables.guard)
-    return shown._replace(uncertainty=float(np.hypot(shown.uncertainty, tables.stated_u("verification_norm", "norm"))))
+    shared = tables.stated_u("verification_norm", "norm")
+    return shown._replace(uncertainty=float(np.hypot(shown.uncertainty, shared)), shared=shared)
 
 
 FIGURE = FigureKind(

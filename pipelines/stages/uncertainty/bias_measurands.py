@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-COLUMNS = ("bias_instability_ug", "bias_record_u_ug", "bias_long_u_ug", "bias_long_s", "bias_switch_on_u_ug")
+COLUMNS = (
+    *("bias_instability_ug", "bias_record_u_ug", "bias_long_u_ug", "bias_long_s", "bias_switch_on_u_ug"),
+    "bias_walk_ug_rts",
+)
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,8 @@ def bias_measurands(noise: BiasNoise, switch_on: float | None = None) -> dict[st
 
     ``record``: the mean over the dwells' own time, which the coefficient follows: what both share of the wander is no error.
     ``long``: the mean over the day after it; flicker and random walk until then are added. ``switch_on``: the mean of a day after
-    the device was switched off and on; not a number where no repeatability of switching on is stated, never zero.
+    the device was switched off and on; not a number where no repeatability of switching on is stated, never zero. The last column
+    is no uncertainty but the coefficient K of the random walk that goes on after the record, µg/√s.
 
     Parameters
     ----------
@@ -72,9 +76,9 @@ def bias_measurands(noise: BiasNoise, switch_on: float | None = None) -> dict[st
     wander = np.hypot(noise.flicker, noise.excess)
     long = of_a_day(at_end, wander, time, widened=noise.widened)
     again = np.full_like(record, np.nan) if switch_on is None else np.hypot(long, switch_on)
-    return dict(
-        zip(COLUMNS, (instability(wander, time), record, long, np.full_like(record, DAY_S), again), strict=True)
-    )
+    walk = noise.carried / np.sqrt(max(float(np.ptp(noise.every)), 1e-9))
+    values = (instability(wander, time), record, long, np.full_like(record, DAY_S), again, walk)
+    return dict(zip(COLUMNS, values, strict=True))
 
 
 def _of_variance_one(kind: tuple[Array, float], noise: BiasNoise) -> tuple[Array, float]:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from schemas.reference import Reference
     from schemas.uncertainty import Uncertainty
 
+MANY = 1e6
+
 
 @dataclass(frozen=True)
 class BudgetTables:
@@ -75,6 +77,12 @@ class BudgetTerms:
         if own is None or own.supply_V is None or supply is None or not supply.ratio_measured or own.ratiometric == 0.0:
             return None
         return FollowedSupply(own.supply_V, own.ratiometric)
+
+    @property
+    def switch_on_dof(self) -> float:
+        """Degrees of freedom that the scatter of switching on is known from; many where nothing is said of them."""
+        cycles = None if self.stability is None else self.stability.power_cycles
+        return MANY if cycles is None else cycles - 1.0
 
     @property
     def reads_own_temperature(self) -> bool:

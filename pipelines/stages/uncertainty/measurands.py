@@ -12,8 +12,11 @@ from inertial import design
 from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import norm_errors, rms_over
-from pipelines.stages.uncertainty.period import Period, period_of
+from pipelines.stages.period import period_of
+from pipelines.stages.period_error import AxisErrors, largest_error
+from pipelines.stages.verify import OF_UNITS
 from pipelines.tables.frames import ByUnit
+from schemas.decisions import BOUND, LARGEST_ERROR, MEDIAN
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
@@ -40,7 +43,7 @@ PARTS = {
     **dict.fromkeys(EFFECTS, "coefficients"),
     "orthogonality": "angles",
     "output": "outputs",
-    **dict.fromkeys(("bias_error", "verification_norm", "bias_error_period"), "verification"),
+    **dict.fromkeys(("bias_error", "verification_norm", "bias_error_period", LARGEST_ERROR), "verification"),
 }
 """The part of the budget that every quantity is computed in."""
 UNSEEN = 0.1
@@ -74,6 +77,7 @@ class BudgetQuantity:
     where there is
         none
     extra : contributions beyond the run by name, (units,) each; dof_noise : (units,)
+    axis_errors : of the error of an axis, where the error over the period is made of it
     """
 
     name: str
@@ -86,6 +90,7 @@ class BudgetQuantity:
     shown: Array | None = None
     unseen: Array | None = None
     extra: dict[str, Array] = field(default_factory=dict[str, "Array"])
+    axis_errors: AxisErrors | None = None
 
 
 def quantities_of(
@@ -255,9 +260,11 @@ def _verification(
     rows = tables.verification
     for axis, letter in enumerate(AXES):
         own = rows[f"error_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)
-        noise = rows[f"rms_uncertainty_{letter}_ug"].to_numpy().reshape(len(lot.units), -1)[:, 0]
+        noise, expected, freedom = (
+            rows[name.format(letter)].to_numpy().reshape(len(lot.units), -1)[:, 0] for name in OF_UNITS
+        )
         parts = np.sqrt(np.mean(true[..., axis, :] ** 2, axis=-2))
-        yield BudgetQuantity(
+        one = BudgetQuantity(
             "bias_error",
             letter,
             "µg",
@@ -265,9 +272,17 @@ def _verification(
             noise,
             np.broadcast_to(parts, (len(lot.units), parts.shape[-1])),
             dof,
-            shown=None if shown is None else _all(rms_over(shown[..., axis, :]), lot),
-            unseen=None if hidden is None else _all(rms_over(true[..., axis, :][..., hidden]), lot),
         )
+        if shown is not None and hidden is not None:
+            seen, unshown = (
+                _all(rms_over(part), lot) for part in (shown[..., axis, :], true[..., axis, :][..., hidden])
+            )
+            # the RMS of the run has in it what the verification shows of the references
+            fixed = np.sqrt(np.maximum(np.sum(one.parts**2, axis=-1) - seen**2, unshown**2))
+            flat = true[..., axis, :].reshape(-1, true.shape[-1])
+            errors = AxisErrors(one.value, expected, freedom, own.mean(axis=1), fixed, flat.T @ flat)
+            one = replace(one, shown=seen, unseen=unshown, axis_errors=errors)
+        yield one
     along = norm_errors(true / MICRO, force)
     value, noise = _worst_pose(lot, tables)
     worst = _worst("verification_norm", "norm", along, np.zeros(along.shape[:-1]) + noise[:, None] ** 2, value, dof)
@@ -301,38 +316,38 @@ def _all(values: Array, lot: LotArrays) -> Array:
 def _period(
     errors: list[BudgetQuantity], lot: LotArrays, tables: BudgetTables, terms: BudgetTerms, dof: Array
 ) -> Iterator[BudgetQuantity]:
-    """RMS error over the period of validity of each axis; none if nothing is stated for the time after the run."""
+    """RMS error over the period of validity of each axis, and the largest; none if nothing is stated for the time after."""
     used = lot.of_kind("dwell")
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[:, used]
     span = float(np.ptp(time[0])) + terms.dwell_s
+    axes: list[AxisErrors] = []
     for letter in AXES:
         own = next(q for q in errors if q.name == "bias_error" and q.axis == letter)
-        periods: list[Period | None] = [period_of(tables, terms, unit, letter, span) for unit in lot.units]
-        whole = [one for one in periods if one is not None]
-        if len(whole) != len(lot.units):
+        whole = [one for unit in lot.units if (one := period_of(tables, terms, unit, letter, span)) is not None]
+        if len(whole) != len(lot.units) or own.axis_errors is None:
             return
-        variance = np.sum(own.parts**2, axis=-1)
-        shown, unseen = (np.zeros_like(variance) if part is None else part for part in (own.shown, own.unseen))
-        fixed = np.sqrt(np.maximum(variance - shown**2, unseen**2))
-        later = {name: np.array([one.parts[name] for one in whole]) for name in whole[0].parts}
-        ageing = later.get("ageing", np.zeros_like(fixed))
-        value = np.sqrt(own.value**2 + fixed**2 + np.sum([part**2 for part in later.values()], axis=0))
-        # of a square: that of the run by its own uncertainty, of what is fixed for a unit by its distribution
-        square = 4.0 * (own.value * own.noise) ** 2 + 2.0 * fixed**4 / _dimensions(own.parts) + 2.0 * ageing**4
-        noise = np.sqrt(square) / (2.0 * np.maximum(value, np.finfo(float).tiny))
+        names = dict.fromkeys(name for one in whole for name in one.parts)
+        later = {name: np.array([one.parts.get(name, 0.0) for one in whole]) for name in names}
+        axes.append(replace(own.axis_errors, later=later))
+    for letter, axis in zip(AXES, axes, strict=True):
+        parts = {"run": axis.run, "budget": axis.fixed, **axis.later}
+        none = np.zeros((len(lot.units), 0))
         yield BudgetQuantity(
-            "bias_error_period",
-            letter,
-            "µg",
-            value,
-            noise,
-            np.zeros((len(lot.units), 0)),
-            dof,
-            extra={"run": own.value, "budget": fixed, **later},
+            "bias_error_period", letter, "µg", axis.value, np.zeros_like(axis.run), none, dof, extra=parts
+        )
+    largest = largest_error(axes, terms.switch_on_dof)
+    worst = np.argmax([axis.value for axis in axes], axis=0)
+    names = dict.fromkeys(name for axis in axes for name in axis.later)
+    parts = {
+        "run": _of_worst([axis.run for axis in axes], worst),
+        "budget": _of_worst([axis.fixed for axis in axes], worst),
+    }
+    parts |= {name: _of_worst([axis.later.get(name, axis.run * 0.0) for axis in axes], worst) for name in names}
+    for name, value in zip((MEDIAN, BOUND), largest, strict=True):
+        yield BudgetQuantity(
+            LARGEST_ERROR, name, "µg", value, np.zeros_like(value), np.zeros((value.size, 0)), dof, extra=parts
         )
 
 
-def _dimensions(parts: Array) -> Array:
-    """Effective number of independent influences: (Σu²)²/Σu⁴."""
-    below = np.sum(parts**4, axis=-1)
-    return np.where(below > 0.0, np.sum(parts**2, axis=-1) ** 2 / np.where(below > 0.0, below, 1.0), 1.0)
+def _of_worst(values: list[Array], worst: NDArray[np.intp]) -> Array:
+    return np.stack(values)[worst, np.arange(worst.size)]

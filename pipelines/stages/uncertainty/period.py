@@ -56,9 +56,34 @@ def period_of(tables: BudgetTables, terms: BudgetTerms, unit: str, axis: str, sp
         "switch_on": stability.switch_on_ug,
         "switch_on_scale": stability.switch_on_ppm / RECTANGULAR,  # RMS of the force along an axis is 1/√3 g
     }
+    walk = walk_of(tables, unit, axis)
+    if walk > 0.0:
+        parts["random_walk"] = walk * walk_carried(windows, stability.flicker_slowest_s)
     if stability.ageing is not None:
         parts["ageing"] = ageing_u(stability.ageing, windows)
     return Period({name: value for name, value in parts.items() if value > 0.0 or name == "flicker"})
+
+
+def walk_carried(windows: Windows, slowest: float | None) -> float:
+    """Standard deviation of the random walk of a run at a use after it, for K = 1/√s.
+
+    It goes on over the run and the period, but is bounded: by the slowest time constant that the history of the device shows,
+    and no less than calibration and a use as long as it show themselves, each by a third of its length. Carried on for a year,
+    K of an hour would grow by a factor of a hundred, to more than devices do; slower changes are ageing.
+    """
+    bound = max(slowest or 0.0, 2.0 * windows.calibration / 3.0)
+    return min(walk_later(windows), float(np.sqrt(bound)))
+
+
+def walk_of(tables: BudgetTables, unit: str, axis: str) -> float:
+    """Random walk K, µg/√s: of the static record if identified there, otherwise that of the fit, within the record's limit."""
+    rows, of_fit = tables.noise, float(np.nan_to_num(_of_fit(tables.wander, unit, axis, "bias_walk_ug_rts")))
+    own = rows[(rows["unit"] == unit) & (rows["axis"] == axis) & (rows["term"] == "K")] if len(rows) else rows
+    if not len(own):
+        return of_fit
+    first = own.iloc[0]
+    shown = float(first["value"] if bool(first["identified"]) else first["high"])
+    return float(np.fmin(shown, of_fit) if not bool(first["identified"]) else shown)
 
 
 def ageing_u(ageing: Ageing, windows: Windows) -> float:
@@ -82,11 +107,11 @@ def instability_of(tables: BudgetTables, unit: str, axis: str) -> float:
         value = float(first["value"] if bool(first["identified"]) else first["high"])
         if np.isfinite(value):
             return value
-    return _of_fit(tables.wander, unit, axis)
+    return _of_fit(tables.wander, unit, axis, "bias_instability_ug")
 
 
-def _of_fit(wander: pd.DataFrame, unit: str, axis: str) -> float:
-    if "bias_instability_ug" not in wander:
+def _of_fit(wander: pd.DataFrame, unit: str, axis: str, name: str) -> float:
+    if name not in wander:
         return float("nan")
     own = wander[(wander["unit"] == unit) & (wander["axis"] == axis)]
-    return float(own["bias_instability_ug"].iloc[0]) if len(own) else float("nan")
+    return float(own[name].iloc[0]) if len(own) else float("nan")

@@ -11,11 +11,12 @@ from inertial import design
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
 from inertial.uncertainty.propagation import fit_design, norm_errors, propagated, rms_over
-from pipelines.stages.uncertainty.budget import with_device_temperature
-from pipelines.stages.uncertainty.contributions import DwellConditions, influences
-from pipelines.stages.uncertainty.measurands import EFFECTS
-from pipelines.stages.uncertainty.period import ageing_u
-from schemas.decisions import GRADES
+from pipelines.stages.budget import with_device_temperature
+from pipelines.stages.contributions import DwellConditions, influences
+from pipelines.stages.period import ageing_u
+from pipelines.stages.period_error import AxisErrors, largest_error
+from pipelines.stages.quantities import EFFECTS
+from schemas.decisions import BOUND, GRADES, LARGEST_ERROR
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ LEAST_SHARE = 0.01
 """Smallest share of a contribution that a reason names."""
 FIGURES = {
     "bias_error": ("bias_error_ug", 1.0),
-    "bias_error_period": ("bias_error_period_ug", 1.0),
+    LARGEST_ERROR: ("bias_error_period_ug", 1.0),
     "verification_norm": ("verification_norm_ug", 1.0),
     "bias": ("zero_g_offset_mg", 1e-3),
     "misalignment": ("misalignment_mrad", 1e-3),
@@ -67,7 +68,8 @@ class PlannedDwells:
 class Reach:
     """A quantity and its reachable uncertainty.
 
-    u : standard uncertainty, or the expected RMS of an error; parts : by contribution, in ``unit``
+    u : standard uncertainty, or the expected RMS of an error, or the 95 % bound of the largest
+    parts : by contribution, in ``unit``
     """
 
     quantity: str
@@ -78,8 +80,9 @@ class Reach:
 
     @property
     def shares(self) -> dict[str, float]:
-        """Share of each contribution in u², the largest first."""
-        shares = {name: part**2 / self.u**2 for name, part in self.parts.items()} if self.u > 0.0 else {}
+        """Share of each contribution in the sum of their squares, the largest first."""
+        whole = sum(part**2 for part in self.parts.values())
+        shares = {name: part**2 / whole for name, part in self.parts.items()} if whole > 0.0 else {}
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
@@ -135,6 +138,8 @@ def _errors(
     columns = design.local_columns(design.split(model.effects)[0], state, model.nonlinear)
     errors = propagation.user_errors(columns, state.force, intrinsic=terms.certificate.frame == "intrinsic")
     out: list[Reach] = []
+    axes: list[AxisErrors] = []
+    later = _later(planned, terms)
     for axis, letter in enumerate(AXES):
         parts = {
             group: MICRO * float(rms_over(errors[..., axis, :][..., names == group]))
@@ -142,12 +147,19 @@ def _errors(
         }
         u = float(np.sqrt(sum(v**2 for v in parts.values())))
         out.append(Reach("bias_error", letter, "µg", u, parts))
-        later = _later(planned, terms)
         if later is not None:
             whole = {"run": planned.run_ug, "budget": u, **later}
             out.append(
                 Reach("bias_error_period", letter, "µg", float(np.sqrt(sum(v**2 for v in whole.values()))), whole)
             )
+            flat = errors[..., axis, :].reshape(-1, errors.shape[-1])
+            run, fixed, dof = (np.array([value]) for value in (planned.run_ug, u, float(len(state.force))))
+            own = {name: np.array([value]) for name, value in later.items()}
+            axes.append(AxisErrors(run, run, dof, 0.0 * run, fixed, flat.T @ flat, own))
+    if axes:
+        worst = max((one for one in out if one.quantity == "bias_error_period"), key=lambda one: one.u)
+        _, bound = largest_error(axes, terms.switch_on_dof)
+        out.append(Reach(LARGEST_ERROR, BOUND, "µg", float(bound[0]), worst.parts))
     return [*out, _norm(errors, state, names)]
 
 
@@ -189,15 +201,15 @@ def unreachable(reaches: Sequence[Reach], limits: Limits, months: int) -> list[s
     for quantity, (figure, factor) in FIGURES.items():
         one = worst[quantity]
         needed = limits.figures[figure].max if figure in limits.figures else None
-        if quantity == "bias_error_period":
-            needed = min(needed or GRADES[limits.grade], GRADES[limits.grade])
+        if quantity == LARGEST_ERROR:
+            needed = min((limit for limit in (needed, GRADES.get(limits.grade)) if limit is not None), default=None)
         if one is None or needed is None:
             continue
-        period = quantity == "bias_error_period"
+        period = quantity == LARGEST_ERROR
         reached = factor * (one.u if period else limits.coverage_factor * one.u)
         if reached > needed:
             unit = limits.figures[figure].unit if figure in limits.figures else one.unit
-            what = f"error expected over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
+            what = f"95 % bound of the error over {months} months" if period else f"U (k = {limits.coverage_factor:g})"
             shares = [(name, share) for name, share in one.shares.items() if share >= LEAST_SHARE][:3]
             rulers = ", ".join(f"{LABELS[name]} {100.0 * share:.0f} %" for name, share in shares)
             out.append(f"{figure}: limit {shown(needed)} {unit}, {what} {shown(reached)} {unit} ({rulers})")

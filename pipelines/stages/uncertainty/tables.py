@@ -29,6 +29,7 @@ BEYOND = {
     "flicker": "flicker to the due date",
     "switch_on": "bias from one switch-on to the next",
     "switch_on_scale": "scale from one switch-on to the next",
+    "random_walk": "random walk of the run, carried on",
     "ageing": "ageing",
 }
 LABELS = {
@@ -162,7 +163,7 @@ SAME = ("visible", "type", "distribution", "scope", "input_unit", "divisor", "so
 
 def _beyond(name: str, terms: BudgetTerms) -> dict[str, Any]:
     """The source of the noise, or of a contribution beyond the run; its stated value is its uncertainty."""
-    kind = "A" if name in {NOISE, "run", "flicker"} else "B"
+    kind = "A" if name in {NOISE, "run", "flicker", "random_walk"} else "B"
     stability = f"[stability], {terms.stability.source}" if terms.stability else ""
     source = "the dwells of the run" if kind == "A" else stability
     return {"visible": float("nan"), "type": kind, "distribution": "normal", "scope": "unit", "input_unit": "", "divisor": 1.0,

@@ -229,6 +229,7 @@ def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
     wander = MICRO * np.sqrt(done.flicker**2 + np.maximum(done.white**2 - known**2, 0.0))
     wander = np.repeat(wander[:, None], 3, axis=1)
     time = np.sort(lot.state.time[0])
+    walk = MICRO * done.walk / np.sqrt(max(float(np.ptp(time)), 1e-9))
     widened = student(max(int(done.fit.dof.sum()), 1))
     long = of_a_day(record, wander, time, slowest=SLOWEST_DIAGNOSED, widened=widened)
     by_measurand: dict[str, Any] = {
@@ -237,5 +238,6 @@ def bias_uncertainty(done: FittedNorms) -> dict[str, Array]:
         "bias_long_u_ug": long,
         "bias_long_s": np.full_like(record, DAY_S),
         "bias_switch_on_u_ug": np.full_like(record, np.nan),
+        "bias_walk_ug_rts": np.repeat(walk[:, None], 3, axis=1),
     }
     return {name: by_measurand[name] for name in COLUMNS}

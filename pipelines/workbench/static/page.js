@@ -120,6 +120,7 @@ async function begin(place, pressed = false) {
     place.dataset.job = job.id;
     if (pressed && !place.querySelector("progress")) { go(location.href, { push: false }); return; }
     jobChanged(job);
+    if (["waiting", "running"].includes(job.state)) look(job.id);  // its end may have been told before its name was known here
   } catch (problem) {
     say(place.querySelector("[data-job-problem]"), problem.message);
   }

@@ -1,0 +1,167 @@
+"""Whether a run's own residuals contradict what its station states of the table, and what they cannot show of it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+from threadpoolctl import threadpool_limits
+from typing_extensions import TypedDict
+
+from inertial.errors import InertialError
+from inertial.uncertainty.contradiction import LEVEL
+from inertial.uncertainty.rounding import equal
+from pipelines.jobs.model_files import use_formulas_of
+from pipelines.jobs.terms import archived_terms
+from pipelines.stages.budget_rows import LABELS
+from pipelines.stages.budget_terms import BudgetTables
+from pipelines.stages.contradiction import JUDGED, LotReferences, lot_references
+from schemas.errors import DataRejected, RecipeInvalid
+from schemas.stated import TO_SI
+
+if TYPE_CHECKING:
+    from inertial.uncertainty.contradiction import Size
+    from pipelines.archive import Run
+    from schemas.uncertainty import Uncertainty
+
+READ = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")
+IMITATED = {"seat": "the misalignment of each unit", "gravity": "the scale factors"}
+"""Entries that the coefficients of the units imitate wholly, and by what."""
+
+
+class SeenReference(TypedDict):
+    """A contribution of the table; all values are standard uncertainties in one unit."""
+
+    entry: Annotated[str, "entry of [uncertainty]"]
+    unit: Annotated[str, "of the values, that of the station's file"]
+    stated: float
+    found: Annotated[float, "likeliest value by the residuals"]
+    low: Annotated[float, "of its 95 % interval"]
+    high: Annotated[float | None, "of its 95 % interval; null: not bounded by the residuals"]
+    told_from: Annotated[float | None, "value that is told with a probability of 90 %; null: none is"]
+    worse: Annotated[bool, "larger than stated: told of about one honest lot in a hundred"]
+    rivals: Annotated[list[str], "entries that explain the same residual as well"]
+
+
+class ReferencesDocument(TypedDict):
+    """What the common residual of a run's units says of the stated table."""
+
+    worse: Annotated[bool | None, "whether the table is worse than stated; null: cannot be judged, see `reason`"]
+    reason: Annotated[str | None, "why it cannot be judged"]
+    p_value: Annotated[float | None, "probability of such a residual if the table is as stated"]
+    along_p: Annotated[
+        float | None,
+        "the same along the force, where no error of the table acts: small where the model lacks an effect",
+    ]
+    seen: Annotated[list[SeenReference], "contributions that the run shows, those that are worse first"]
+    not_seen: Annotated[list[str], "entries whose errors the coefficients imitate wholly"]
+
+
+_judged: dict[tuple[str, ...], ReferencesDocument] = {}
+"""The judgement of the last run: closing text, report and certificate of one command need it once."""
+
+
+def references_of(run: Run) -> ReferencesDocument | None:
+    """The judgement of a captured run; None where its station states no error of the table, or no table turned the units."""
+    terms, tables = archived_terms(run.about), run.tables()
+    poses = (run.about.get("recipe") or {}).get("poses")
+    if terms is None or terms.stated is None or not (run.about.get("capture") and poses and {*READ} <= {*tables}):
+        return None
+    if not any(one.standard().u > 0.0 for name, one in terms.stated.entries.items() if name in JUDGED):
+        return None
+    key = (str(terms.document()), *(run.manifest(name)["sha256"] for name in READ))
+    if key not in _judged:
+        try:
+            use_formulas_of(run)
+            with threadpool_limits(1):
+                found = lot_references(
+                    BudgetTables(**{name: run.table(name) for name in READ}, lot=None, calibration=None), terms
+                )
+        except (DataRejected, RecipeInvalid, InertialError) as problem:
+            found = str(problem).rstrip(".")
+        _judged.clear()
+        _judged[key] = _document(found, terms.stated)
+    return _judged[key]
+
+
+def _document(judged: LotReferences | str, stated: Uncertainty) -> ReferencesDocument:
+    if isinstance(judged, str):
+        return {"worse": None, "reason": judged, "p_value": None, "along_p": None, "seen": [], "not_seen": []}
+    found = {one.name for one in judged.found}
+    every = [*judged.found, *(one for one in judged.looked if one.name not in found)]
+    return {
+        "worse": bool(found),
+        "reason": None,
+        "p_value": judged.p_value,
+        "along_p": judged.along_p,
+        "seen": [_seen(one, stated, told_from=_told_from(one, judged), worse=one.name in found) for one in every],
+        "not_seen": [name for name in IMITATED if name in stated.entries and not stated.entries[name].exact],
+    }
+
+
+def _told_from(one: Size, judged: LotReferences) -> float:
+    return next((own.seen_from for own in judged.looked if own.name == one.name), one.seen_from)
+
+
+def _seen(one: Size, stated: Uncertainty, *, told_from: float, worse: bool) -> SeenReference:
+    standard = stated.entries[one.name].standard()
+    own = standard.u / TO_SI[standard.unit]
+    return {
+        "entry": one.name,
+        "unit": standard.unit,
+        "stated": own,
+        "found": own * one.factor,
+        "low": own * one.low,
+        "high": _finite(own * one.high),
+        "told_from": _finite(own * told_from),
+        "worse": worse,
+        "rivals": list(one.rivals),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+UNITS = {"urad": "µrad", "arcsec": "″", "deg": "°"}
+
+
+def contradiction(judged: ReferencesDocument) -> str:
+    """What is stated and what was found, where the table is worse than stated; else empty."""
+    if not judged["worse"]:
+        return ""
+    parts = [_found(one) for one in judged["seen"] if one["worse"]]
+    text = f"the table is worse than stated (p {equal(judged['p_value'] or 0.0)}): {'; '.join(parts)}"
+    if judged["along_p"] is not None and judged["along_p"] < LEVEL:
+        text += (
+            f"; or the model lacks an effect: the units have a common residual along the force too (p {equal(judged['along_p'])})"
+            ", where no error of the table acts"
+        )
+    return text
+
+
+def _found(one: SeenReference) -> str:
+    unit, high = UNITS.get(one["unit"], one["unit"]), one["high"]
+    interval = f"above {_digits(one['low'])}" if high is None else f"{_digits(one['low'])} to {_digits(high)}"
+    names = " or ".join(LABELS[name] for name in (one["entry"], *one["rivals"]))
+    values = f"stated u {_digits(one['stated'])} {unit}, found {_digits(one['found'])} {unit} (95 %: {interval} {unit})"
+    return f"{names}: {values}"
+
+
+def _digits(value: float, count: int = 3) -> str:
+    """A value to so many digits, without an exponent up to a million."""
+    return f"{float(f'{value:.{count}g}'):g}"
+
+
+def unseen(judged: ReferencesDocument) -> str:
+    """From which size on the run would have told an error, and what it cannot show at any size."""
+    told = [f"{LABELS[one['entry']]} {_from(one)}" for one in judged["seen"]]
+    none = [f"{LABELS[name]} (as {IMITATED[name]})" for name in judged["not_seen"]]
+    text = f"told at 90 % from: {', '.join(told)}" if told else "nothing of the table is seen"
+    return f"{text}; not seen at any size: {', '.join(none)}" if none else text
+
+
+def _from(one: SeenReference) -> str:
+    unit = UNITS.get(one["unit"], one["unit"])
+    size = "no size" if one["told_from"] is None else f"u {_digits(one['told_from'], 2)} {unit}"
+    return f"{size} (stated {_digits(one['stated'])})"

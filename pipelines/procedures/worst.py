@@ -1,0 +1,76 @@
+"""The deciding axis of a figure, and the interval of the largest of several axes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inertial.distributions import normal_upper
+from inertial.uncertainty.deviation_law import DeviationLaw
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pipelines.procedures.base import FigureValue
+
+TAIL = 0.025
+REACH_95 = float(normal_upper(TAIL))
+
+
+def worst(values: Sequence[FigureValue]) -> FigureValue:
+    """The deciding axis: one that is not identified, or no number, else the largest magnitude with twice its uncertainty.
+
+    Its interval is that of the largest magnitude of all axes; see :func:`interval_of_largest`.
+    """
+    missing = [one for one in values if not one.identified]
+
+    def size(one: FigureValue) -> float:
+        bound = abs(one.value) + 2.0 * one.uncertainty
+        return bound if np.isfinite(bound) else np.inf  # max() passes over a nan that is not the first
+
+    if missing:
+        return missing[0]
+    deciding = max(values, key=size)
+    if len(values) == 1 or not np.isfinite(size(deciding)) or not deciding.uncertainty > 0.0:  # a limit has no interval
+        return deciding
+    low, high = interval_of_largest(values, -1.0 if deciding.value < 0.0 else 1.0)
+    return replace(deciding, low=low, high=high)
+
+
+def interval_of_largest(values: Sequence[FigureValue], sign: float) -> tuple[float, float]:
+    """Ends of an interval that holds the largest of n magnitudes with at least 95 %, with the sign of the deciding axis.
+
+    The largest of n estimates is chosen by its noise: the interval of that axis alone holds the largest magnitude of three equal
+    ones in 81 to 86 %. The upper end is the largest of the axes' upper ends, each of 97.5 %: that of the axis with the largest
+    true value is among them. The lower end is the largest of lower ends of 0.975^(1/n) each, so that all n hold together with
+    97.5 % (Šidák). Where it is below zero the sign is open, and the interval is the hull of the intervals of all axes.
+    """
+    ends = [_ends(one) for one in values]
+    magnitudes = [
+        (low, high) if one.value >= 0.0 else (-high, -low) for one, (low, high) in zip(values, ends, strict=True)
+    ]
+    tail = 1.0 - (1.0 - TAIL) ** (1.0 / len(values))
+    inner = max(_lower(one, low, tail) for one, (low, _) in zip(values, magnitudes, strict=True))
+    outer = max(high for _, high in magnitudes)
+    if inner >= 0.0:
+        return (inner, outer) if sign > 0.0 else (-outer, -inner)
+    hull = min(low for low, _ in ends), max(high for _, high in ends)
+    own = (inner, outer) if sign > 0.0 else (-outer, -inner)
+    return min(hull[0], own[0]), max(hull[1], own[1])
+
+
+def _ends(one: FigureValue) -> tuple[float, float]:
+    """The 95 % interval of one axis; that of a normal law where none is stated."""
+    reach = REACH_95 * one.uncertainty
+    low = one.low if not np.isnan(one.low) else one.value - reach
+    high = one.high if not np.isnan(one.high) else one.value + reach
+    return low, high
+
+
+def _lower(one: FigureValue, low: float, tail: float) -> float:
+    """Lower end of a magnitude with a smaller tail than that of its interval of 95 %."""
+    if np.isfinite(one.dof):
+        return DeviationLaw(one.value, one.dof, one.removed).quantile(tail)
+    return abs(one.value) - (abs(one.value) - low) * float(normal_upper(tail)) / REACH_95
