@@ -23,9 +23,9 @@ from scipy.stats import beta
 
 from benchmarks.budget import PRESETS, STATED
 from benchmarks.budget_lots import DRAWN, DWELL_S, RECIPES, Plan, measured, plan_of
-from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
-from pipelines.stages.contradiction import LotReferences, lot_references
 from pipelines.stages.fit import fit
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
+from pipelines.stages.uncertainty.contradiction import LotReferences, lot_references
 from schemas.simulation import ReferenceErrors
 from schemas.validity import CertificateTerms, Stability
 from stations.plant.preset import Preset, load_preset

@@ -36,9 +36,9 @@ from benchmarks.budget_lots import (  # noqa: E402
     true_coefficients,
 )
 from inertial.frames import force_from_angles  # noqa: E402
-from pipelines.stages.budget import budget  # noqa: E402
-from pipelines.stages.budget_terms import BudgetTables, BudgetTerms  # noqa: E402
 from pipelines.stages.fit import fit  # noqa: E402
+from pipelines.stages.uncertainty.budget import budget  # noqa: E402
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms  # noqa: E402
 from pipelines.stages.verify import verify  # noqa: E402
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance  # noqa: E402
 from schemas.validity import CertificateTerms, Stability  # noqa: E402

@@ -13,9 +13,9 @@ from inertial.uncertainty.contradiction import LEVEL
 from inertial.uncertainty.rounding import equal
 from pipelines.jobs.model_files import use_formulas_of
 from pipelines.jobs.terms import archived_terms
-from pipelines.stages.budget_rows import LABELS
-from pipelines.stages.budget_terms import BudgetTables
-from pipelines.stages.contradiction import JUDGED, LotReferences, lot_references
+from pipelines.stages.uncertainty.budget_terms import BudgetTables
+from pipelines.stages.uncertainty.contradiction import JUDGED, LotReferences, lot_references
+from pipelines.stages.uncertainty.tables import LABELS
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.stated import TO_SI
 

@@ -18,7 +18,7 @@ from pipelines.chain import certify as certifying
 from pipelines.chain.certify import certify
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.cli.adequacy_text import print_references
+from pipelines.cli.text.verdict_text import print_references
 from pipelines.jobs.references import contradiction, references_of, unseen
 from pipelines.report.context import ReportContext
 from pipelines.report.panels import stated_references

@@ -17,7 +17,7 @@ from pipelines.procedures.worst import worst
 from pipelines.stages.bias_stability import bias_stability
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures
-from pipelines.stages.lot_risks import lot_risks
+from pipelines.stages.uncertainty.lot_risks import lot_risks
 from schemas.decisions import decide
 from schemas.limits import Limits, limits_of
 

@@ -17,7 +17,7 @@ from pipelines.certificates.document.content import (
     ReferenceStandard,
     Result,
 )
-from pipelines.certificate_document.numbers import probability, significant
+from pipelines.certificates.document.numbers import probability, significant
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, stated_budget
 from pipelines.certificates.statement import stated

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pipelines.jobs.references import UNITS, contradiction, references_of, unseen
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
-from pipelines.stages.budget_rows import LABELS
+from pipelines.stages.uncertainty.tables import LABELS
 
 if TYPE_CHECKING:
     from pipelines.report.context import ReportContext

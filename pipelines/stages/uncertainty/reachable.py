@@ -11,11 +11,11 @@ from inertial import design
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
 from inertial.uncertainty.propagation import fit_design, norm_errors, propagated, rms_over
-from pipelines.stages.budget import with_device_temperature
-from pipelines.stages.contributions import DwellConditions, influences
-from pipelines.stages.period import ageing_u
-from pipelines.stages.period_error import AxisErrors, largest_error
-from pipelines.stages.quantities import EFFECTS
+from pipelines.stages.uncertainty.budget import with_device_temperature
+from pipelines.stages.uncertainty.contributions import DwellConditions, influences
+from pipelines.stages.uncertainty.measurands import EFFECTS
+from pipelines.stages.uncertainty.period import ageing_u
+from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR
 from schemas.units import AXES, MICRO
 

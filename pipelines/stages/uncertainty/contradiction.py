@@ -21,16 +21,16 @@ from inertial.uncertainty.contradiction import (
     without,
 )
 from inertial.uncertainty.influences import Errors, MeasurementModel, difference, sensitivity
-from pipelines.stages.budget import conditions, with_device_temperature
-from pipelines.stages.contributions import influences
 from pipelines.stages.noisy_fit import fitted_with_noise
+from pipelines.stages.uncertainty.budget import conditions, with_device_temperature
+from pipelines.stages.uncertainty.contributions import influences
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from pipelines.stages.budget_terms import BudgetTables, BudgetTerms
+    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
     from pipelines.tables.dwells import LotArrays
     from schemas.uncertainty import Uncertainty
 
