@@ -34,6 +34,9 @@ _FLICKER, _HALVINGS = 1e4, 24
 _KEPT_TIMES = 400
 """Dwells up to which kernels are kept: each has the square of their number."""
 
+_COMMON = 2.0
+"""Variance of the common residual over that of the units' noise, from which on the noise is looked for without it."""
+
 _REFUTED = 4.0
 """Deviance by which flicker must be worse than white noise to be out of the question."""
 
@@ -166,11 +169,17 @@ def fit_lot_with_wander(
     inside = np.einsum("...np,...p->...n", columns.local, theta) + columns.shared[..., : columns.station] @ station
     wide = np.sqrt(solved.variance * stretch)[..., None] * level
     known = _known(series, shares, solved)
+    own = _covariance(shared[..., there, :], solved) * (known * wide[..., None]) ** 2
+    apart = _apart(((z - inside) / level)[..., there])
+    if apart is not None:
+        alone = Series(columns.local[..., there, :], shared[..., there, :0], apart, profile[there], cut)
+        alone.sound = series.sound
+        own = own * _widening(alone, solved.gain, own / level[..., None] ** 2)
     left = _ResidualCovariance(columns.local, shared, solved, covariance, there)
     weighted = replace(
         plain,
         coefficients=theta,
-        covariance=_covariance(shared[..., there, :], solved) * (known * wide[..., None]) ** 2,
+        covariance=own,
         shared=station,
         shared_covariance=known**2 * solved.variance * solved.shared_inverse[: columns.station, : columns.station],
         residuals=np.swapaxes(z - inside, -1, -2),
@@ -190,6 +199,34 @@ def fit_lot_with_wander(
         gain=np.broadcast_to(solved.gain, (*theta.shape, int(there.sum()))),
         widened=known,
     )
+
+
+def _apart(residuals: Array) -> Array | None:
+    """The residuals (units, 3, n) without what the units have in common, where that is more than their noise makes; None elsewhere.
+
+    Errors of the station are alike in all units. Larger than the noise of quiet devices they are taken for its white part, and
+    flicker that does not average out is missed: the bias over temperature of such lots held 87 % in intervals of 95 %.
+    """
+    units = residuals.shape[0] if residuals.ndim > 2 else 1
+    if units == 1:
+        return None
+    common = residuals.mean(axis=0)
+    apart = (residuals - common) * np.sqrt(units / (units - 1))
+    return apart if units * np.mean(common**2) > _COMMON * np.mean(apart**2) else None
+
+
+def _widening(alone: Series, gain: Array, covariance: Array) -> Array:
+    """Factors (..., 3, p, p) that bring variances up to those by the noise of the units alone; one on the diagonal elsewhere.
+
+    Parameters
+    ----------
+    gain : (..., 3, p, n), of the fit; covariance : (..., 3, p, p), over the square of the level of the noise
+    """
+    shares, found = _solve(alone)
+    noise = found.variance * alone.covariance(shares)
+    instead = np.einsum("...pn,...pn->...p", gain @ noise, gain)
+    wider = np.sqrt(np.maximum(instead / np.diagonal(covariance, axis1=-2, axis2=-1), 1.0))
+    return np.asarray(wider[..., :, None] * wider[..., None, :])
 
 
 def lack_of_fit(chi2: Array, dof: int) -> Array:
