@@ -202,7 +202,7 @@ def fit_lot_with_wander(
 
 
 def _apart(residuals: Array) -> Array | None:
-    """The residuals (units, 3, n) without what the units have in common, where that is more than their noise makes; None elsewhere.
+    """The residuals (units, 3, n) without what the units have in common, where that is more than noise; None elsewhere.
 
     Errors of the station are alike in all units. Larger than the noise of quiet devices they are taken for its white part, and
     flicker that does not average out is missed: the bias over temperature of such lots held 87 % in intervals of 95 %.

@@ -32,7 +32,7 @@ def test_a_pattern_of_the_table_hides_no_flicker_of_quiet_units() -> None:
             bias = [names.index(("bias", "K0")) for names in found.fit.names]
             for axis, place in enumerate(bias):
                 error = found.fit.coefficients[:, axis, place] - found.fit.coefficients[:, axis, place].mean()
-                into += (error / np.sqrt(found.fit.covariance[:, axis, place, place] * 5.0 / 6.0)).tolist()
+                into.extend((error / np.sqrt(found.fit.covariance[:, axis, place, place] * 5.0 / 6.0)).tolist())
     assert np.mean(np.abs(alone) < 1.96) == pytest.approx(0.95, abs=0.04)
     assert np.mean(np.abs(pulls) < 1.96) > 0.9
 
