@@ -204,7 +204,7 @@ def test_a_procedure_is_drawn(name: str, run) -> None:
     own = points[(points["procedure"] == name) & (points["unit"] == "P2")]
     drawn = picture(PROCEDURES[name], {**run.about["recipe"]["procedures"][OWN.index(name)]}, own)
     assert "<svg" in drawn
-    assert len(re.findall(r"<path|<use", drawn)) > 10
+    assert len(re.findall(r"<(?:path|use|circle|rect|line|polyline|text)\b", drawn)) > 10
     assert PROCEDURES[name].title in run.report.read_text(encoding="utf-8")
 
 
