@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record
 REMADE = re.compile(r"runs/[^/]+/(report\.(json|html)|sealed\.json)|captures/[^/]+/state/.*|.*/lock|orchestrator/.*")
+_NEWEST, _WRITTEN_S = 4, 2.0
+"""Entries whose runs may be without their seal, and the time in which their writers write it."""
 SEAL = re.compile(r"runs/[^/]+/sealed\.json")
 WRITTEN_ONCE = ".parquet"  # such a file is there or not; others are compared byte for byte
 PAGE = ".html"
@@ -98,6 +101,7 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
         for name in _names(source.root, "", links)
         if name not in entries and not name.startswith(f"{CHAIN}/") and name != MARK
     ]
+    names += _late_seals(source.root, entries, set(names))
     kept = [name for name in (*names, *sorted(entries)) if not _copy(source.root, target.root, name, chain, copied)]
     _drop_old_states(source.root, target.root)
     if kept:
@@ -112,6 +116,23 @@ def copy_archive(source: Archive, target: Archive) -> Copied:
             "remove them"
         )
     return copied
+
+
+def _late_seals(root: Place, entries: set[str], names: set[str]) -> list[str]:
+    """Seals of runs that the newest entries of the chain state and which their writer had not written at the listing."""
+    late: list[str] = []
+    for name in sorted(entries)[-_NEWEST:]:
+        try:
+            seal = f"runs/{files.read_json(root / name)['run']}/sealed.json"
+        except (ArchiveUnusable, KeyError, TypeError):  # of no run, or 'tumbleline verify' reports it
+            continue
+        until = time.monotonic() + _WRITTEN_S
+        while seal not in names and time.monotonic() < until:
+            if (root / seal).is_file():
+                late.append(seal)
+                break
+            time.sleep(0.02)
+    return late
 
 
 def _chain_of(root: Place, entries: set[str]) -> _ChainAtStart:

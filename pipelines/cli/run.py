@@ -121,13 +121,12 @@ def command(
 def _next(run: Run, document: dict[str, Any], archive: str | None) -> list[str]:
     """The commands after a run: what its model lacks or its plan cannot show, and its certificates where they can be given."""
     from pipelines.cli.next_commands import archive_words, command_line
-    from pipelines.stages.grade import NO_GRADE
 
     own = [run.id, *archive_words(archive)]
     lines = [command_line("diagnose", *own)] if document["adequacy"] is not None else []
-    certain = any(
-        unit["outcome"] == "pass" and unit.get("basis") == "budget" and unit["grade"] != NO_GRADE
-        for unit in document["units"]
+    adequate = document["adequacy"] is None or document["adequacy"]["adequate"] is not False
+    certain = adequate and any(
+        unit["outcome"] == "pass" and unit.get("basis") == "budget" for unit in document["units"]
     )
     return [*lines, command_line("certify", *own)] if certain else lines
 

@@ -6,15 +6,38 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from schemas.units import AXES
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
 
+OF_UNITS = ("rms_uncertainty_{}_ug", "rms_expected_{}_ug", "rms_dof_{}")
+"""Columns that are the same in all rows of a unit, for each axis."""
 _TINY = float(np.finfo(float).tiny)
 _NODES, _RAW = np.polynomial.hermite_e.hermegauss(24)
 _WEIGHTS = _RAW / np.sqrt(2.0 * np.pi)
+
+
+def rms_columns(errors: Array, covariance: Array) -> dict[str, Array]:
+    """Columns of a verification that are the same for all dwells of a unit, (...,) each, by their names.
+
+    Uncertainty of the RMS of each axis, RMS of a correct model, and degrees of freedom of its square.
+
+    Parameters
+    ----------
+    errors : (..., 3, m); covariance : (..., 3, m, m), of a correct model, the square of the errors' unit
+    """
+    trace = np.einsum("...jj->...", covariance)
+    freedom = trace**2 / np.maximum(np.einsum("...jk,...jk->...", covariance, covariance), _TINY)
+    values = rms_uncertainty(errors, covariance), np.sqrt(trace / errors.shape[-1]), freedom
+    return {
+        name.format(letter): value[..., axis]
+        for name, value in zip(OF_UNITS, values, strict=True)
+        for axis, letter in enumerate(AXES)
+    }
 
 
 def rms_uncertainty(error: Array, covariance: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.correction import correct, station_change
-from pipelines.stages.rms_error import rms_uncertainty
+from pipelines.stages.rms_error import OF_UNITS, rms_columns
 from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-OF_UNITS = ("rms_uncertainty_{}_ug", "rms_expected_{}_ug", "rms_dof_{}")
-"""Columns that are the same in all rows of a unit, for each axis."""
 
 
 def verify(
@@ -72,20 +69,13 @@ def verify_tables(
     by_axis = MICRO * (corrected - truth)[:, unseen]
     spread = predictions if isinstance(predictions, np.ndarray) else _expected(predictions, lot.units)
     expected = np.einsum("uja,uajk,uka->ujk", toward, spread, toward)
-    of_rms = rms_uncertainty(np.swapaxes(by_axis, 1, 2), spread)
-    trace = np.einsum("uajj->ua", spread)
-    freedom = trace**2 / np.maximum(np.einsum("uajk,uajk->ua", spread, spread), np.finfo(float).tiny)
-    of_units = dict(zip(OF_UNITS, (of_rms, np.sqrt(trace / spread.shape[-1]), freedom), strict=True))
+    of_units = rms_columns(np.swapaxes(by_axis, 1, 2), spread)
     columns = {
         "norm_g": norm[:, unseen],
         "error_ug": MICRO * (norm - np.linalg.norm(lot.state.force, axis=-1))[:, unseen],
         "uncertainty_ug": np.sqrt(np.diagonal(expected, axis1=-2, axis2=-1)),
         "reading_ug": MICRO * np.sqrt(np.sum((toward * reading) ** 2, axis=-1)),
-        **{
-            name.format(letter): values[:, None, axis] + np.zeros_like(by_axis[..., axis])
-            for name, values in of_units.items()
-            for axis, letter in enumerate(AXES)
-        },
+        **{name: values[:, None] + np.zeros_like(by_axis[..., 0]) for name, values in of_units.items()},
     }
     return {
         "verification": _rows(lot, unseen, columns, by_axis),

@@ -304,3 +304,15 @@ def test_a_refused_restore_of_the_archive_leaves_the_database(
     words = ["archive", "restore", str(made / "archive"), "--archive", str(tmp_path / "other")]
     assert CliRunner().invoke(app, [*words, "--database", str(tmp_path / "old.db")]).exit_code != 0
     assert rows_of(tmp_path / "prefect.db") == 5
+
+
+def test_the_seal_of_an_entry_that_is_written_while_the_files_are_listed_is_copied(made: Path, tmp_path: Path) -> None:
+    shutil.copytree(made, tmp_path / "line")
+    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+    (seal, *_) = sorted((archive.root / "runs").glob("*/sealed.json"))
+    seal.rename(tmp_path / "sealed.json")
+    later = threading.Timer(0.3, lambda: shutil.move(tmp_path / "sealed.json", seal))
+    later.start()
+    copy_archive(archive, copy)
+    later.join()
+    assert verify(copy, keys={}).whole

@@ -12,9 +12,9 @@ from inertial import design
 from inertial.frames import angles_from_force
 from inertial.state import State
 from inertial.uncertainty.propagation import norm_errors, rms_over
+from pipelines.stages.rms_error import OF_UNITS
 from pipelines.stages.uncertainty.period import period_of
 from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
-from pipelines.stages.verify import OF_UNITS
 from pipelines.tables.frames import ByUnit
 from schemas.decisions import BOUND, LARGEST_ERROR, MEDIAN
 from schemas.units import AXES, MICRO

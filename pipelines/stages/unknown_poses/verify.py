@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from inertial.fits.wander import student
-from pipelines.stages.rms_error import rms_uncertainty
+from pipelines.stages.rms_error import rms_columns
 from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
 from pipelines.stages.verify import nothing_verified
 from schemas.units import AXES, MICRO
@@ -58,7 +58,7 @@ def _rows(one: NormDwells, gravity: float, widened: float) -> tuple[pd.DataFrame
     share = share / np.sqrt(np.mean(share**2, axis=0))
     by_axis = error[:, None] * share
     spread = share.T[:, :, None] * expected * share.T[:, None, :]
-    of_rms = rms_uncertainty(by_axis.T, spread)
+    of_unit = rms_columns(by_axis.T, spread)
     poses = [name for name, held in zip(lot.poses, unseen, strict=True) if held]
     temperature = lot.state.temperature
     u = np.sqrt(np.diagonal(expected))
@@ -71,7 +71,7 @@ def _rows(one: NormDwells, gravity: float, widened: float) -> tuple[pd.DataFrame
             "error_ug": error,
             "uncertainty_ug": u,
             "reading_ug": MICRO * one.reading[unseen],
-            **{f"rms_uncertainty_{letter}_ug": np.full(len(error), of_rms[axis]) for axis, letter in enumerate(AXES)},
+            **{name: np.full(len(error), value) for name, value in of_unit.items()},
             **{f"error_{letter}_ug": by_axis[:, axis] for axis, letter in enumerate(AXES)},
             "unit_C": np.full(len(error), np.nan) if temperature is None else temperature[0, unseen],
         }
