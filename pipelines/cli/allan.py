@@ -106,12 +106,11 @@ def _print(document: dict[str, Any]) -> None:
     span = document["samples"] / document["rate_hz"]
     out.print(
         f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, {short(span)} s",
-        markup=False,
         soft_wrap=True,
     )
     _print_terms(document) if document["statistic"] == STATISTICS[0] else _print_curves(document)
     for note in document["notes"]:
-        out.print(note, style="yellow", markup=False, soft_wrap=True)
+        out.print(note, style="yellow", soft_wrap=True)
 
 
 def _print_terms(document: dict[str, Any]) -> None:

@@ -90,24 +90,21 @@ def _document(one: CheckedFile) -> dict[str, Any]:
 def _print(one: CheckedFile) -> None:
     out = console()
     head = f"{one.path}: certificate {one.facts.number}, unit {one.facts.serial}" if one.facts else str(one.path)
-    out.print(head, style="bold", markup=False, soft_wrap=True)
+    out.print(head, style="bold", soft_wrap=True)
     for check in one.checks:
         mark = {"good": "ok", "bad": "WRONG", "not checked": "-"}[check.state]
-        out.print(
-            f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state], markup=False, soft_wrap=True
-        )
+        out.print(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state], soft_wrap=True)
     wrong = sum(check.state == "bad" for check in one.checks)
     if wrong:
-        out.print(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red", markup=False)
+        out.print(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red")
     elif one.accepted:
         by = {"signature": "a trusted signature", "archive": "the archive"}
         proven = " and ".join(by[name] for name in one.proven_by)
-        out.print(f"  accepted: nothing is wrong, proven by {proven}", style="bold green", markup=False)
+        out.print(f"  accepted: nothing is wrong, proven by {proven}", style="bold green")
     else:
         out.print(
             f"  not accepted: nothing is wrong, and nothing shows where the file comes from; {_needed(one)}",
             style="bold yellow",
-            markup=False,
             soft_wrap=True,
         )
 

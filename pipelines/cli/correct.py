@@ -242,7 +242,7 @@ def _many(rejected: int, used: int) -> bool:
 
 def _print(document: dict[str, Any], out: Console) -> None:
     def line(text: str, style: str = "") -> None:
-        out.print(text, style=style or None, markup=False, soft_wrap=True)
+        out.print(text, style=style or None, soft_wrap=True)
 
     def axes(values: dict[str, float]) -> str:
         return ", ".join(f"{axis} {short(value)}" for axis, value in values.items())

@@ -100,7 +100,7 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
         soft_wrap=True,
     )
     out.print("Begin with", soft_wrap=True)
-    out.print(f"  {_command('diagnose', folder, hidden.model)}", markup=False, soft_wrap=True)
+    out.print(f"  {_command('diagnose', folder, hidden.model)}", soft_wrap=True)
 
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
@@ -204,25 +204,24 @@ class _Game:
         out.print(
             f"{self.hidden.truth} ({self.hidden.kind}): {self.hidden.effect}",
             style="bold",
-            markup=False,
             soft_wrap=True,
         )
         named = ", ".join(" or ".join(group) for group in document["classes"]) or "nothing"
         if document["told_apart"]:
-            out.print(f"The diagnosis named {named}. Found.", style="bold green", markup=False, soft_wrap=True)
+            out.print(f"The diagnosis named {named}. Found.", style="bold green", soft_wrap=True)
         elif document["found"]:
             self._one_of_a_class(document, named)
         elif self.hidden.effect in document["unseen"]:
             text = f"The diagnosis named {named}, and listed {self.hidden.effect} as not visible under this plan."
-            out.print(text, style="bold yellow", markup=False, soft_wrap=True)
+            out.print(text, style="bold yellow", soft_wrap=True)
         else:
-            out.print(f"The diagnosis named {named}. Not found.", style="bold red", markup=False, soft_wrap=True)
+            out.print(f"The diagnosis named {named}. Not found.", style="bold red", soft_wrap=True)
         lines = [
             [when, *(short(document[key][f]) for f in ("rms_ug", "fresh_rms_ug"))]
             for when, key in (("before", "before"), ("extended", "after"))
         ]
         print_table(["model", "residual, µg", "fresh run, µg"], lines)
-        out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.", markup=False, soft_wrap=True)
+        out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.", soft_wrap=True)
 
     def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
         """The result if the hidden effect is in a class with others, and the measurement that separates them."""
@@ -238,19 +237,18 @@ class _Game:
             else "nothing of its class was added"
         )
         text = f"The diagnosis named {named}. Found in a class, not separated: {what}; these data fit equally well with {others}."
-        out.print(text, style="bold yellow", markup=False, soft_wrap=True)
+        out.print(text, style="bold yellow", soft_wrap=True)
         rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]
         if not rows:
             out.print(
                 "No measurement that the station can take is certain to separate them.",
-                markup=False,
                 soft_wrap=True,
             )
         elif "minutes" in rows[0]:
-            out.print("The measurement that separates them:", markup=False, soft_wrap=True)
+            out.print("The measurement that separates them:", soft_wrap=True)
             measurements_table(rows, out)
         else:
-            out.print(rows[0]["why"], markup=False, soft_wrap=True)
+            out.print(rows[0]["why"], soft_wrap=True)
 
     def _step(self, title: str, line: str) -> None:
         if self.asks:
@@ -258,7 +256,7 @@ class _Game:
         if not self.quiet:
             console().print(f"\n{title}", style="bold cyan")
             if line:
-                console().print(f"  {line}", style="dim", markup=False, soft_wrap=True)
+                console().print(f"  {line}", style="dim", soft_wrap=True)
 
     def _say(self, text: str) -> None:
         if not self.quiet:

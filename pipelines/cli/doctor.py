@@ -64,11 +64,11 @@ def _show(document: DoctorDocument) -> None:
     print_table(["part", "check", "state", "found"], lines, whole=3)
     out = console()
     if document["samples"]:
-        out.print(f"sample recipes and stations: {document['samples']}", markup=False, soft_wrap=True)
+        out.print(f"sample recipes and stations: {document['samples']}", soft_wrap=True)
     for state in ("not configured", "warning", "fault"):
         for c in (c for c in checks if c["state"] == state):
             needed = f", needed: {c['needed']}" if c["needed"] else ""
             remedy = f"; {c['remedy']}" if c["remedy"] else ""
             text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}{remedy}"
-            out.print(text, style=COLOURS[state], markup=False, soft_wrap=True)
-    out.print(f"{document['faults']} faults, {document['warnings']} warnings", markup=False)
+            out.print(text, style=COLOURS[state], soft_wrap=True)
+    out.print(f"{document['faults']} faults, {document['warnings']} warnings")

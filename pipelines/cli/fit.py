@@ -70,9 +70,7 @@ def command(
     runner = Runner(job, store)
     try:
         for done in runner.all():
-            error_console().print(
-                f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}", markup=False
-            )
+            error_console().print(f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}")
     except Exception:
         runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
         raise

@@ -263,12 +263,12 @@ def import_and_print(
         print_json(dict(imported))
     else:
         out = console()
-        out.print(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}", markup=False)
+        out.print(f"{imported['unit']}: {imported['records']} recordings, kept as run {imported['run']}")
         rows = [
             [one["figure"], one["axis"], short(one["value"]), short(one["uncertainty"]), one["unit"], one["note"]]
             for one in imported["figures"]
         ]
         print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
         for line in imported["text"]:
-            out.print(f"  {line}", markup=False, soft_wrap=True)
+            out.print(f"  {line}", soft_wrap=True)
     return DONE if all(one["identified"] for one in imported["figures"]) else PART_FAILED

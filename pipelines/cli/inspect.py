@@ -104,9 +104,9 @@ def _print(one: InspectDocument) -> None:
     names = " + ".join(Path(name).name for name in one["files"])
     rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
     long = "" if one["duration_s"] is None else f", {one['duration_s']:.5g} s"
-    out.print(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}", markup=False, soft_wrap=True)
+    out.print(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}", soft_wrap=True)
     for remark in one["remarks"]:
-        out.print(f"  {remark}", markup=False, soft_wrap=True)
+        out.print(f"  {remark}", soft_wrap=True)
     _print_columns(one)
     if one["output_unit"]:
         out.print(f"  output in {one['output_unit']}: {one['output_reason']}", soft_wrap=True)

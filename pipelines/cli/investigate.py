@@ -140,7 +140,7 @@ def _question(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
 
     out = error_console()
     for sentence in follow_up.why:
-        out.print(f"\n{sentence}.", markup=False, soft_wrap=True)
+        out.print(f"\n{sentence}.", soft_wrap=True)
     measurements_table(list(follow_up.rows), out)
     left = inquiry.budget - inquiry.spent
     text = f"Measure this follow-up ({follow_up.minutes:.1f} min; {left:.1f} of {inquiry.budget:.1f} min budget left)?"
@@ -179,7 +179,7 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
 
     runs = len(joint.lineage.runs)
     text = f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}"
-    error_console().print(text, markup=False, soft_wrap=True)
+    error_console().print(text, soft_wrap=True)
 
 
 def _continue_command() -> str:
@@ -219,7 +219,7 @@ def _rounds(document: dict[str, Any]) -> None:
         f"Station time: {first} min first run ({document['run']}), {further} min follow-ups "
         f"({100.0 * minutes['share']:.0f} %), {short(minutes['budget'])} min budget."
     )
-    console().print(text, markup=False, soft_wrap=True)
+    console().print(text, soft_wrap=True)
     if document["rounds"]:
         lines = [[r["run"], short(r["minutes"]), "\n".join(r["why"])] for r in document["rounds"]]
         print_table(["run", "station time, min", "reason"], lines, title="Follow-ups")

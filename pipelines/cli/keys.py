@@ -48,7 +48,7 @@ def command(
         return
     _print(document["rows"])
     if not subject:
-        console().print("tumbleline keys SUBJECT shows a list", markup=False)
+        console().print("tumbleline keys SUBJECT shows a list")
 
 
 def _print(rows: list[dict[str, str]]) -> None:

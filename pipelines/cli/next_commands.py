@@ -132,7 +132,7 @@ def print_next(out: Console, lines: Sequence[str]) -> None:
     if lines:
         out.print("\nNext:", style="bold")
         for line in lines:
-            out.print(f"  {line}", markup=False, soft_wrap=True)
+            out.print(f"  {line}", soft_wrap=True)
 
 
 def print_extension(out: Console, document: dict[str, Any], find: FindData, model: Path | None) -> None:
@@ -149,11 +149,11 @@ def print_extension(out: Console, document: dict[str, Any], find: FindData, mode
     file = model or free_name()
     new = not (model and model.exists())
     if data.refusal is not None and (why := data.refusal([*document["effects"], *document["recommended"]])):
-        out.print(why, style="yellow", markup=False, soft_wrap=True)
+        out.print(why, style="yellow", soft_wrap=True)
     print_next(out, extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
         its_own = " and its temperatures with --fresh-history" if data.history else ""
-        out.print(MEASURE_AGAIN.format(history=its_own), style="dim", markup=False, soft_wrap=True)
+        out.print(MEASURE_AGAIN.format(history=its_own), style="dim", soft_wrap=True)
 
 
 def free_name() -> str:

@@ -49,11 +49,11 @@ def command(
     if as_json:
         print_json({"waiting": [vars(one) for one in matches], "answered": "go" if go else "stop" if stop else None})
     elif go or stop:
-        console().print(f"{matches[0].name}: {'continues' if go else 'stops'}", markup=False)
+        console().print(f"{matches[0].name}: {'continues' if go else 'stops'}")
     elif matches:
         print_table(["run", "asks"], [[one.name, one.question] for one in matches])
     else:
-        console().print("no run waits for the operator", markup=False)
+        console().print("no run waits for the operator")
 
 
 def _answer(*, go: bool) -> Answer:

@@ -120,7 +120,7 @@ def command(
     )
     for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
         error_console().print(
-            f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow", markup=False, soft_wrap=True
+            f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow", soft_wrap=True
         )
     limits = _limits(planned_recipe, folder_of(recipe))
     if not planned_recipe.tumbles and page is None and pictures is None:

@@ -139,7 +139,6 @@ def _print(document: dict[str, Any]) -> None:
     out.print(
         f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, segments of "
         f"{document['segment']} samples, resolution {short(document['rate_hz'] / document['segment'])} Hz",
-        markup=False,
         soft_wrap=True,
     )
     unit = document["unit"] or "unit"

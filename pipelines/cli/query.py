@@ -62,9 +62,7 @@ def command(
         return
     print_table(list(answer.columns), [[_cell(value) for value in row] for row in answer.rows[:MANY]])
     if len(answer.rows) > MANY:
-        console().print(
-            f"{number_of(len(answer.rows) - MANY, 'more row')}; print all rows with --json or --csv", markup=False
-        )
+        console().print(f"{number_of(len(answer.rows) - MANY, 'more row')}; print all rows with --json or --csv")
 
 
 def _cell(value: object) -> str:

@@ -59,10 +59,9 @@ def command(
     out = console()
     out.print(
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
-        markup=False,
     )
-    out.print(f"  {', '.join(record.effects)}", markup=False, soft_wrap=True)
-    out.print(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}", markup=False)
+    out.print(f"  {', '.join(record.effects)}", soft_wrap=True)
+    out.print(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}")
 
 
 def _released(
@@ -101,7 +100,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
         print_json({"archive": str(store.root), "releases": rows})
         return
     if not records:
-        console().print(f"no model is released in {store.root}; release one with 'tumbleline release'", markup=False)
+        console().print(f"no model is released in {store.root}; release one with 'tumbleline release'")
         return
     lines = [
         [
@@ -116,9 +115,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
     ]
     print_table(["no.", "model", "for", "from", "in use", "by"], lines, whole=4)
     for one in records:
-        console().print(
-            f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}", markup=False, soft_wrap=True
-        )
+        console().print(f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}", soft_wrap=True)
 
 
 def _name(record: Release) -> str:

@@ -102,7 +102,7 @@ def command(
         for request, job in zip(requests, jobs, strict=True)
     ]
     for line in (line for run in runs for line in library_remarks(run)):
-        error_console().print(f"run: {line}", markup=False, soft_wrap=True)
+        error_console().print(f"run: {line}", soft_wrap=True)
     documents = [judged(summary(run), run) for run in runs]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
@@ -188,7 +188,7 @@ def shown() -> Generator[tuple[Progress, Callable[[Done], None], Callable[[], Ab
 
         def report_stage(done: Done) -> None:
             how = "reused" if done.reused else f"{done.seconds:.1f} s"
-            bars.console.print(f"{done.stage:<10} {how}", markup=False)
+            bars.console.print(f"{done.stage:<10} {how}")
             at = stages.index(done.stage) + 1 if done.stage in DOES else 0
             note = DOES[stages[at]] if at < len(stages) else "finishing"
             bars.update(bar, description=note, completed=at, total=len(stages))

@@ -20,7 +20,7 @@ def run_until_stopped(server: uvicorn.Server, place: socket.socket, command: str
     try:
         server.run(sockets=[place])
     except KeyboardInterrupt:  # the server has ended by it, and raises it again
-        error_console().print(f"{command}: ended", markup=False)
+        error_console().print(f"{command}: ended")
     finally:
         logging.getLogger("uvicorn.error").removeFilter(_not_cancelled)
 

@@ -94,8 +94,8 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     if document["units"]:
         print_summary(document)
     else:
-        console().print(_unfinished(run), markup=False, soft_wrap=True)
-    console().print(f"tables  {', '.join(tables)}", markup=False)
+        console().print(_unfinished(run), soft_wrap=True)
+    console().print(f"tables  {', '.join(tables)}")
 
 
 def _unfinished(run: Run) -> str:
@@ -115,7 +115,7 @@ def _show_table(run: Run, name: str, *, as_json: bool) -> None:
     lines = [[_cell(value) for value in row] for row in shown.itertuples(index=False)]
     print_table([str(column) for column in frame.columns], lines, title=f"{run.id}: {name}")
     if len(frame) > MANY:
-        console().print(f"{number_of(len(frame) - MANY, 'more row')}; print all rows with --json", markup=False)
+        console().print(f"{number_of(len(frame) - MANY, 'more row')}; print all rows with --json")
 
 
 def _cell(value: object) -> str:

@@ -109,7 +109,7 @@ def serve(
             print_table(
                 ["device", "id", "profile"], lines, title=f"{config.name} on {at}:{port_found}, speed {speed:g}"
             )
-            console().print("stop with Ctrl-C", markup=False)
+            console().print("stop with Ctrl-C")
 
     run(
         config,

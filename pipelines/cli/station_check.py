@@ -48,7 +48,7 @@ def check(
     else:
         _print(readings, findings, registers=registers)
         for message in failed:
-            error_console().print(message, markup=False)
+            error_console().print(message)
     raise typer.Exit(STATION if failed else 0)
 
 

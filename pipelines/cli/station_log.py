@@ -46,7 +46,7 @@ def log(
         print_json({"events": events})
         return
     if not events:
-        console().print("no events", markup=False)
+        console().print("no events")
         return
     for event in events:
         _print(event)

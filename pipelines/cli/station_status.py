@@ -48,7 +48,7 @@ def status(
             console().print(picture(now))
     if not as_json:
         for fault in now.faults.values():
-            error_console().print(fault, markup=False)
+            error_console().print(fault)
     raise typer.Exit(STATION if now.faults else 0)
 
 

@@ -31,19 +31,17 @@ class Terminal:
         with self._quiet():
             out = error_console()
             out.print(f"\n{TITLES[prompt.kind]}  ", style="bold", end="")
-            out.print(f"{prompt.text}.", markup=False, soft_wrap=True)
+            out.print(f"{prompt.text}.", soft_wrap=True)
             for slot, serial in prompt.slots:
-                out.print(f"  slot {slot:>2}  {serial}", markup=False)
+                out.print(f"  slot {slot:>2}  {serial}")
             return "stop" if _line("Enter when done, 'stop' to stop the run: ").lower() in STOP else "go"
 
 
 def scanned(slots: int) -> Seating:
     """The seating, scanned at the terminal slot by slot."""
     out = error_console()
-    out.print(f"Scan the units, slot by slot (0 to {slots - 1}); Enter alone leaves a slot empty.", markup=False)
-    seating = scan(
-        slots, lambda slot: _line(f"slot {slot:>2}: "), lambda message: out.print(message, style="yellow", markup=False)
-    )
+    out.print(f"Scan the units, slot by slot (0 to {slots - 1}); Enter alone leaves a slot empty.")
+    seating = scan(slots, lambda slot: _line(f"slot {slot:>2}: "), lambda message: out.print(message, style="yellow"))
     if not seating.units:
         raise WrongUse("scan: no unit was scanned, at least one is needed; give the command again")
     return seating
@@ -70,7 +68,7 @@ def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED)
         if answer in STOP:
             return False
         message = f"'{answer}' is neither yes nor no: {choices}"
-        error_console().print(message, style="yellow", markup=False, soft_wrap=True)
+        error_console().print(message, style="yellow", soft_wrap=True)
 
 
 def attended() -> bool:
@@ -80,7 +78,7 @@ def attended() -> bool:
 
 def _line(question: str, unattended: str = UNATTENDED) -> str:
     """A line of standard input; its end is an error."""
-    error_console().print(question, end="", markup=False, soft_wrap=True)
+    error_console().print(question, end="", soft_wrap=True)
     line = sys.stdin.readline()
     if not line:
         raise WrongUse(unattended)

@@ -61,17 +61,17 @@ def _made(archive: Archive, valid: Calibration) -> dict[str, Any]:
 def _print(serial: str, day: str, valid: Calibration | None, history: list[Calibration], made: dict[str, Any]) -> None:
     out = console()
     if valid is None:
-        out.print(f"{serial}: no calibration is valid on {day}", style="bold red", markup=False)
+        out.print(f"{serial}: no calibration is valid on {day}", style="bold red")
     else:
         event = valid.event
-        out.print(f"{serial}: certificate {valid.certificate} is valid on {day}", style="bold green", markup=False)
-        out.print(f"  valid    {valid.start} until {valid.until}, grade {event.grade}", markup=False)
-        out.print(f"  from     run {valid.run}, recipe {event.recipe}, station {event.station}", markup=False)
-        out.print(f"  by       {event.who} on {event.where}, {event.when}", markup=False)
-        out.print(f"  tables   coefficients {event.coefficients[:16]}…", markup=False)
+        out.print(f"{serial}: certificate {valid.certificate} is valid on {day}", style="bold green")
+        out.print(f"  valid    {valid.start} until {valid.until}, grade {event.grade}")
+        out.print(f"  from     run {valid.run}, recipe {event.recipe}, station {event.station}")
+        out.print(f"  by       {event.who} on {event.where}, {event.when}")
+        out.print(f"  tables   coefficients {event.coefficients[:16]}…")
         if made.get("made"):
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
-            out.print(f"  code     {made['made']['code'][:16]}… with {libraries}", markup=False, soft_wrap=True)
+            out.print(f"  code     {made['made']['code'][:16]}… with {libraries}", soft_wrap=True)
     lines = [[one.certificate, one.start, one.until, one.state, one.run, _why(one)] for one in history]
     print_table(["certificate", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []

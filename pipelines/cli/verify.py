@@ -109,23 +109,22 @@ def command(
 def _print(report: Report) -> None:
     out, checked = console(), report.checked
     for finding in checked.findings:
-        out.print(f"{finding.kind:<11} {finding.path} {finding.message}", markup=False, soft_wrap=True)
+        out.print(f"{finding.kind:<11} {finding.path} {finding.message}", soft_wrap=True)
         for line in finding.consequences[:SHOWN]:
-            out.print(f"            {line}", markup=False, style="dim", soft_wrap=True)
+            out.print(f"            {line}", style="dim", soft_wrap=True)
         if len(finding.consequences) > SHOWN:
             left = len(finding.consequences) - SHOWN
-            out.print(f"            and {left} more; --json lists all", markup=False, style="dim")
+            out.print(f"            and {left} more; --json lists all", style="dim")
     for remark in checked.remarks:
-        out.print(f"  {remark}", markup=False, style="dim", soft_wrap=True)
+        out.print(f"  {remark}", style="dim", soft_wrap=True)
     rate = f"{checked.bytes / report.seconds / 1e6:.3g} MB/s"
     out.print(
         f"{number_of(report.runs, 'run')}, {number_of(report.captures, 'capture')}: {number_of(checked.tables, 'table')}, "
         f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})",
-        markup=False,
         soft_wrap=True,
     )
-    out.print(f"signatures  {report.trust}", markup=False, soft_wrap=True)
+    out.print(f"signatures  {report.trust}", soft_wrap=True)
     if report.head:
-        out.print(f"chain       ends with {report.head}", markup=False, soft_wrap=True)
+        out.print(f"chain       ends with {report.head}", soft_wrap=True)
     verdict = number_of(len(checked.findings), "finding") if checked.findings else "nothing is wrong"
     out.print(verdict, style="bold green" if report.whole else "bold red")

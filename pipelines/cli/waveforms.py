@@ -62,7 +62,7 @@ def command(
         return
     place = output or Path(f"{stored.id[:12]}-record{record}{WRITERS[form].SUFFIX}")
     for path in write_waveforms(form, channels, place):
-        console().print(f"{path}: {', '.join(one.name for one in channels)}", markup=False)
+        console().print(f"{path}: {', '.join(one.name for one in channels)}")
 
 
 def _one_text(form: str, channels: list[Channel]) -> str:

@@ -53,7 +53,7 @@ def print_findings(document: dict[str, Any]) -> None:
     _classes(document)
     _dwells(document)
     for text in document.get("warnings", ()):
-        console().print(f"warning: {text}", style="yellow", markup=False, soft_wrap=True)
+        console().print(f"warning: {text}", style="yellow", soft_wrap=True)
 
 
 def _dwells(document: dict[str, Any]) -> None:
@@ -68,7 +68,6 @@ def _dwells(document: dict[str, Any]) -> None:
         out.print(
             f"without {'these dwells' if len(single['dwells']) > 1 else 'this dwell'} the model is: {verdict_without}; "
             f"to leave out: --leave-out {names}",
-            markup=False,
             soft_wrap=True,
         )
     if removed and removed["heavy_tails"]:
@@ -78,7 +77,6 @@ def _dwells(document: dict[str, Any]) -> None:
             f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
             f"{' …' if len(tails) > 5 else ''}; the tails of the noise of this run may reach as far",
             style="dim",
-            markup=False,
             soft_wrap=True,
         )
     if document["adequate"]:
@@ -91,13 +89,13 @@ def _dwells(document: dict[str, Any]) -> None:
             without = group["without_influence"]
             if without:
                 text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
-            out.print(text, style="dim", markup=False, soft_wrap=True)
+            out.print(text, style="dim", soft_wrap=True)
     if not document["classes"] and document["influence"]:
         text = f"largest residuals, share of all: {_carried(document['influence'])}"
         without = document.get("without_influence")
         if without:
             text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
-        out.print(text, style="dim", markup=False, soft_wrap=True)
+        out.print(text, style="dim", soft_wrap=True)
 
 
 def _carried(rows: list[dict[str, Any]]) -> str:
@@ -160,7 +158,7 @@ def _classes(document: dict[str, Any]) -> None:
     title = "Missing effects; these data cannot separate the effects of one row"
     print_table(columns, lines, title=title)
     if any(not group["plausible"] for group in document["classes"]):
-        console().print("(!) larger than the usual size of this effect: check other causes, too", markup=False)
+        console().print("(!) larger than the usual size of this effect: check other causes, too")
     legend = (
         "residual: with the effect added · cross-validated: on dwells not fitted, the worst of poses, soaks, stretches of "
         "time"
@@ -169,9 +167,9 @@ def _classes(document: dict[str, Any]) -> None:
         legend += " · –: no dwells left out can judge it"
     if any(group.get("nonlinear_interval") for group in document["classes"]):
         legend += " · in brackets: 68 % interval"
-    console().print(legend, style="dim", markup=False)
+    console().print(legend, style="dim")
     for line in why_not_recommended(document):
-        console().print(line, markup=False, soft_wrap=True)
+        console().print(line, soft_wrap=True)
 
 
 def why_not_recommended(document: dict[str, Any]) -> list[str]:
@@ -230,12 +228,11 @@ def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, 
     out.print(
         f"\nSignificant, but of unknown cause: {unexplained['text']} as a {unexplained['shape']} "
         f"(p {equal(unexplained['p_value'])}).",
-        markup=False,
         soft_wrap=True,
     )
     if document["offer"]:
-        out.print(f"Formula for {model or 'a model file'}, to be refined:\n", markup=False, soft_wrap=True)
-        out.print(document["offer"]["toml"], markup=False, soft_wrap=True)
+        out.print(f"Formula for {model or 'a model file'}, to be refined:\n", soft_wrap=True)
+        out.print(document["offer"]["toml"], soft_wrap=True)
         if data is not None:
             print_next(out, [_with_formula(document, data())])
 

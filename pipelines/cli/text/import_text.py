@@ -23,9 +23,9 @@ def print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
     """Imported transfer functions for people."""
     out = console()
     for one in imports:
-        out.print(f"{one['unit']}: {one['points']} points, kept as run {one['run']}", markup=False)
+        out.print(f"{one['unit']}: {one['points']} points, kept as run {one['run']}")
         for line in one["text"]:
-            out.print(f"  {line}", markup=False, soft_wrap=True)
+            out.print(f"  {line}", soft_wrap=True)
         verdict, style = VERDICTS_OF_TRANSFER[one["adequate"]]
         out.print(f"  {verdict}", style=style)
 
@@ -35,9 +35,9 @@ def print_import(one: dict[str, Any], archive: str | None, *, list_dwells: bool)
     out = console()
     dwells = number_of(one["dwells"], "dwell")
     rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
-    out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}", markup=False)
+    out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}")
     for remark in [*one["remarks"], *one["lines"]]:
-        out.print(f"  {remark}", markup=False, soft_wrap=True)
+        out.print(f"  {remark}", soft_wrap=True)
     if list_dwells:
         _print_dwells(one["dwell_list"], one["out_unit"])
     if one["fit"]:

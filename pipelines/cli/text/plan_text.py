@@ -184,15 +184,15 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], [_line(row) for row in worst.values()])
     for row in worst.values():
         rulers = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["shares"].items() if share >= LEAST)
-        out.print(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}", markup=False, soft_wrap=True)
+        out.print(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}", soft_wrap=True)
     period = f"period of validity {reach['validity_months']} months, frame {reach['frame']}"
-    out.print(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim", markup=False)
+    out.print(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim")
     if reach["grade_source"] == "assumed":
-        out.print("references: assumed values, which allow no certificate", markup=False)
+        out.print("references: assumed values, which allow no certificate")
     for name, rules in reach["not_stated"].items():
-        out.print(f"not stated: {name} (dominates {rules})", markup=False)
+        out.print(f"not stated: {name} (dominates {rules})")
     for line in (*reach["remarks"], *(f"cannot be met: {one}" for one in reach["unreachable"])):
-        out.print(line, markup=False, soft_wrap=True)
+        out.print(line, soft_wrap=True)
 
 
 def _line(row: dict[str, Any]) -> list[str]:

@@ -83,7 +83,7 @@ def print_adequacy(verdict: AdequacyDocument | None) -> None:
         return
     faulty = f"; left out because of a data fault: {', '.join(verdict['faulty'])}" if verdict["faulty"] else ""
     text = f"model   {plain_verdict(verdict)}{faulty}"
-    console().print(text, style=STYLE_OF[verdict["adequate"]], markup=False, soft_wrap=True)
+    console().print(text, style=STYLE_OF[verdict["adequate"]], soft_wrap=True)
 
 
 def print_references(judged: ReferencesDocument | None) -> None:
@@ -97,6 +97,4 @@ def print_references(judged: ReferencesDocument | None) -> None:
     else:
         told = f"CONTRADICTED: {contradiction(judged)}" if judged["worse"] else "not contradicted by the residuals"
         text = f"{told}; {unseen(judged)}"
-    console().print(
-        f"stated references   {text}", style="bold red" if judged["worse"] else "", markup=False, soft_wrap=True
-    )
+    console().print(f"stated references   {text}", style="bold red" if judged["worse"] else "", soft_wrap=True)
