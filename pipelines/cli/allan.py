@@ -106,7 +106,6 @@ def _print(document: dict[str, Any]) -> None:
     span = document["samples"] / document["rate_hz"]
     out.print(
         f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, {short(span)} s",
-        soft_wrap=True,
     )
     _print_terms(document) if document["statistic"] == STATISTICS[0] else _print_curves(document)
     for note in document["notes"]:

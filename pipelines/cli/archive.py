@@ -68,11 +68,11 @@ def clean(
         return
     out = console()
     for place in done.removed:
-        out.print(f"{'found' if only_look else 'removed'}  {place}", soft_wrap=True)
+        out.print(f"{'found' if only_look else 'removed'}  {place}")
     for place in dict.fromkeys(done.busy):
-        out.print(f"in use   {place}", soft_wrap=True)
+        out.print(f"in use   {place}")
     for run in done.sealed:
-        out.print(f"sealed   {run}", soft_wrap=True)
+        out.print(f"sealed   {run}")
     word = "found" if only_look else "removed"
     out.print(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({size_text(done.bytes)})")
     if done.anchored:
@@ -118,10 +118,10 @@ def key(
         return
     out = console()
     out.print(f"key      {signatures.name_of(made)}")
-    out.print(f"public   {hexadecimal}", soft_wrap=True)
-    out.print(f"private  {place}", soft_wrap=True)
+    out.print(f"public   {hexadecimal}")
+    out.print(f"private  {place}")
     if output is not None and not public:
-        out.print(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}", soft_wrap=True)
+        out.print(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}")
 
 
 @app.command()
@@ -158,7 +158,7 @@ def backup(
     counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"
     out.print(counted, soft_wrap=True)
     if made is not None:
-        out.print(f"database  {made}", soft_wrap=True)
+        out.print(f"database  {made}")
 
 
 @app.command()
@@ -195,13 +195,13 @@ def compact(
         return
     out = console()
     for name in done.packs:
-        out.print(f"written  packed/{name}", soft_wrap=True)
+        out.print(f"written  packed/{name}")
     for name in done.kept:
-        out.print(f"kept     {name}: changed, or in use; the next compaction packs it", soft_wrap=True)
+        out.print(f"kept     {name}: changed, or in use; the next compaction packs it")
     for name in done.unfinished:
-        out.print(f"open     {name}: not finished, left as it is", soft_wrap=True)
+        out.print(f"open     {name}: not finished, left as it is")
     packed = f"{number_of(done.packed, 'file')} packed ({size_text(done.bytes)})"
-    out.print(f"{packed}, {number_of(done.freed, 'single file')} removed", soft_wrap=True)
+    out.print(f"{packed}, {number_of(done.freed, 'single file')} removed")
 
 
 @app.command()
@@ -239,7 +239,7 @@ def restore(
     else:
         out = console()
         counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)})"
-        out.print(f"{counted}, {done.present} already there", soft_wrap=True)
+        out.print(f"{counted}, {done.present} already there")
         state = "nothing is wrong" if report.whole else "run 'tumbleline verify' for the findings"
         out.print(f"verified: {number_of(report.runs, 'run')}, {state}")
     raise typer.Exit(DONE if report.whole else PART_FAILED)

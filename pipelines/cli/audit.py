@@ -115,19 +115,19 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], page: Path | None)
         f"all until {date_of(audited.scope.until - 1)}"
     )  # fmt: skip
     counted = ", ".join(number_of(number[f"{noun}s"], noun) for noun in ("calibration", "unit", "run", "station"))
-    out.print(f"{counted}; {period}", soft_wrap=True)
+    out.print(f"{counted}; {period}")
     _show_yield(audited)
     out.print(_certificates(audited), soft_wrap=True)
     for who, words in WHO.items():
         own = [finding for finding in audit_findings if finding.who == who]
         if own:
-            out.print(f"\n{words}", style="bold", soft_wrap=True)
+            out.print(f"\n{words}", style="bold")
         for kind in dict.fromkeys(finding.kind for finding in own):
             _show_kind([finding for finding in own if finding.kind == kind])
     if not audit_findings:
         out.print("no action is needed")
     if page is not None:
-        error_console().print(f"page    {page}", soft_wrap=True)
+        error_console().print(f"page    {page}")
 
 
 _BEGINNING = -700000.0  # days before any calibration
@@ -143,7 +143,7 @@ def _certificates(audited: Audit) -> str:
 
 def _show_kind(own: list[AuditFinding]) -> None:
     for finding in own[:SHOWN]:
-        console().print(f"  · {finding.message}", soft_wrap=True)
+        console().print(f"  · {finding.message}")
     if len(own) > SHOWN:
         console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page list all", style="dim")
 
@@ -152,4 +152,4 @@ def _show_yield(audited: Audit) -> None:
     shares: list[Any] = [share for share in audited.yields if share.of in {"all", "station"}]
     parts = [f"{share.name} {short(100.0 * share.interval.value)} %" for share in shares if share.total]
     if parts:
-        console().print(f"yield   {', '.join(parts)}", soft_wrap=True)
+        console().print(f"yield   {', '.join(parts)}")

@@ -68,9 +68,9 @@ def command(
         print_json(_document(done))
     else:
         for one in done.written:
-            console().print(f"certificate {one.number}: {one.pdf}, {one.xml}", soft_wrap=True)
+            console().print(f"certificate {one.number}: {one.pdf}, {one.xml}")
     for serial, why in done.left_out.items():
-        error_console().print(f"certificate: {serial}: {why}", soft_wrap=True)
+        error_console().print(f"certificate: {serial}: {why}")
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
 

@@ -93,7 +93,7 @@ def _print(one: CheckedFile) -> None:
     out.print(head, style="bold", soft_wrap=True)
     for check in one.checks:
         mark = {"good": "ok", "bad": "WRONG", "not checked": "-"}[check.state]
-        out.print(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state], soft_wrap=True)
+        out.print(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state])
     wrong = sum(check.state == "bad" for check in one.checks)
     if wrong:
         out.print(f"  not accepted: {wrong} of {len(one.checks)} checks failed", style="bold red")
@@ -105,7 +105,6 @@ def _print(one: CheckedFile) -> None:
         out.print(
             f"  not accepted: nothing is wrong, and nothing shows where the file comes from; {_needed(one)}",
             style="bold yellow",
-            soft_wrap=True,
         )
 
 

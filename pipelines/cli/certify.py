@@ -89,7 +89,7 @@ def command(
 
             make_imported_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
-        error_console().print(f"certify: the report was not made again: {problem}", soft_wrap=True)
+        error_console().print(f"certify: the report was not made again: {problem}")
     if as_json:
         print_json(_document(source.id, done))
     else:
@@ -109,7 +109,7 @@ def _print_run(run: Run) -> None:
         *library_remarks(run),
     ]
     for line in lines:
-        error_console().print(f"certify: {line}", soft_wrap=True)
+        error_console().print(f"certify: {line}")
 
 
 def _document(run: str, done: Certified) -> dict[str, Any]:
@@ -141,10 +141,9 @@ def _print(run: str, done: Certified) -> None:
         console().print(
             f"The documents: tumbleline certificate {run} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
             style="dim",
-            soft_wrap=True,
         )
     for serial, why in done.left_out.items():
-        console().print(f"  {serial} not certified: {why}", soft_wrap=True)
+        console().print(f"  {serial} not certified: {why}")
 
 
 def _ended(sequences: tuple[int, ...]) -> str:

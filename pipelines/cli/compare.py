@@ -88,7 +88,7 @@ def compared(
 def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
     """Print a comparison for people, with so many of the worst poses."""
     out = console()
-    out.print(f"model  {', '.join(document['effects'])}", soft_wrap=True)
+    out.print(f"model  {', '.join(document['effects'])}")
     lines = [
         ["fitted to these dwells", short(document["rms_ug"])],
         ["dwells left out: the worst of poses, soaks, stretches of time", short(document["heldout_rms_ug"])],
@@ -101,7 +101,6 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
         "The noise assumed by the fit includes what is missing from the model; 'tumbleline diagnose' states the noise of the "
         "measurement.",
         style="dim",
-        soft_wrap=True,
     )
     fresh = document["fresh_rms_ug"] is not None
     units = [
@@ -116,7 +115,7 @@ def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:
         print_table(["force x y z\ng", "dwells", "rms\nµg"], worst, title="Worst poses")
     _parameters(document)
     for text in document["warnings"]:
-        out.print(f"warning: {text}", style="yellow", soft_wrap=True)
+        out.print(f"warning: {text}", style="yellow")
 
 
 def _parameters(document: dict[str, Any]) -> None:

@@ -18,14 +18,14 @@ def limited(out: Console) -> bool:
 class WordConsole(Console):
     """Text for people.
 
-    With ``soft_wrap`` a line is written as it is, and a terminal breaks it within a word. Here this holds only for lines that
-    are copied: commands, and lines with a word (a path) that is longer than the terminal is wide.
+    With ``soft_wrap``, the default of a text here, a line is written as it is, and a terminal breaks it within a word. That holds
+    only for lines that are copied: commands, and lines with a word (a path) that is longer than the terminal is wide.
     """
 
     def print(self, *objects: Any, soft_wrap: bool | None = None, **options: Any) -> None:
         """Print as :class:`rich.console.Console` does."""
-        if soft_wrap and limited(self) and len(objects) == 1 and isinstance(objects[0], str):
-            soft_wrap = _copied(objects[0], self.width)
+        if len(objects) == 1 and isinstance(objects[0], str) and soft_wrap is not False:
+            soft_wrap = not limited(self) or _copied(objects[0], self.width)
         super().print(*objects, soft_wrap=soft_wrap, **options)
 
 

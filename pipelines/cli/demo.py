@@ -97,10 +97,9 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
     out = console()
     out.print(
         f"The lot was measured twice, with one hidden effect. Files in {folder}: {', '.join(f'{n}.parquet' for n in names)}.",
-        soft_wrap=True,
     )
-    out.print("Begin with", soft_wrap=True)
-    out.print(f"  {_command('diagnose', folder, hidden.model)}", soft_wrap=True)
+    out.print("Begin with")
+    out.print(f"  {_command('diagnose', folder, hidden.model)}")
 
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
@@ -204,24 +203,23 @@ class _Game:
         out.print(
             f"{self.hidden.truth} ({self.hidden.kind}): {self.hidden.effect}",
             style="bold",
-            soft_wrap=True,
         )
         named = ", ".join(" or ".join(group) for group in document["classes"]) or "nothing"
         if document["told_apart"]:
-            out.print(f"The diagnosis named {named}. Found.", style="bold green", soft_wrap=True)
+            out.print(f"The diagnosis named {named}. Found.", style="bold green")
         elif document["found"]:
             self._one_of_a_class(document, named)
         elif self.hidden.effect in document["unseen"]:
             text = f"The diagnosis named {named}, and listed {self.hidden.effect} as not visible under this plan."
             out.print(text, style="bold yellow", soft_wrap=True)
         else:
-            out.print(f"The diagnosis named {named}. Not found.", style="bold red", soft_wrap=True)
+            out.print(f"The diagnosis named {named}. Not found.", style="bold red")
         lines = [
             [when, *(short(document[key][f]) for f in ("rms_ug", "fresh_rms_ug"))]
             for when, key in (("before", "before"), ("extended", "after"))
         ]
         print_table(["model", "residual, µg", "fresh run, µg"], lines)
-        out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.", soft_wrap=True)
+        out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.")
 
     def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
         """The result if the hidden effect is in a class with others, and the measurement that separates them."""
@@ -242,10 +240,9 @@ class _Game:
         if not rows:
             out.print(
                 "No measurement that the station can take is certain to separate them.",
-                soft_wrap=True,
             )
         elif "minutes" in rows[0]:
-            out.print("The measurement that separates them:", soft_wrap=True)
+            out.print("The measurement that separates them:")
             measurements_table(rows, out)
         else:
             out.print(rows[0]["why"], soft_wrap=True)
@@ -256,7 +253,7 @@ class _Game:
         if not self.quiet:
             console().print(f"\n{title}", style="bold cyan")
             if line:
-                console().print(f"  {line}", style="dim", soft_wrap=True)
+                console().print(f"  {line}", style="dim")
 
     def _say(self, text: str) -> None:
         if not self.quiet:

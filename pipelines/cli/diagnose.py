@@ -185,15 +185,15 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
 
     out, rows = error_console(), document["next_measurements"]
     if not reasons(rows):
-        out.print(f"next: no steps of the station are proposed; {path} is not written", soft_wrap=True)
+        out.print(f"next: no steps of the station are proposed; {path} is not written")
         return
     limits = limits_from(base.limits, home, path.parent)
     recipe = next_recipe(base, rows, path.stem).model_copy(update={"limits": limits})
     remarks = [f"Written by 'tumbleline diagnose --next' from {source}: recipe {base.name}, then", *reasons(rows)]
     remarks += [f"without formula {formula.id}: name the model file with 'model'" for formula in base.formulas]
     files.publish(path, recipe_text(recipe, remarks).encode(), "recipe", files.ELSEWHERE)
-    out.print(f"next: {path}; to see what it determines:", soft_wrap=True)
-    out.print(f"  {command_line('plan', str(path))}", soft_wrap=True)
+    out.print(f"next: {path}; to see what it determines:")
+    out.print(f"  {command_line('plan', str(path))}")
 
 
 def write_report(path: Path, text: str) -> None:
@@ -201,4 +201,4 @@ def write_report(path: Path, text: str) -> None:
     from pipelines.archive import files
 
     files.publish(path, text.encode(), "report", files.ELSEWHERE)
-    error_console().print(f"report: {path}", soft_wrap=True)
+    error_console().print(f"report: {path}")

@@ -54,7 +54,7 @@ def _print(document: dict[str, Any], most: int | None) -> None:
     _print_changes(document["figures"], ("figure",), "figures", most)
     for side in ("only_a", "only_b"):
         if document[side]:
-            out.print(f"only in {side[-1]}: {', '.join(document[side])}", soft_wrap=True)
+            out.print(f"only in {side[-1]}: {', '.join(document[side])}")
     _print_causes(document["because"])
 
 
@@ -101,7 +101,7 @@ def _print_changes(rows: list[dict[str, Any]], key: tuple[str, ...], what: str, 
     new, gone = _apart(rows, "b"), _apart(rows, "a")
     for side, names in (("only in b", new), ("only in a", gone)):
         if names:
-            out.print(f"{what} {side}: {', '.join(names)}", soft_wrap=True)
+            out.print(f"{what} {side}: {', '.join(names)}")
 
 
 def _change_line(row: dict[str, Any], key: tuple[str, ...]) -> list[str]:
@@ -127,6 +127,6 @@ def _print_causes(rows: list[dict[str, Any]]) -> None:
     for row in rows:
         name = f" {row['name']}" if row["name"] else ""
         if row["what"] != "code":
-            out.print(f"  {row['what']}{name}: {row['a']} → {row['b']}", soft_wrap=True)
+            out.print(f"  {row['what']}{name}: {row['a']} → {row['b']}")
     if code:
-        out.print(f"  code of {', '.join(code)}", soft_wrap=True)
+        out.print(f"  code of {', '.join(code)}")

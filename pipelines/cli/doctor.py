@@ -64,7 +64,7 @@ def _show(document: DoctorDocument) -> None:
     print_table(["part", "check", "state", "found"], lines, whole=3)
     out = console()
     if document["samples"]:
-        out.print(f"sample recipes and stations: {document['samples']}", soft_wrap=True)
+        out.print(f"sample recipes and stations: {document['samples']}")
     for state in ("not configured", "warning", "fault"):
         for c in (c for c in checks if c["state"] == state):
             needed = f", needed: {c['needed']}" if c["needed"] else ""

@@ -39,5 +39,4 @@ def print_evidence(document: dict[str, Any]) -> None:
         out.print(
             f"few dwells: a cubic term {seen} is not detected (probability 0.5)",
             style="dim",
-            soft_wrap=True,
         )

@@ -138,7 +138,7 @@ def _write(files: dict[str, bytes], output: Path | None) -> None:
             f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
         ) from None
     if folder:
-        error_console().print(f"export: {len(files)} files in {output}", soft_wrap=True)
+        error_console().print(f"export: {len(files)} files in {output}")
 
 
 def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
@@ -162,4 +162,4 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
         lines.append(f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' gives them a period of validity")
     lines += [*library_remarks(run), *signers]
     for line in lines:
-        error_console().print(f"export: {line}", soft_wrap=True)
+        error_console().print(f"export: {line}")

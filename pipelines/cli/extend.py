@@ -99,9 +99,9 @@ def command(
     out = error_console() if printed else console()
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
-        out.print(f"{target}: created with version 1: {first}", soft_wrap=True)
+        out.print(f"{target}: created with version 1: {first}")
     change = f"removes {step.effect}" if remove else f"has {step.effect}"
-    out.print(f"{target}: version {after.model.version} {change} ({step.why})", soft_wrap=True)
+    out.print(f"{target}: version {after.model.version} {change} ({step.why})")
 
 
 def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> None:

@@ -74,7 +74,7 @@ def command(
 
         chart = evolution_chart(rows, model_file.model.name)
         files.publish(picture, drawn(chart, picture.suffix.lower()), "picture", files.ELSEWHERE)
-        error_console().print(f"picture: {picture}", soft_wrap=True)
+        error_console().print(f"picture: {picture}")
     if as_json:
         print_json({"model": model_file.model.name, "file": str(model), "versions": rows})
     else:
@@ -112,21 +112,19 @@ def _print(rows: list[dict[str, Any]], name: str, file: Path) -> None:
     print_table(["version", *(heads[k] for k in keys)], errors, title="Error, rms")
     for row in rows:
         if row["text"]:
-            out.print(f"version {row['version']}: {row['text']}", soft_wrap=True)
+            out.print(f"version {row['version']}: {row['text']}")
     out.print(
         "cross-validated: the worst of poses, soaks and stretches of time · fresh run: coefficients unchanged, the bias change "
         "of each unit included · assumed noise: of the fit of each version, missing effects included",
         style="dim",
-        soft_wrap=True,
     )
     for text in dict.fromkeys(text for row in rows for text in row["warnings"]):
-        out.print(f"warning: {text}", style="yellow", soft_wrap=True)
+        out.print(f"warning: {text}", style="yellow")
     refuted = [name for row in rows if row["confirmed"] is False for name in row["added"]]
     if refuted:
         out.print(
             f"{', '.join(refuted)}: refuted. The fresh run does not show the predicted change; remove it from the model.",
             style="bold red",
-            soft_wrap=True,
         )
         print_next(out, [removal(file, effect) for effect in refuted if effect in rows[-1]["effects"]])
 

@@ -270,5 +270,5 @@ def import_and_print(
         ]
         print_table(["figure", "axis", "value", "standard uncertainty", "unit", "remark"], rows, whole=2)
         for line in imported["text"]:
-            out.print(f"  {line}", soft_wrap=True)
+            out.print(f"  {line}")
     return DONE if all(one["identified"] for one in imported["figures"]) else PART_FAILED

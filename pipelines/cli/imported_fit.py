@@ -117,11 +117,11 @@ def _print(document: dict[str, Any]) -> None:
     out = console()
     left = f", without {', '.join(document['left_out'])}" if document["left_out"] else ""
     model = ", ".join(document["effects"]) or "axes in the plane"
-    out.print(f"{model}{left}: kept as run {document['run']}", soft_wrap=True)
+    out.print(f"{model}{left}: kept as run {document['run']}")
     for line in document["lines"]:
-        out.print(f"  {line}", soft_wrap=True)
+        out.print(f"  {line}")
     for unit in document["units"]:
         reasons = f" ({unit['reasons']})" if unit["reasons"] else ""
-        out.print(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}", soft_wrap=True)
+        out.print(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}")
     text, style = VERDICTS[document["adequate"]]
     out.print(f"  {text}", style=style)

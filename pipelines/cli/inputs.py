@@ -23,7 +23,7 @@ def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[
 
     dwells, temperatures, place = inputs.dwells_and_history(source, history, archive)
     if place and not history:
-        error_console().print(f"history: {place}, found beside the dwells", soft_wrap=True)
+        error_console().print(f"history: {place}, found beside the dwells")
     return dwells, temperatures
 
 

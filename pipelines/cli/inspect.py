@@ -71,7 +71,6 @@ def command(
             console().print(
                 f"{len(documents)} recordings; if they are parts of one, add --join rows (one after the other) or --join "
                 "columns (side by side)",
-                soft_wrap=True,
             )
         for document in documents:
             _print(document)
@@ -104,35 +103,33 @@ def _print(one: InspectDocument) -> None:
     names = " + ".join(Path(name).name for name in one["files"])
     rate = "" if one["rate_hz"] is None else f", {one['rate_hz']:.5g} Hz"
     long = "" if one["duration_s"] is None else f", {one['duration_s']:.5g} s"
-    out.print(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}", soft_wrap=True)
+    out.print(f"{names}: {one['form']}, {one['rows']} rows{rate}{long}")
     for remark in one["remarks"]:
-        out.print(f"  {remark}", soft_wrap=True)
+        out.print(f"  {remark}")
     _print_columns(one)
     if one["output_unit"]:
-        out.print(f"  output in {one['output_unit']}: {one['output_reason']}", soft_wrap=True)
+        out.print(f"  output in {one['output_unit']}: {one['output_reason']}")
     if one["time_unit"]:
-        out.print(f"  time in {one['time_unit']}: {one['time_reason']}", soft_wrap=True)
+        out.print(f"  time in {one['time_unit']}: {one['time_reason']}")
     if one["gaps"]:
-        out.print(f"  {number_of(one['gaps'], 'gap')} in time longer than five samples", soft_wrap=True)
+        out.print(f"  {number_of(one['gaps'], 'gap')} in time longer than five samples")
     for column in one["columns"]:
         if column["clipped"] and column["low"] is not None and column["high"] is not None:
             out.print(
                 f"  axis {column['meaning']} is clipped: {number_of(column['clipped'], 'sample')} in runs at the end of its "
                 f"range ({column['low']:g} to {column['high']:g}); the true output is beyond",
-                soft_wrap=True,
             )
     for fault in one["faults"][:MOST_FAULTS]:
         what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
         out.print(
             f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on",
-            soft_wrap=True,
         )
     more = len(one["faults"]) - MOST_FAULTS
     if more > 0:
-        out.print(f"  and {more} more such faults", soft_wrap=True)
+        out.print(f"  and {more} more such faults")
     _print_intervals(one)
     for text in one["open"]:
-        out.print(f"  to be added by you: {text}", soft_wrap=True)
+        out.print(f"  to be added by you: {text}")
     out.print(one["command"], soft_wrap=True)
 
 
@@ -163,11 +160,9 @@ def _print_intervals(one: InspectDocument) -> None:
         return
     several = [k for k, interval in enumerate(intervals) if interval["positions"] > 1]
     total = sum(interval["end_s"] - interval["start_s"] for interval in intervals)
-    out.print(f"  {number_of(len(intervals), 'static interval')}, {total:.4g} s", soft_wrap=True)
+    out.print(f"  {number_of(len(intervals), 'static interval')}, {total:.4g} s")
     for k in several[:MOST_FAULTS]:
-        out.print(
-            f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back", soft_wrap=True
-        )
+        out.print(f"  interval {k} holds about {intervals[k]['positions']} positions logged back to back")
     rows = [
         [
             str(k),
@@ -181,4 +176,4 @@ def _print_intervals(one: InspectDocument) -> None:
     ]
     print_table(["interval", "start, s", "end, s", "samples", "mean x / y / z", "sd x / y / z"], rows)
     if len(intervals) > MOST_INTERVALS:
-        out.print(f"  and {len(intervals) - MOST_INTERVALS} more", soft_wrap=True)
+        out.print(f"  and {len(intervals) - MOST_INTERVALS} more")

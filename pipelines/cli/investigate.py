@@ -140,7 +140,7 @@ def _question(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
 
     out = error_console()
     for sentence in follow_up.why:
-        out.print(f"\n{sentence}.", soft_wrap=True)
+        out.print(f"\n{sentence}.")
     measurements_table(list(follow_up.rows), out)
     left = inquiry.budget - inquiry.spent
     text = f"Measure this follow-up ({follow_up.minutes:.1f} min; {left:.1f} of {inquiry.budget:.1f} min budget left)?"
@@ -202,9 +202,7 @@ def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
     out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
     _rounds(document)
     print_findings(document)
-    out.print(
-        f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow", soft_wrap=True
-    )
+    out.print(f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow")
     if document["ended"] in {"asked", "declined"}:
         measurements_table(document["next_measurements"])
         print_next(out, [document["command"]])

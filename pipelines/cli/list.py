@@ -33,11 +33,11 @@ def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> No
         console().print(f"no run in {store.root}; make one with 'tumbleline run'")
         return
     out = console()
-    out.print(f"{number_of(len(infos), 'run')} in {store.root}", soft_wrap=True)
+    out.print(f"{number_of(len(infos), 'run')} in {store.root}")
     print_table(["run", "started (UTC)", "station", "passed", "units"], [_line(info) for info in infos])
     for info in infos:
         if info.rerun_of:
-            out.print(f"{info.id} is a re-run of {info.rerun_of}", soft_wrap=True)
+            out.print(f"{info.id} is a re-run of {info.rerun_of}")
 
 
 def _line(info: RunInfo) -> list[str]:

@@ -100,7 +100,7 @@ def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits
     from pipelines.serving.listening import listening_socket
 
     place = listening_socket(host, port, "monitor")
-    console().print(f"http://{host}:{place.getsockname()[1]}/healthz", soft_wrap=True)
+    console().print(f"http://{host}:{place.getsockname()[1]}/healthz")
     sys.stdout.flush()  # a program that started it waits for the address
     config = uvicorn.Config(
         TimedRequests(application(monitor), place.connections), log_level="warning", access_log=False, server_header=False,

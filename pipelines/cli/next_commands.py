@@ -132,7 +132,7 @@ def print_next(out: Console, lines: Sequence[str]) -> None:
     if lines:
         out.print("\nNext:", style="bold")
         for line in lines:
-            out.print(f"  {line}", soft_wrap=True)
+            out.print(f"  {line}")
 
 
 def print_extension(out: Console, document: dict[str, Any], find: FindData, model: Path | None) -> None:

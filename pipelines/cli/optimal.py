@@ -212,12 +212,12 @@ def print_optimum(document: dict[str, Any]) -> None:
         print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)
     else:
         print_table(ERROR_HEADS, _error_lines(document["coefficients"]))
-        out.print(f"error: of the new recipe; given: of {document['from']}", style="dim", soft_wrap=True)
+        out.print(f"error: of the new recipe; given: of {document['from']}", style="dim")
     if document["seen_besides"]:
-        out.print(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}", soft_wrap=True)
-    out.print(f"Recipe file: {document['file']}", soft_wrap=True)
+        out.print(f"Also visible, unlike with the textbook plan: {', '.join(document['seen_besides'])}")
+    out.print(f"Recipe file: {document['file']}")
     if document["limits_missing"]:
-        error_console().print(f"warning: {document['limits_missing']}", soft_wrap=True, style="yellow")
+        error_console().print(f"warning: {document['limits_missing']}", style="yellow")
     else:
         print_next(out, [command_line("run", str(document["file"]))])
     if "page" in document:

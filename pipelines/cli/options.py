@@ -298,4 +298,4 @@ def print_remarks(run: Run, serials: Sequence[str]) -> None:
     from pipelines.certificates.coefficient_remarks import library_remarks, signature_remarks
 
     for line in (*signature_remarks(run, serials), *library_remarks(run)):
-        error_console().print(f"show: {line}", markup=False, soft_wrap=True)
+        error_console().print(f"show: {line}", markup=False)

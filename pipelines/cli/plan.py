@@ -119,9 +119,7 @@ def command(
         with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
     )
     for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
-        error_console().print(
-            f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow", soft_wrap=True
-        )
+        error_console().print(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
     limits = _limits(planned_recipe, folder_of(recipe))
     if not planned_recipe.tumbles and page is None and pictures is None:
         document = plan_of_procedures(planned_recipe, config, limits)

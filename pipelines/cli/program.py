@@ -77,7 +77,7 @@ def command(
         chosen,
         config,
         Choice(form, offset_registers, tolerance),
-        lambda text: out.print(f"program: {text}", soft_wrap=True),
+        lambda text: out.print(f"program: {text}"),
     )
     result = document(source, outcomes, given)
     if as_json:
@@ -92,7 +92,7 @@ def _agreed(run: str, station: str, chosen: Sequence[tuple[int, UnitCalibration]
 
     out = error_console()
     for slot, unit in chosen:
-        out.print(f"  slot {slot:>2}  {unit.unit}  {unit.certified}", soft_wrap=True)
+        out.print(f"  slot {slot:>2}  {unit.unit}  {unit.certified}")
     question = f"Write the coefficients of run {run} into {len(chosen)} devices on station {station}?"
     return agreed(question, "y or Enter writes, n writes nothing", UNATTENDED)
 
@@ -116,4 +116,4 @@ def _print(result: dict[str, Any]) -> None:
     print_table(heads, rows, title=f"run {result['run']}")
     for one in result["units"]:
         if one["outcome"] == "failed":
-            console().print(f"  {one['unit']} failed at '{one['step']}': {one['reason']}", soft_wrap=True)
+            console().print(f"  {one['unit']} failed at '{one['step']}': {one['reason']}")

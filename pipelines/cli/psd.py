@@ -139,7 +139,6 @@ def _print(document: dict[str, Any]) -> None:
     out.print(
         f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, segments of "
         f"{document['segment']} samples, resolution {short(document['rate_hz'] / document['segment'])} Hz",
-        soft_wrap=True,
     )
     unit = document["unit"] or "unit"
     lines = [[row["channel"], short(row["median_amplitude"], 4)] for row in document["spectra"]]

@@ -60,7 +60,7 @@ def command(
     out.print(
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
     )
-    out.print(f"  {', '.join(record.effects)}", soft_wrap=True)
+    out.print(f"  {', '.join(record.effects)}")
     out.print(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}")
 
 
@@ -115,7 +115,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
     ]
     print_table(["no.", "model", "for", "from", "in use", "by"], lines, whole=4)
     for one in records:
-        console().print(f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}", soft_wrap=True)
+        console().print(f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}")
 
 
 def _name(record: Release) -> str:

@@ -152,7 +152,7 @@ def _print(outcomes: list[RerunOutcome], document: dict[str, Any], archive: str 
         out.print(f"… and {len(outcomes) - SHOWN} more; --json lists all", style="dim")
     for one in outcomes:
         if one.error:
-            out.print(f"  {one.run}: {one.error}", style="bold red", soft_wrap=True)
+            out.print(f"  {one.run}: {one.error}", style="bold red")
     out.print(
         f"{document['selected']} selected: {document['rerun']} re-analysed, {document['unchanged']} unchanged, "
         f"{document['failed']} failed"
@@ -193,13 +193,13 @@ def _print_check(results: list[Reproduction]) -> None:
     for one in results:
         tables += sum(how == "same bytes" for how in one.tables.values())
         for line in [one.error] if one.error else one.differences:
-            out.print(f"  {one.run}: {line}", style="bold red", soft_wrap=True)
+            out.print(f"  {one.run}: {line}", style="bold red")
         if one.differences:
             why = (
                 ", ".join(one.changed)
                 or "neither code nor libraries; the computer differs or the stored file is damaged"
             )
-            out.print(f"    changed since: {why}", soft_wrap=True)
+            out.print(f"    changed since: {why}")
     left = sum(how == "not checked" for one in results for how in one.tables.values())
     same = sum(one.same for one in results)
     out.print(
@@ -215,5 +215,4 @@ def _print_check(results: list[Reproduction]) -> None:
         out.print(
             f"changed since, without effect on the tables: {', '.join(changes)}",
             style="dim",
-            soft_wrap=True,
         )

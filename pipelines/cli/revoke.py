@@ -51,4 +51,4 @@ def command(
     if as_json:
         print_json({"unit": serial, "revoked": ended, **event.document()})
     else:
-        console().print(f"revoked {', '.join(ended)} from {event.start} on: {event.reason}", soft_wrap=True)
+        console().print(f"revoked {', '.join(ended)} from {event.start} on: {event.reason}")

@@ -102,7 +102,7 @@ def command(
         for request, job in zip(requests, jobs, strict=True)
     ]
     for line in (line for run in runs for line in library_remarks(run)):
-        error_console().print(f"run: {line}", soft_wrap=True)
+        error_console().print(f"run: {line}")
     documents = [judged(summary(run), run) for run in runs]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})

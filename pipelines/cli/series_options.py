@@ -58,7 +58,7 @@ def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | Non
     if plot is not None:
         refuse_ending(plot, "--plot")
         files.publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot", files.ELSEWHERE)
-        error_console().print(f"plot: {plot}", soft_wrap=True)
+        error_console().print(f"plot: {plot}")
     if page is not None:
         files.publish(page, noise_page(document).encode(), "page", files.ELSEWHERE)
-        error_console().print(f"page: {page}", soft_wrap=True)
+        error_console().print(f"page: {page}")

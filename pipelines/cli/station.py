@@ -173,7 +173,7 @@ def _print_disputed(profile: Profile) -> None:
     """Registers on which sources disagree, one line each."""
     for register in profile.registers:
         if register.disputed:
-            console().print(f"disputed  {register.name}: {register.disputed}", soft_wrap=True)
+            console().print(f"disputed  {register.name}: {register.disputed}")
 
 
 def _where(device: Served) -> dict[str, object]:

@@ -106,13 +106,13 @@ def print_summary(document: dict[str, Any]) -> None:
             out.print(f"  {unit['unit']}: {unit['reasons']}")
     out.print(f"  decided by {document['rule']}", style="dim")
     if any(unit.get("basis") != "budget" for unit in document["units"]):
-        out.print(f"  {NOISE_ONLY}", style="dim", soft_wrap=True)
+        out.print(f"  {NOISE_ONLY}", style="dim")
     for line in _interrupted(document["interruptions"]):
         out.print(line, soft_wrap=True)
     total = len(document["units"])
     out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
     out.print(f"run     {document['run']}")
-    out.print(f"report  {document['report']}", soft_wrap=True)
+    out.print(f"report  {document['report']}")
 
 
 def _listed(document: dict[str, Any]) -> list[tuple[str, str]]:

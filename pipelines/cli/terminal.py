@@ -31,7 +31,7 @@ class Terminal:
         with self._quiet():
             out = error_console()
             out.print(f"\n{TITLES[prompt.kind]}  ", style="bold", end="")
-            out.print(f"{prompt.text}.", soft_wrap=True)
+            out.print(f"{prompt.text}.")
             for slot, serial in prompt.slots:
                 out.print(f"  slot {slot:>2}  {serial}")
             return "stop" if _line("Enter when done, 'stop' to stop the run: ").lower() in STOP else "go"

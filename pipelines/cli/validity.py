@@ -71,7 +71,7 @@ def _print(serial: str, day: str, valid: Calibration | None, history: list[Calib
         out.print(f"  tables   coefficients {event.coefficients[:16]}…")
         if made.get("made"):
             libraries = ", ".join(f"{name} {number}" for name, number in made["made"]["libraries"].items())
-            out.print(f"  code     {made['made']['code'][:16]}… with {libraries}", soft_wrap=True)
+            out.print(f"  code     {made['made']['code'][:16]}… with {libraries}")
     lines = [[one.certificate, one.start, one.until, one.state, one.run, _why(one)] for one in history]
     print_table(["certificate", "from", "until", "state", "run", "reason"], lines)
     rows = made.get("coefficients") or []

@@ -109,22 +109,21 @@ def command(
 def _print(report: Report) -> None:
     out, checked = console(), report.checked
     for finding in checked.findings:
-        out.print(f"{finding.kind:<11} {finding.path} {finding.message}", soft_wrap=True)
+        out.print(f"{finding.kind:<11} {finding.path} {finding.message}")
         for line in finding.consequences[:SHOWN]:
-            out.print(f"            {line}", style="dim", soft_wrap=True)
+            out.print(f"            {line}", style="dim")
         if len(finding.consequences) > SHOWN:
             left = len(finding.consequences) - SHOWN
             out.print(f"            and {left} more; --json lists all", style="dim")
     for remark in checked.remarks:
-        out.print(f"  {remark}", style="dim", soft_wrap=True)
+        out.print(f"  {remark}", style="dim")
     rate = f"{checked.bytes / report.seconds / 1e6:.3g} MB/s"
     out.print(
         f"{number_of(report.runs, 'run')}, {number_of(report.captures, 'capture')}: {number_of(checked.tables, 'table')}, "
         f"{number_of(checked.manifests, 'manifest')}, {number_of(checked.rows, 'row')} in {report.seconds:.2f} s ({rate})",
-        soft_wrap=True,
     )
-    out.print(f"signatures  {report.trust}", soft_wrap=True)
+    out.print(f"signatures  {report.trust}")
     if report.head:
-        out.print(f"chain       ends with {report.head}", soft_wrap=True)
+        out.print(f"chain       ends with {report.head}")
     verdict = number_of(len(checked.findings), "finding") if checked.findings else "nothing is wrong"
     out.print(verdict, style="bold green" if report.whole else "bold red")

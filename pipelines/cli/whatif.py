@@ -99,11 +99,11 @@ def _print(document: dict[str, Any]) -> None:
         if rows:
             out.print(f"{number_of(len(rows), 'unit')}: {outcome}")
             for row in rows[:SHOWN]:
-                out.print(f"  {row['unit']} in {row['run']}: {row['reasons']}", soft_wrap=True, style="dim")
+                out.print(f"  {row['unit']} in {row['run']}: {row['reasons']}", style="dim")
     for row in document["failed"]:
-        out.print(f"  {row['run']}: {row['error']}", style="bold red", soft_wrap=True)
+        out.print(f"  {row['run']}: {row['error']}", style="bold red")
     style = {"better": "bold green", "worse": "bold red"}.get(document["verdict"], "bold")
-    out.print(f"{document['verdict']}: {document['words']}", style=style, soft_wrap=True)
+    out.print(f"{document['verdict']}: {document['words']}", style=style)
     out.print(f"evidence  {document['evidence']}")
 
 

@@ -98,7 +98,7 @@ def command(
         )  # fmt: skip
         servers: list[uvicorn.Server] = []
         app = create_app(settings, ending=lambda: any(server.should_exit for server in servers))
-        console().print(f"{settings.address}/?token={settings.token}", soft_wrap=True)
+        console().print(f"{settings.address}/?token={settings.token}")
         sys.stdout.flush()  # a program that started it waits for the address
         error_console().print("Open the address above; Ctrl-C ends the workbench.")
         config = uvicorn.Config(

@@ -158,7 +158,7 @@ def called(path: Path) -> set[str]:
 
 
 def test_every_module_that_prints_a_command_to_give_next_is_run_by_a_test() -> None:
-    modules = {path.stem for path in (ROOT / "pipelines" / "cli").glob("*.py") if called(path) & PRINTING} - {
+    modules = {path.stem for path in (ROOT / "pipelines" / "cli").rglob("*.py") if called(path) & PRINTING} - {
         "next_commands"
     }
     assert modules == set(CASES) | set(ELSEWHERE)

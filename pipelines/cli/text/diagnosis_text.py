@@ -53,7 +53,7 @@ def print_findings(document: dict[str, Any]) -> None:
     _classes(document)
     _dwells(document)
     for text in document.get("warnings", ()):
-        console().print(f"warning: {text}", style="yellow", soft_wrap=True)
+        console().print(f"warning: {text}", style="yellow")
 
 
 def _dwells(document: dict[str, Any]) -> None:
@@ -68,7 +68,6 @@ def _dwells(document: dict[str, Any]) -> None:
         out.print(
             f"without {'these dwells' if len(single['dwells']) > 1 else 'this dwell'} the model is: {verdict_without}; "
             f"to leave out: --leave-out {names}",
-            soft_wrap=True,
         )
     if removed and removed["heavy_tails"]:
         tails = [d for d in removed["dwells"] if d.get("tail", True)]
@@ -77,7 +76,6 @@ def _dwells(document: dict[str, Any]) -> None:
             f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
             f"{' …' if len(tails) > 5 else ''}; the tails of the noise of this run may reach as far",
             style="dim",
-            soft_wrap=True,
         )
     if document["adequate"]:
         return
@@ -228,10 +226,9 @@ def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, 
     out.print(
         f"\nSignificant, but of unknown cause: {unexplained['text']} as a {unexplained['shape']} "
         f"(p {equal(unexplained['p_value'])}).",
-        soft_wrap=True,
     )
     if document["offer"]:
-        out.print(f"Formula for {model or 'a model file'}, to be refined:\n", soft_wrap=True)
+        out.print(f"Formula for {model or 'a model file'}, to be refined:\n")
         out.print(document["offer"]["toml"], soft_wrap=True)
         if data is not None:
             print_next(out, [_with_formula(document, data())])
@@ -248,7 +245,6 @@ def _next_command(out: Console, document: dict[str, Any], data: FindData, model:
         out.print(
             f"These data do not separate: {alternatives}. The added effect is one of its class.",
             style="dim",
-            soft_wrap=True,
         )
 
 

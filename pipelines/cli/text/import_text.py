@@ -25,7 +25,7 @@ def print_transfers(imports: Sequence[Mapping[str, Any]]) -> None:
     for one in imports:
         out.print(f"{one['unit']}: {one['points']} points, kept as run {one['run']}")
         for line in one["text"]:
-            out.print(f"  {line}", soft_wrap=True)
+            out.print(f"  {line}")
         verdict, style = VERDICTS_OF_TRANSFER[one["adequate"]]
         out.print(f"  {verdict}", style=style)
 
@@ -37,7 +37,7 @@ def print_import(one: dict[str, Any], archive: str | None, *, list_dwells: bool)
     rows = f"{number_of(one['samples'], 'sample')}, {dwells}" if one["samples"] else dwells
     out.print(f"{', '.join(one['units'])}: {rows} in {one['out_unit']}, kept as run {one['run']}")
     for remark in [*one["remarks"], *one["lines"]]:
-        out.print(f"  {remark}", soft_wrap=True)
+        out.print(f"  {remark}")
     if list_dwells:
         _print_dwells(one["dwell_list"], one["out_unit"])
     if one["fit"]:

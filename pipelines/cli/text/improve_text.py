@@ -23,7 +23,7 @@ ERRORS = {
 def print_heading(text: str, *, quiet: bool) -> None:
     """Print a heading, unless the output is a document."""
     if not quiet:
-        console().print(f"\n{text}", style="bold cyan", soft_wrap=True)
+        console().print(f"\n{text}", style="bold cyan")
 
 
 def print_verdict(document: dict[str, Any]) -> None:
@@ -39,7 +39,7 @@ def print_improvement(document: dict[str, Any]) -> None:
     _ladder(document["ladder"])
     out = console()
     for text in document["warnings"]:
-        out.print(f"warning: {text}", style="yellow", soft_wrap=True)
+        out.print(f"warning: {text}", style="yellow")
     print_next(out, document["next"])
 
 
@@ -67,7 +67,7 @@ def _ladder(rows: list[dict[str, Any]]) -> None:
     print_table(["error, µg rms", *heads], lines, title="Error by version of the model", whole=0)
     for row in rows[1:]:
         style = {True: "bold green", False: "bold red", None: "yellow"}[row["confirmed"]]
-        console().print(f"{', '.join(row['added'])}: {row['text']}", style=style, soft_wrap=True)
+        console().print(f"{', '.join(row['added'])}: {row['text']}", style=style)
 
 
 def next_lines(document: dict[str, Any], target: Path, find: FindData, *, after: dict[str, Any]) -> list[str]:

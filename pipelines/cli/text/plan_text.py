@@ -184,7 +184,7 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], [_line(row) for row in worst.values()])
     for row in worst.values():
         rulers = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["shares"].items() if share >= LEAST)
-        out.print(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}", soft_wrap=True)
+        out.print(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}")
     period = f"period of validity {reach['validity_months']} months, frame {reach['frame']}"
     out.print(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim")
     if reach["grade_source"] == "assumed":

@@ -97,4 +97,4 @@ def print_references(judged: ReferencesDocument | None) -> None:
     else:
         told = f"CONTRADICTED: {contradiction(judged)}" if judged["worse"] else "not contradicted by the residuals"
         text = f"{told}; {unseen(judged)}"
-    console().print(f"stated references   {text}", style="bold red" if judged["worse"] else "", soft_wrap=True)
+    console().print(f"stated references   {text}", style="bold red" if judged["worse"] else "")
