@@ -18,6 +18,7 @@ BENCHMARKS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("fits.py", ("--units", "200", "--rounds", "3"), ()),
     ("allan.py", ("--channels", "6", "--minutes", "10"), ()),
     ("budget.py", ("--units", "40"), ("--units", "304")),
+    ("exceedance.py", ("--units", "48"), ()),
     ("recovery.py", ("--units", "50"), ("--units", "200")),
     ("throughput.py", ("--rounds", "5"), ("--rounds", "25")),
     ("plans.py", ("--units", "50", "--device", "adxl355"), ()),
