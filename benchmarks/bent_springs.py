@@ -1,6 +1,5 @@
 """Springs with a quadratic and a cubic term that show within 1 g, for units whose sheet has none of the size."""
 
-# ruff: noqa: ARG002 - the interface passes all quantities
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any

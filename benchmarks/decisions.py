@@ -35,7 +35,6 @@ SEED = 63_000_000
 def _bump(rng: Any, units: int, scene: Any) -> Any:
     """A bias that rises in a band of temperature of 8 K: physics of no catalogue."""
     centre, size = float(rng.uniform(-5.0, 5.0)), rng.standard_normal((1, 3)) + 0.3 * rng.standard_normal((units, 3))
-    del scene
     import numpy as np
 
     return lambda s: size[:, None] * np.exp(-0.5 * ((s.temperature - 20.0 - centre) / 4.0) ** 2)[..., None]

@@ -48,19 +48,16 @@ class Equipment:
 
     def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Waveforms:
         """A dwell along an axis."""
-        del slots
         return self._bench.sine(frequency, level, axis, seconds, self._next())
 
     def sine_across(
         self, frequency: float, level: float, axis: int, angle: float, seconds: float, slots: Sequence[int]
     ) -> Waveforms:
         """A dwell across an axis."""
-        del slots
         return self._bench.sine(frequency, level, axis, seconds, self._next(), across_deg=angle)
 
     def step(self, volts: float, hold_s: float, before_s: float, slots: Sequence[int]) -> Waveforms:
         """A step of voltage at the self-test inputs."""
-        del slots
         return self._bench.self_test(volts, hold_s, before_s, 2.0 * hold_s, self._next())
 
     def _next(self) -> int:

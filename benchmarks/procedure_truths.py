@@ -56,7 +56,6 @@ def _random(plant: Plant, k: int) -> dict[str, float]:
 
 def _turn_on(plant: Plant, k: int) -> dict[str, float]:
     """Between switchings, and the wander of the noise over the cycles, which is part of the scatter from cycle to cycle."""
-    del k
     f = np.geomspace(1e-7, 10.0, 50_001)
     density = _flicker(plant, f) + 2.0 * (plant.preset.rate_random_walk_ug / (2.0 * np.pi * f)) ** 2
     gaps = CYCLE_S * np.arange(1, CYCLES)
@@ -75,7 +74,6 @@ def _flicker(plant: Plant, f: Array) -> Array:
 
 
 def _warm_up(plant: Plant, k: int) -> dict[str, float]:
-    del plant, k
     return {"warm_up_s": WARM_S * float(np.log(1e6 * WARM_G / BAND_UG))}
 
 
@@ -223,7 +221,6 @@ def _of_turn(plant: Plant, k: int, quadratic: float, cubic: float) -> dict[str, 
 
 def _process(plant: Plant, k: int) -> dict[str, float]:
     """Root of the expected variance of 100 s means in an hour, and of the Allan variance at 100 s, by the noise's densities."""
-    del k
     preset, tau, count = plant.preset, 100.0, 36
     f = np.geomspace(1e-7, 1.0, 50_001)
     flicker = _flicker(plant, f)

@@ -15,4 +15,3 @@ class Progress(Protocol):
 
 def silent(done: int, total: int, note: str) -> None:
     """Discards the progress."""
-    del done, total, note

@@ -75,7 +75,6 @@ class Gravity(RelativeEntry):
 
     def states(self, part: str = "") -> bool:
         """Whether it has an uncertainty, that of the formula where none is stated, or is said to be exact."""
-        del part
         return self.exact or self.relative().u > 0.0
 
     @property
@@ -139,7 +138,6 @@ class Settling(Entry):
 
     def states(self, part: str = "") -> bool:
         """By its time constants."""
-        del part
         return True
 
     @property

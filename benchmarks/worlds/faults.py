@@ -120,13 +120,11 @@ def table_slip(scene: Any, readings: Floats, noise: Floats, amount: float, rng: 
 
 def unsoaked(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
     """The devices are not soaked, and what is read is the chamber's air."""
-    del readings, amount, rng
     return scene, None, scene.chamber + 1.0, noise, Told(("thermal_lag", "device_not_soaked"), (), ())
 
 
 def unit_unsoaked(scene: Any, readings: Floats, noise: Floats, amount: float, rng: np.random.Generator) -> Done:
     """The reading of one unit is the chamber's, and its soaks were too short for it; the others read their own."""
-    del amount
     unit = int(rng.integers(len(noise)))
     readings = readings.copy()
     readings[unit] = scene.chamber[unit] + 1.0

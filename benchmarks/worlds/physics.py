@@ -18,7 +18,6 @@ def _sizes(rng: np.random.Generator, units: int, count: int = 1) -> Floats:
 
 def _of_force(shape: Callable[[Floats], Floats]) -> Callable[..., Effect]:
     def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
-        del scene
         size = _sizes(rng, units)[..., 0]
         return lambda s: size[:, None] * shape(s.force)[None]
 
@@ -29,7 +28,6 @@ def _of_temperature(shape: Callable[[Floats, Floats], Floats]) -> Callable[..., 
     """``shape(warm (units, n, 1), force along the axes (units, n, 3))`` gives (units, n, 3)."""
 
     def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
-        del scene
         size = _sizes(rng, units)[..., 0]
         return lambda s: size[:, None] * shape((s.temperature - 25.0)[..., None], s.along)
 
@@ -38,7 +36,6 @@ def _of_temperature(shape: Callable[[Floats, Floats], Floats]) -> Callable[..., 
 
 def cross_coupling(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """f_i·f_j and f_i·f_k."""
-    del scene
     size = _sizes(rng, units, 2)
 
     def effect(s: Any) -> Floats:
@@ -51,7 +48,6 @@ def cross_coupling(rng: np.random.Generator, units: int, scene: Any) -> Effect:
 
 def misalignment_temperature(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """Axes that turn with temperature."""
-    del scene
     size = _sizes(rng, units, 2)
 
     def effect(s: Any) -> Floats:
@@ -71,7 +67,6 @@ def aging_linear(rng: np.random.Generator, units: int, scene: Any) -> Effect:
 
 def warm_up(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """Bias that settles after power-on."""
-    del scene
     size, tau = _sizes(rng, units)[..., 0], float(np.exp(rng.uniform(np.log(900.0), np.log(3000.0))))
     return lambda s: size[:, None] * np.exp(-s.start / tau)[None, :, None]
 
@@ -93,7 +88,6 @@ def thermal_kink(rng: np.random.Generator, units: int, scene: Any) -> Effect:
 def thermal_hysteresis(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """Play between temperature and bias: the bias follows the edge of a gap of some kelvin."""
     size, half = _sizes(rng, units)[..., 0], float(rng.uniform(4.0, 12.0))
-    del scene
 
     def effect(s: Any) -> Floats:
         body, state = s.fine_temperature, np.empty_like(s.fine_temperature)
@@ -110,7 +104,6 @@ def thermal_hysteresis(rng: np.random.Generator, units: int, scene: Any) -> Effe
 
 def level_error(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """The outer axis is not level: up leans in the laboratory, alike for all units."""
-    del scene
     lean = rng.standard_normal(2)
 
     def effect(s: Any) -> Floats:
@@ -134,7 +127,6 @@ def creep_after_move(rng: np.random.Generator, units: int, scene: Any) -> Effect
     The table turns both axes at once and is at rest for the wait before a dwell. Time constants are of the design, within 3 %
     from unit to unit.
     """
-    del scene
     size = _sizes(rng, units)[..., 0]
     tau = float(np.exp(rng.uniform(np.log(15.0), np.log(60.0)))) * (1.0 + 0.03 * rng.standard_normal(units))
 
@@ -181,7 +173,6 @@ def converter(rng: np.random.Generator, units: int, scene: Any) -> Effect:
 
     What it converts is the output of the axis, with offset, misalignment and its run with temperature.
     """
-    del scene
     period, size = float(rng.uniform(0.15, 0.6)), 1.0 + 0.2 * rng.standard_normal((units, 1, 3))
     phase = rng.uniform(0.0, 2.0 * np.pi, (units, 1, 3))
     return lambda s: size * np.sin(2.0 * np.pi * s.output / period + phase)
@@ -191,7 +182,6 @@ def _of_scale(course: Callable[[Any], Floats]) -> Callable[..., Effect]:
     """Scale factors that follow a course in time or temperature, (units, n)."""
 
     def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
-        del scene
         size = _sizes(rng, units)[..., 0]
         return lambda s: size[:, None] * course(s)[..., None] * s.along
 
@@ -202,7 +192,6 @@ def _of_axes(course: Callable[[Any], Floats]) -> Callable[..., Effect]:
     """Axes of each unit that turn by a course in time or temperature, (units, n)."""
 
     def draw(rng: np.random.Generator, units: int, scene: Any) -> Effect:
-        del scene
         size = _sizes(rng, units, 2)
 
         def effect(s: Any) -> Floats:
@@ -218,7 +207,6 @@ def _of_axes(course: Callable[[Any], Floats]) -> Callable[..., Effect]:
 
 def fixture_bends(rng: np.random.Generator, units: int, scene: Any) -> Effect:
     """A fixture of two metals that turns all units by the square of the temperature's distance from that of its assembly."""
-    del units, scene
     way = rng.standard_normal(3)
 
     def effect(s: Any) -> Floats:

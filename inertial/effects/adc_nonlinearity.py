@@ -23,12 +23,10 @@ class AdcNonlinearity(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("period", "g", 0.08, 1.0, "inverse", 90),)
 
     def columns(self, state: State, axis: int, *, period: float, **nonlinear: float) -> Array:
-        del nonlinear
         # sine and cosine by the tangent of half the angle, which numpy computes many at a time: a tenth of their time
         half = np.tan(np.pi * state.converted(axis) / period)
         square = half * half
         return stack(state, [2.0 * half / (1.0 + square), (1.0 - square) / (1.0 + square)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return "INL_sin", "INL_cos"

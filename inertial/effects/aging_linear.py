@@ -21,10 +21,8 @@ class AgingLinear(SensorEffect):
     simplicity: ClassVar[int] = 27
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del axis, nonlinear
         hours = state.time / 3600.0
         return stack(state, [hours])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kt",)

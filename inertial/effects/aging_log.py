@@ -35,12 +35,10 @@ class AgingLog(SensorEffect):
         return (*self.nonlinear, Nonlinear("clock", "", GOES_ON, BEGINS_AGAIN, choices=(GOES_ON, BEGINS_AGAIN)))
 
     def columns(self, state: State, axis: int, *, tau: float, clock: float = GOES_ON, **nonlinear: float) -> Array:
-        del axis, nonlinear
         since = running(state)
         if clock == BEGINS_AGAIN and state.since_power is not None:
             since = state.since_power
         return stack(state, [np.log1p(since / tau)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kl",)

@@ -21,7 +21,6 @@ class AxisNonorthogonality(StationEffect):
     simplicity: ClassVar[int] = 41
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
-        del nonlinear
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         tipped = -np.cos(outer)
         return np.stack([tipped * np.cos(inner), -tipped * np.sin(inner), np.zeros_like(tipped)], axis=-1)[..., None]

@@ -22,7 +22,6 @@ class Backlash(StationEffect):
     simplicity: ClassVar[int] = 43
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
-        del nonlinear
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         force = frames.force_from_angles(outer, inner)
         about_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
@@ -31,7 +30,6 @@ class Backlash(StationEffect):
         return np.stack(sides, axis=-1)
 
     def start_change(self, state: State, **nonlinear: float) -> Array:
-        del nonlinear
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         force = frames.force_from_angles(outer, inner)
         about_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)

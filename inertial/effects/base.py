@@ -95,12 +95,10 @@ class Effect(ABC):
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:
         """Nonlinear parameters with bounds that suit this run (a step lies inside it, a kink inside its temperatures)."""
-        del state
         return self.nonlinear
 
     def constants(self, state: State) -> Mapping[str, float]:
         """What the columns take from the run the model is fitted on (a centre, a range), kept with the coefficients."""
-        del state
         return {}
 
 
@@ -138,12 +136,10 @@ class SensorEffect(Effect):
 
     def names_at(self, axis: int, **nonlinear: float) -> tuple[str, ...]:
         """Names of the coefficients of one axis where constants of the run decide how many there are."""
-        del nonlinear
         return self.names(axis)
 
     def start_columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         """What the state of a memory before the first dwell would add, (..., n, k); k = 0 without memory."""
-        del axis, nonlinear
         return np.zeros((*state.time.shape, 0))
 
 
@@ -162,7 +158,6 @@ class StationEffect(Effect):
 
     def start_change(self, state: State, **nonlinear: float) -> Array:
         """What the state of a memory before the first dwell would add to the force: (..., n, 3, k); k = 0 without memory."""
-        del nonlinear
         return np.zeros((*state.force.shape, 0))
 
 

@@ -22,9 +22,7 @@ class Bias(SensorEffect):
     simplicity: ClassVar[int] = 0
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del axis, nonlinear
         return stack(state, [np.ones_like(state.time)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("K0",)

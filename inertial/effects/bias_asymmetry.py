@@ -23,9 +23,7 @@ class BiasAsymmetry(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("transition", "g", 1e-5, 0.05, "log", 5),)
 
     def columns(self, state: State, axis: int, *, transition: float, **nonlinear: float) -> Array:
-        del nonlinear
         return stack(state, [np.tanh(state.along(axis) / transition)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("K0'",)

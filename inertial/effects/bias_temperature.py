@@ -20,10 +20,8 @@ class BiasTemperature(SensorEffect):
     simplicity: ClassVar[int] = 3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del axis, nonlinear
         theta = state.need("theta", self.id)
         return stack(state, [theta])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kT",)

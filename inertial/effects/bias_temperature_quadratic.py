@@ -21,10 +21,8 @@ class BiasTemperatureQuadratic(SensorEffect):
     after: ClassVar[tuple[str, ...]] = ("bias_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del axis, nonlinear
         theta = state.need("theta", self.id)
         return stack(state, [theta**2])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kT2",)

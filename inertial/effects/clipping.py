@@ -23,10 +23,8 @@ class Clipping(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("full_scale", "g", 0.5, 0.999, "linear", 14),)
 
     def columns(self, state: State, axis: int, *, full_scale: float, **nonlinear: float) -> Array:
-        del nonlinear
         f = state.converted(axis)
         return stack(state, [np.clip(f, -full_scale, full_scale) - f])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("FS",)

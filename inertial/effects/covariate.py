@@ -51,13 +51,11 @@ class Covariate(SensorEffect):
         self, state: State, axis: int, *, centre: float, half_range: float, degree: float, **nonlinear: float
     ) -> Array:
         """A line, and the curved functions of the spline, of the scaled column: (..., n, degree)."""
-        del axis, nonlinear
         z = (state.need(self.column, self.id) - centre) / half_range
         return stack(state, [z, *_natural(z)][: int(degree)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the coefficients."""
-        del axis
         return tuple(f"kc{k + 1}" for k in range(_KNOTS.size - 1)) if self.curve else ("kc1",)
 
     def names_at(self, axis: int, **nonlinear: float) -> tuple[str, ...]:

@@ -42,7 +42,6 @@ class CreepAfterMove(SensorEffect):
 
         tau : s; way : 1 if the force follows the table from pose to pose, 0 if it changes at the end of each move
         """
-        del nonlinear
         since = np.full_like(state.time, 1.0) if state.since_move is None else state.since_move
 
         def left() -> Array:
@@ -52,11 +51,9 @@ class CreepAfterMove(SensorEffect):
         return stack(state, [state.remember((self.id, axis, tau, way), left)])
 
     def start_columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
         return stack(state, [np.exp(-(state.time - state.time[..., :1]) / tau)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kC",)
 
 

@@ -20,7 +20,6 @@ class CrossAxisQuadratic(SensorEffect):
     vanishing: ClassVar[float] = 1e-3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         f, (j, k) = state.force, others(axis)
         return stack(state, [f[..., j] ** 2, f[..., k] ** 2, f[..., j] * f[..., k]])
 

@@ -20,7 +20,6 @@ class CrossCoupling(SensorEffect):
     vanishing: ClassVar[float] = 1e-3
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         f, (j, k) = state.force, others(axis)
         return stack(state, [f[..., axis] * f[..., j], f[..., axis] * f[..., k]])
 

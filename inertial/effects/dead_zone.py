@@ -23,9 +23,7 @@ class DeadZone(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("width", "g", 1e-5, 0.5, "log", 12),)
 
     def columns(self, state: State, axis: int, *, width: float, **nonlinear: float) -> Array:
-        del nonlinear
         return stack(state, [-np.clip(state.converted(axis), -width, width)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("DZ",)

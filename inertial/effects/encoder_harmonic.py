@@ -26,7 +26,6 @@ class EncoderHarmonic(StationEffect):
     )
 
     def force_change(self, state: State, *, harmonic: float, inner_axis: float, **nonlinear: float) -> Array:
-        del nonlinear
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         if inner_axis:
             force, angle = frames.force_from_angles(outer, inner), inner

@@ -54,12 +54,10 @@ class Formula(SensorEffect):
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         """The formulas at every dwell, (..., n, p)."""
-        del nonlinear
         return stack(state, [formula.values(state, axis) for formula in self.formulas])
 
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the coefficients."""
-        del axis
         if len(self.formulas) == 1:
             return (self.symbol,)
         return tuple(f"{self.symbol}{k + 1}" for k in range(len(self.formulas)))

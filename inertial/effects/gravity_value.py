@@ -19,7 +19,6 @@ class GravityValue(StationEffect):
     simplicity: ClassVar[int] = 37
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
-        del nonlinear
         return state.force[..., None]
 
     def names(self) -> tuple[str, ...]:

@@ -25,7 +25,6 @@ class LevelError(StationEffect):
     simplicity: ClassVar[int] = 40
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
-        del nonlinear
         if state.outer is None and state.heading is not None:
             return np.stack(frames.horizontal(state.force, state.heading), axis=-1)
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)

@@ -26,12 +26,10 @@ class Magnetic(SensorEffect):
     simplicity: ClassVar[int] = 45
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del axis, nonlinear
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         north = frames.to_fixture((1.0, 0.0, 0.0), outer, inner)
         east = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
         return np.concatenate([north[..., :2], east], axis=-1)
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return (*(f"B1{a}" for a in AXES[:2]), *(f"B2{a}" for a in AXES))

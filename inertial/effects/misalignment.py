@@ -19,7 +19,6 @@ class Misalignment(SensorEffect):
     simplicity: ClassVar[int] = 2
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         j, k = others(axis)
         return stack(state, [state.force[..., j], state.force[..., k]])
 

@@ -19,7 +19,6 @@ class MisalignmentTemperature(SensorEffect):
     simplicity: ClassVar[int] = 8
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         theta = state.need("theta", self.id)
         j, k = others(axis)
         return stack(state, [theta * state.force[..., j], theta * state.force[..., k]])

@@ -20,7 +20,6 @@ class OuterEncoderOffset(StationEffect):
     simplicity: ClassVar[int] = 39
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
-        del nonlinear
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         turned = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
         return turned[..., None]

@@ -31,18 +31,15 @@ class PoseHysteresis(SensorEffect):
     )
 
     def columns(self, state: State, axis: int, *, half_width: float, kept: float, **nonlinear: float) -> Array:
-        del nonlinear
         if not kept:
             return stack(state, [np.tanh(state.force_step[..., axis] / half_width)])
         inside = state.remember((self.id, axis, half_width), lambda: operators.play(state.force[..., axis], half_width))
         return stack(state, [inside])
 
     def start_columns(self, state: State, axis: int, *, half_width: float, kept: float, **nonlinear: float) -> Array:
-        del nonlinear
         first = np.zeros(state.time.shape)
         first[..., 0] = 1.0
         return stack(state, [operators.play_memory(state.force[..., axis], half_width) if kept else first])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kP",)

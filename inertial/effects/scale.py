@@ -19,10 +19,8 @@ class Scale(SensorEffect):
     simplicity: ClassVar[int] = 1
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         f = state.force[..., axis]
         return stack(state, [f])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("K1",)

@@ -21,10 +21,8 @@ class ScaleAging(SensorEffect):
     sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         hours = state.time / 3600.0
         return stack(state, [hours * state.along(axis)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("K1t",)

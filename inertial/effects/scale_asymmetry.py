@@ -22,10 +22,8 @@ class ScaleAsymmetry(SensorEffect):
     sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         f = state.along(axis)
         return stack(state, [np.abs(f)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("K1'",)

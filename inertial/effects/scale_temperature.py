@@ -20,10 +20,8 @@ class ScaleTemperature(SensorEffect):
     sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         theta = state.need("theta", self.id)
         return stack(state, [theta * state.along(axis)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("aT",)

@@ -21,10 +21,8 @@ class ScaleTemperatureQuadratic(SensorEffect):
     after: ClassVar[tuple[str, ...]] = ("scale_temperature",)
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         theta = state.need("theta", self.id)
         return stack(state, [theta**2 * state.along(axis)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("aT2",)

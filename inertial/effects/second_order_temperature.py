@@ -20,11 +20,9 @@ class SecondOrderTemperature(SensorEffect):
     sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         theta = state.need("theta", self.id)
         f = state.along(axis)
         return stack(state, [theta * f**2])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("K2T",)

@@ -20,7 +20,6 @@ class SlotRotation(SensorEffect):
     scope: ClassVar[Scope] = "slot"
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         j, k = others(axis)
         return stack(state, [state.force[..., k], -state.force[..., j]])
 

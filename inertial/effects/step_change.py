@@ -27,11 +27,9 @@ class StepChange(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("instant", "s", 0.0, 1.0, "linear", 40),)
 
     def columns(self, state: State, axis: int, *, instant: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
         return stack(state, [(state.time > instant).astype(float)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kS",)
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:

@@ -25,12 +25,10 @@ class SupplySensitivity(SensorEffect):
     primary: ClassVar[int | None] = 1
 
     def columns(self, state: State, axis: int, *, nominal: float, **nonlinear: float) -> Array:
-        del nonlinear
         change = state.need("supply", self.id) - nominal
         return stack(state, [change, change * state.along(axis)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return "kV", "K1V"
 
     def constants(self, state: State) -> Mapping[str, float]:

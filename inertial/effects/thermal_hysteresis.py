@@ -28,25 +28,20 @@ class ThermalHysteresis(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("half_width", "K", 1.0, 60.0, "log", 10),)
 
     def columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
         return stack(state, [self._inside(state, half_width), self._inside(state, _NARROW * half_width)])
 
     def _inside(self, state: State, half_width: float) -> Array:
         def hysteresis(time: Array, temperature: Array) -> Array:
-            del time
             return operators.play(temperature, half_width)
 
         return state.temperature_operator((self.id, half_width), hysteresis)
 
     def start_columns(self, state: State, axis: int, *, half_width: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
 
         def memory(time: Array, temperature: Array) -> Array:
-            del time
             return operators.play_memory(temperature, half_width)
 
         return stack(state, [state.temperature_operator((self.id, "start", half_width), memory)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return "kH", "kH2"

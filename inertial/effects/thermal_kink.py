@@ -29,14 +29,12 @@ class ThermalKink(SensorEffect):
     )
 
     def columns(self, state: State, axis: int, *, centre: float, width: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
         temperature = state.need("temperature", self.id)
         above = (temperature - centre) / width
         # np.logaddexp takes ten times as long
         return stack(state, [width * (np.maximum(above, 0.0) + np.log1p(np.exp(-np.abs(above))))])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kK",)
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:

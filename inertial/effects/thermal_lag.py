@@ -27,7 +27,6 @@ class ThermalLag(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 5.0, 3000.0, "log", 14),)
 
     def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
 
         def lag(time: Array, temperature: Array) -> Array:
             return operators.first_order_lag(time, temperature, tau) - temperature
@@ -36,9 +35,7 @@ class ThermalLag(SensorEffect):
         return stack(state, [behind, behind * (state.need("theta", self.id))])
 
     def start_columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
         return stack(state, [np.exp(-(state.time - state.time[..., :1]) / tau)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return "kL", "kL2"

@@ -23,7 +23,6 @@ class ThermalRate(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("settling", "s", 4.0, 60.0, "log", 4),)
 
     def columns(self, state: State, axis: int, *, settling: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
 
         def rate(time: Array, temperature: Array) -> Array:
             return 60.0 * (temperature - operators.first_order_lag(time, temperature, settling)) / settling
@@ -31,5 +30,4 @@ class ThermalRate(SensorEffect):
         return stack(state, [state.temperature_operator((self.id, settling), rate)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kR",)

@@ -20,10 +20,8 @@ class ThirdOrder(SensorEffect):
     sharp: ClassVar[bool] = True
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del nonlinear
         f = state.along(axis)
         return stack(state, [f**3])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("K3",)

@@ -21,10 +21,8 @@ class VibrationRectification(SensorEffect):
     simplicity: ClassVar[int] = 34
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
-        del axis, nonlinear
         vibration = state.need("vibration", self.id)
         return stack(state, [vibration**2])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("VRE",)

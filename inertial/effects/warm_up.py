@@ -24,10 +24,8 @@ class WarmUp(SensorEffect):
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("tau", "s", 10.0, 7200.0, "log", 14),)
 
     def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
-        del axis, nonlinear
         since = since_first(state) if state.since_power is None else state.since_power
         return stack(state, [coldness(state, tau) * np.exp(-since / tau)])
 
     def names(self, axis: int) -> tuple[str, ...]:
-        del axis
         return ("kW",)

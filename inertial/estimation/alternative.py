@@ -58,7 +58,6 @@ class Handling(Effect):
 
     def looks(self, lot: "Lot", places: int) -> int:
         """Number of places that are paid for: those of the search, unless residuals have chosen them among more."""
-        del lot
         return places
 
     @abstractmethod
@@ -76,7 +75,6 @@ class Handling(Effect):
 
     def possible(self, size: Array) -> bool:
         """Whether coefficients (k,) are possible for the alternative; others have another cause of the same shape."""
-        del size
         return True
 
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
@@ -89,22 +87,18 @@ class Handling(Effect):
 
     def placed(self, lot: "Lot", **place: float) -> dict[str, float]:
         """The place once more in a lot with the dwells that were left out of the search."""
-        del lot
         return place
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """The lot without it; None if only its term in the model removes it."""
-        del lot, size, place
         return None
 
     def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
         """The same if it needs more than the coefficients: ``misfit`` is the misfit of the model on a lot of some units."""
-        del misfit
         return self.mended(lot, size, **place)
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:
         """Places of the affected dwells: the first after a change, or each one that is wrong."""
-        del lot
         return [int(place["dwell"])] if "dwell" in place else []
 
     def units(self, **place: float) -> tuple[int, ...]:

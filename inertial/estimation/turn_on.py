@@ -23,14 +23,12 @@ class TurnOnBias(SensorEffect):
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         """A step at every power-on but the first, (..., n, p)."""
-        del axis, nonlinear
         dwell = np.arange(state.time.shape[-1])
         steps = [np.broadcast_to((dwell >= k).astype(float), state.time.shape) for k in switched(state)]
         return stack(state, steps) if steps else np.zeros((*state.time.shape, 0))
 
     def names(self, axis: int) -> tuple[str, ...]:
         """Its one name."""
-        del axis
         return ("kP",)
 
 

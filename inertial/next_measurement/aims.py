@@ -192,7 +192,6 @@ class Sighting:
 
     def worth(self, steps: Sequence[SequenceStep], pace: StationPace, *, fine: bool = False) -> float:
         """Mean share over the effects of the required chi-square."""
-        del fine
         return float(np.mean(np.minimum(self.shown(steps, pace) / _SHOWN, 1.0)))
 
     def shown(self, steps: Sequence[SequenceStep], pace: StationPace) -> Array:

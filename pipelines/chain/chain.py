@@ -115,7 +115,6 @@ def _fit(job: Job, run: Run) -> Tables:
 
 
 def _verify(job: Job, run: Run) -> Tables:
-    del job
     coefficients, covariance, predictions = (run.table(name) for name in _VERIFIED[2:])
     return verify_tables(_lot(run), coefficients, covariance, predictions)
 
@@ -128,7 +127,6 @@ def static_inputs(run: Run) -> tuple[Iterable[pd.DataFrame], *tuple[pd.DataFrame
 
 
 def _noise(job: Job, run: Run) -> Tables:
-    del job
     return noise(*static_inputs(run))
 
 
@@ -169,7 +167,6 @@ def _listed(job: Job) -> dict[str, Any]:
 
 
 def _none(job: Job) -> dict[str, Any]:
-    del job
     return {}
 
 

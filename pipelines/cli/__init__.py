@@ -108,7 +108,6 @@ class _Commands(TyperGroup):
 
     def list_commands(self, ctx: Context) -> list[str]:
         """Names of the commands."""
-        del ctx
         return [*COMMANDS]  # after its import the module cli.list hides the built-in ``list`` here
 
     def resolve_command(self, ctx: Context, args: list[str]) -> tuple[str | None, Command | None, list[str]]:
@@ -119,7 +118,6 @@ class _Commands(TyperGroup):
 
     def get_command(self, ctx: Context, cmd_name: str) -> Command | None:
         """The command of this name."""
-        del ctx
         return _OnDemand(cmd_name) if cmd_name in COMMANDS else None
 
 
@@ -166,7 +164,6 @@ def _product(
     ] = False,
 ) -> None:
     """Calibrate accelerometers in production: measure, fit, judge the model, grade, with traceable results."""
-    del log, version  # their callbacks have done it
 
 
 def main() -> None:

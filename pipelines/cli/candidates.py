@@ -89,7 +89,6 @@ def _recipes(ctx: Context) -> list[str]:
 def _limits(ctx: Context) -> list[str]:
     from pipelines.jobs.recipes import limits_names
 
-    del ctx
     return [*limits_names(), *_files("*.toml")]
 
 
@@ -97,14 +96,12 @@ def _stations(ctx: Context) -> list[str]:
     from schemas.own_files import own_names
     from schemas.station import BUILT_IN
 
-    del ctx
     return [BUILT_IN, *own_names("stations"), *_files("*.toml")]
 
 
 def _effects(ctx: Context) -> list[str]:
     from inertial.effects import catalogue
 
-    del ctx
     return list(catalogue())
 
 
@@ -116,35 +113,30 @@ def _effects_with_value(ctx: Context) -> list[str]:
 def _hidden(ctx: Context) -> list[str]:
     from pipelines.demo.scenes import SCENES
 
-    del ctx
     return ["random", *(scene.kind for scene in SCENES)]
 
 
 def _presets(ctx: Context) -> list[str]:
     from stations.plant.preset import preset_names
 
-    del ctx
     return preset_names()
 
 
 def _profiles(ctx: Context) -> list[str]:
     from stations.profile_files import profile_names
 
-    del ctx
     return profile_names()
 
 
 def _faults(ctx: Context) -> list[str]:
     from stations.plant.faults.catalogue import kinds
 
-    del ctx
     return list(kinds())
 
 
 def _formats(ctx: Context) -> list[str]:
     from pipelines.export import FORMATS
 
-    del ctx
     return list(FORMATS)
 
 
@@ -157,7 +149,6 @@ def _tables(ctx: Context) -> list[str]:
 def _subjects(ctx: Context) -> list[str]:
     from pipelines.cli.keys import SUBJECTS
 
-    del ctx
     return list(SUBJECTS)
 
 

@@ -118,14 +118,12 @@ def _approval(
 
     def at_the_terminal(quiet: Callable[[], AbstractContextManager[None]]) -> Approval:
         def ask(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
-            del joint
             with quiet():
                 return _question(inquiry, follow_up)
 
         return ask
 
     def nobody(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
-        del inquiry, joint, follow_up
         return "nobody"
 
     if yes:

@@ -76,7 +76,6 @@ class _Kept:
 
     def part(self, record: int, number: int, samples: pd.DataFrame) -> None:
         """Store a part of a record."""
-        del record, number
         self.samples.append(samples)
 
     def put(
@@ -89,7 +88,6 @@ class _Kept:
         parts: int = 0,
     ) -> None:
         """Store one record."""
-        del record, station_state, parts
         self.samples.append(samples)
         self.readings.append(readings)
         self.history.append(history)

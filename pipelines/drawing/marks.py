@@ -101,7 +101,6 @@ def marks(x: Array, y: Array, trace: Trace, colour: str, wider: float = 0.0) -> 
 
 
 def _line(trace: Trace, place: Place, scale: ColourScale | None) -> str:
-    del scale
     x, y = place.x(trace.x), place.y(trace.y)
     whole = np.isfinite(x + y) & (np.abs(place.across(trace.x) - 0.5) <= 0.5 + INSIDE) & ~_far_outside(place, trace.y)
     path, pen = "", "M"
@@ -120,7 +119,6 @@ def _far_outside(place: Place, y: Array) -> NDArray[np.bool_]:
 
 
 def _band(trace: Trace, place: Place, scale: ColourScale | None) -> str:
-    del scale
     high = np.asarray(trace.high)
     there = np.isfinite(trace.x + trace.y + high)
     x = place.x(trace.x[there])
@@ -130,7 +128,6 @@ def _band(trace: Trace, place: Place, scale: ColourScale | None) -> str:
 
 
 def _bars(trace: Trace, place: Place, scale: ColourScale | None) -> str:
-    del scale
     there = np.isfinite(trace.x + trace.y)
     at, value = trace.x[there], trace.y[there]
     apart = float(np.min(np.diff(np.sort(at)))) if at.size > 1 else 1.0
@@ -144,7 +141,6 @@ def _bars(trace: Trace, place: Place, scale: ColourScale | None) -> str:
 
 def _density(trace: Trace, place: Place, scale: ColourScale | None) -> str:
     """Cells in four shades of grey by the logarithm of their count."""
-    del scale
     counts = np.asarray(trace.counts, dtype=float)
     if not counts.any():
         return ""
@@ -163,7 +159,6 @@ def _density(trace: Trace, place: Place, scale: ColourScale | None) -> str:
 
 
 def _labels(trace: Trace, place: Place, scale: ColourScale | None) -> str:
-    del scale
     x, y = place.x(trace.x), place.y(trace.y)
     look = f'font-size="11" fill="{ROLES[trace.role]}"'
     anchors = trace.anchors or ("center",) * len(trace.texts)

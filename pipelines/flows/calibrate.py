@@ -59,7 +59,6 @@ def listening(
 
 def _worth_repeating(task_: Any, task_run: Any, state: Any) -> bool:
     """Whether a stage failed because of a link or device that may recover; finished records are not measured again."""
-    del task_, task_run
     try:
         state.result()
     except NotReached:  # the stage has already run for hours

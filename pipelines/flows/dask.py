@@ -25,7 +25,6 @@ _work: list[tuple[Callable[[Any], Any], Sequence[Any]]] = []
 @task(task_run_name="{label}", cache_policy=NO_CACHE, persist_result=False)
 def partition(label: str, function: Callable[[Any], Any], part: Any) -> Any:
     """The result of the function for one partition, on any worker."""
-    del label
     return in_one_thread(function, part)
 
 

@@ -40,7 +40,6 @@ class PausedApproval:
 
     def __call__(self, inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
         """Wait for the answer, without a limit of time."""
-        del joint
         why = "; ".join(follow_up.why)
         text = f"measure {follow_up.minutes:.1f} min more ({inquiry.budget - inquiry.spent:.1f} min are left): {why}"
         return self.paused.ask(Prompt("approve", inquiry.lineage.ids[0], text))

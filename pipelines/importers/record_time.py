@@ -67,7 +67,6 @@ def seconds(
         labels = columns["dwell"].astype(str).tolist()
         backwards(time, labels, where, together=False)
         return _continued(clock)
-    del breaks
     backwards(time, [""] * len(time), where, together=False)
     if len(time) < 2 or time[-1] <= time[0]:
         found = "1 sample" if len(time) < 2 else f"{len(time)} samples, all at {columns['time'].iloc[0]:g} s"

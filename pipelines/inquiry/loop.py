@@ -44,7 +44,6 @@ class Approval(Protocol):
 
 def always(inquiry: Inquiry, joint: JointDiagnosis, follow_up: FollowUp) -> Consent:
     """Approval of every follow-up within the budget."""
-    del inquiry, joint, follow_up
     return "go"
 
 

@@ -32,16 +32,13 @@ def application(monitor: Monitor) -> Starlette:
     """The application; its numbers contain no serial number, and no request changes anything."""
 
     def metrics(request: Request) -> Response:
-        del request
         return Response(text(monitor.snapshot()), media_type=CONTENT_TYPE)
 
     def health(request: Request) -> Response:
-        del request
         document = monitor.snapshot().document()
         return JSONResponse(dict(document), 200 if document["ok"] else UNHEALTHY)
 
     def live(request: Request) -> Response:
-        del request
         return PlainTextResponse("alive\n")
 
     return Starlette(routes=[Route("/metrics", metrics), Route("/healthz", health), Route("/livez", live)])

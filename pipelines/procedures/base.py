@@ -243,7 +243,6 @@ class InG(Procedure):
 
     def check(self, part: NominalScale, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a list without a scale."""
-        del station
         part.require_scale(recipe)
 
 

@@ -69,7 +69,6 @@ class BiasStability(InG, Evaluated):
 
     def steps(self, part: BiasStabilityPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record."""
-        del recipe
         pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
         return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
 
@@ -136,7 +135,6 @@ class BiasStability(InG, Evaluated):
 
     def chart(self, part: BiasStabilityPart, points: pd.DataFrame) -> Chart:
         """Means of 10 s and of 100 s of every axis over time, each about its mean."""
-        del part
         short: list[Trace] = []
         long: list[Trace] = []
         for axis in AXES:

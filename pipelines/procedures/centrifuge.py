@@ -143,7 +143,6 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
 
     def steps(self, part: CentrifugePart, recipe: Recipe) -> list[ProcedureStep]:
         """One record at each speed: up, down again, then the same with the units reversed, and all at the next radius."""
-        del recipe
         way = [*part.forces_g, *(part.forces_g[-2::-1] if part.down_again else ())]
         pose = Pose(name="centrifuge", outer_deg=0.0, inner_deg=0.0)
         return [
@@ -189,7 +188,6 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
 
     def evaluate(self, part: CentrifugePart, points: pd.DataFrame, device: Device) -> Outcome:
         """Coefficients of every unit; the whole polynomial where the input is reversed."""
-        del device
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):

@@ -30,7 +30,6 @@ class MultiPosition(Procedure):
 
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
         """Per temperature the poses of the fit, then those for verification."""
-        del part
         steps: list[ProcedureStep] = []
         for soak, temperature in enumerate(recipe.temperatures_C):
             poses, waits, settled = recipe.poses_at(soak), recipe.waits_at(soak), recipe.settles_at(soak)

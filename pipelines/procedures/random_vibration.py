@@ -92,7 +92,6 @@ class RandomVibration(InG, OnEquipment, Evaluated):
 
     def steps(self, part: RandomVibrationPart, recipe: Recipe) -> list[ProcedureStep]:
         """One recording at each level."""
-        del recipe
         pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
         return [
             ProcedureStep(
@@ -145,7 +144,6 @@ class RandomVibration(InG, OnEquipment, Evaluated):
 
     def evaluate(self, part: RandomVibrationPart, points: pd.DataFrame, device: Device) -> Outcome:
         """Slope over g rms², its straightness tested; none where samples are clipped, which imitates it."""
-        del device
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
         name = "vibration_rectification_ug_g2"

@@ -108,7 +108,6 @@ class Ratiometry(SetsEquipment, Evaluated):
 
     def steps(self, part: RatiometryPart, recipe: Recipe) -> list[ProcedureStep]:
         """Both faces of every axis, at each voltage."""
-        del recipe
         return [
             ProcedureStep(
                 f"{volt:g} V, {axis} {side}",
@@ -127,7 +126,6 @@ class Ratiometry(SetsEquipment, Evaluated):
 
     def check(self, part: RatiometryPart, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a voltage that the supply does not have."""
-        del recipe
         command = profile_of(station.fitted()["power_supply"]).command("voltage")
         low, high = command.minimum or 0.0, command.maximum or np.inf
         for volt in part.supplies_V:
@@ -161,7 +159,6 @@ class Ratiometry(SetsEquipment, Evaluated):
                     }
                     | noise_columns(noise)
                 )  # fmt: skip
-        del part, device
         return point_table(rows)
 
     def evaluate(self, part: RatiometryPart, points: pd.DataFrame, device: Device) -> Outcome:

@@ -105,7 +105,6 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
         """The bias, the shocks, the bias again."""
-        del recipe
         still = Pose(name="bias", outer_deg=0.0, inner_deg=0.0)
         machine = Pose(name="shock", outer_deg=0.0, inner_deg=0.0)
         signs = (1.0, -1.0) if part.both_directions else (1.0,)
@@ -172,7 +171,6 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         """Figures of every unit, and whether it has survived."""
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
-        del device
         for unit, rows in points.groupby("unit", sort=False):
             name = str(unit)
             ratio = rows[rows["series"] == "ratio"]

@@ -30,12 +30,10 @@ class StaticRecord(Procedure):
 
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
         """One record."""
-        del part
         return [ProcedureStep("static", recipe.static_pose, recipe.static_temperature_C, "allan")]
 
     def check(self, part: Any, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a record without a duration."""
-        del part, station
         if recipe.static_record_s <= 0.0:
             raise RecipeInvalid(
                 "recipe: procedures lists static_record and static_record_s is 0 s, a duration is needed; set static_record_s",

@@ -81,7 +81,6 @@ class StepResponse(OnEquipment, FromWaveforms):
 
     def steps(self, part: StepPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record for each step."""
-        del recipe
         pose = Pose(name="step", outer_deg=0.0, inner_deg=0.0)
         hold = 1e-3 * part.hold_ms
         return [
@@ -122,7 +121,6 @@ class StepResponse(OnEquipment, FromWaveforms):
 
     def evaluate(self, part: StepPart, points: pd.DataFrame, device: Device) -> Outcome:
         """The figures of the worst axis of every unit."""
-        del device
         figures: dict[str, list[FigureValue]] = {}
         findings: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):

@@ -77,7 +77,6 @@ class Sweep(OnEquipment, FromWaveforms):
 
     def steps(self, part: SweepPart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell for each point."""
-        del recipe
         pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
         return [
             ProcedureStep(
@@ -93,7 +92,6 @@ class Sweep(OnEquipment, FromWaveforms):
 
     def check(self, part: SweepPart, recipe: Recipe, station: StationConfig) -> None:
         """Refuse a part without a scale to compare the sensitivity with."""
-        del station
         if part.nominal_scale is None and not recipe.tumbles:
             raise RecipeInvalid(
                 "recipe: procedure sweep has no scale to compare the sensitivity with; set nominal_scale (output per g), or list "

@@ -90,7 +90,6 @@ class Tilt(Evaluated):
 
     def steps(self, part: TiltPart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell at each angle, in order of angle."""
-        del recipe
         inner = 0.0 if part.about == "x" else 90.0
         steps: list[ProcedureStep] = []
         for k in range(round(360.0 / part.step_deg)):
@@ -120,12 +119,10 @@ class Tilt(Evaluated):
                     }
                     for i, axis in enumerate(AXES)
                 ]
-        del device, part
         return points(rows)
 
     def evaluate(self, part: TiltPart, points: pd.DataFrame, device: Device) -> Outcome:
         """Figures of the axes in the plane, and what the plane leaves open."""
-        del device
         figures: dict[str, list[FigureValue]] = {}
         largest: list[Finding] = []
         for unit, rows in points.groupby("unit", sort=False):

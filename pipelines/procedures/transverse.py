@@ -92,7 +92,6 @@ class TransverseTest(InG, OnEquipment, Evaluated):
 
     def steps(self, part: TransversePart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell at each angle."""
-        del recipe
         pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
         return [
             ProcedureStep(

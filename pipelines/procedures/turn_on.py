@@ -67,7 +67,6 @@ class TurnOn(InG, Evaluated):
 
     def steps(self, part: TurnOnPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record per cycle."""
-        del recipe
         return [
             ProcedureStep(
                 f"cycle {k + 1}",
@@ -99,7 +98,6 @@ class TurnOn(InG, Evaluated):
 
     def evaluate(self, part: TurnOnPart, points: pd.DataFrame, device: Device) -> Outcome:
         """Scatter of the worst axis, and its upper limit: few cycles cannot pass a limit close to the estimate."""
-        del device, part
         figures: dict[str, list[FigureValue]] = {}
         for unit, rows in points.groupby("unit", sort=False):
             value, upper = list[FigureValue](), list[FigureValue]()
@@ -126,7 +124,6 @@ class TurnOn(InG, Evaluated):
 
     def chart(self, part: TurnOnPart, points: pd.DataFrame) -> Chart:
         """Mean of every cycle about the mean of all, with the standard deviation of each axis."""
-        del part
         traces: list[Trace] = []
         for k, axis in enumerate(AXES):
             own = points[points["axis"] == axis]

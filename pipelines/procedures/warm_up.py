@@ -66,7 +66,6 @@ class WarmUp(InG, Evaluated):
 
     def steps(self, part: WarmUpPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record directly after power-on."""
-        del recipe
         pose = Pose(name="warm-up", outer_deg=0.0, inner_deg=0.0)
         step = ProcedureStep(
             pose.name,
@@ -101,7 +100,6 @@ class WarmUp(InG, Evaluated):
 
     def evaluate(self, part: WarmUpPart, points: pd.DataFrame, device: Device) -> Outcome:
         """The time of the slowest axis; not determined where the record ends too soon, or noise alone exceeds the band."""
-        del device
         figures: dict[str, list[FigureValue]] = {}
         for unit, rows in points.groupby("unit", sort=False):
             figures[str(unit)] = [

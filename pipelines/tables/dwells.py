@@ -243,7 +243,6 @@ def _white_error(readings: Readings, scale: Array, output: Array) -> Array:
         typical = np.nanmedian(np.where(error > 0.0, error, np.nan), axis=1, keepdims=True)
         typical = np.where(np.isfinite(typical), typical, np.nanmax(typical) if np.isfinite(typical).any() else 1e-6)
         return np.where(np.isfinite(error) & (error > 0.2 * typical), error, typical)
-    del output
     spread = np.sqrt(np.nanmean(readings.misfit**2, axis=1, keepdims=True))
     pooled = np.sqrt(np.mean(spread**2, axis=0, keepdims=True))
     return np.broadcast_to(np.maximum(pooled, 1e-12), readings.output.shape)

@@ -41,7 +41,6 @@ def create_app(settings: WorkbenchSettings, ending: Callable[[], bool] = lambda:
 
     @asynccontextmanager
     async def life(app: FastAPI) -> AsyncGenerator[None]:
-        del app
         yield
         bench.jobs.close()
         if settings.pause_lots:
@@ -76,7 +75,6 @@ def _not_there(request: Request, problem: Exception) -> Response:
 
 
 def _not_readable(request: Request, problem: Exception) -> Response:
-    del problem  # it would give the body back
     return _answer(
         request, "request: its body or a parameter cannot be read, a JSON object is needed; reload the page", 422
     )

@@ -181,7 +181,6 @@ def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
 
 @lru_cache(maxsize=48)
 def _table(archive: str, run: str, name: str, when: int) -> pd.DataFrame:
-    del when
     return Archive(archive).run(run).table(name)
 
 

@@ -123,7 +123,6 @@ def test_a_serial_answer_that_comes_late_is_heard_out_before_the_next_question(m
 
 
 def unheard(data):
-    del data
     return b""
 
 

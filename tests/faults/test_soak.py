@@ -217,7 +217,6 @@ class Soak:
 
     def disk_fills(self, chance: random.Random) -> None:
         """The disk of the archive is full for some seconds."""
-        del chance
         filler = self.folder / "disk" / "filler"
         with filler.open("wb") as file:
             try:

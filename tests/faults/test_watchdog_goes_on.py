@@ -39,24 +39,20 @@ def killed(process):
 
 def full_disk(state, pids):
     """No byte can be written to any file by these processes, as where the disk is full."""
-    del state
     for pid in pids:
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (0, 0))
 
 
 def folder_gone(state, pids):
-    del pids
     shutil.rmtree(state)
 
 
 def folder_in_the_way(state, pids):
-    del pids
     shutil.rmtree(state)
     state.write_text("no folder")
 
 
 def torn_notes(state, pids):
-    del pids
     for path in (state / "leases").glob("*.json"):
         path.write_text('{"token": "12')
 

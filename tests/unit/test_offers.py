@@ -33,7 +33,6 @@ class Told:
         self.all = [StepSequence(kind, (step,) * (k + 1)) for k, kind in enumerate(self.kinds)]
 
     def offers(self, held: Sequence[SequenceStep]) -> list[StepSequence]:
-        del held
         return self.all
 
     def minutes(self, chosen: Sequence[StepSequence]) -> float:

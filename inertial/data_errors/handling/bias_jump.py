@@ -51,13 +51,11 @@ class BiasJump(Handling):
 
     def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """The same for every unit."""
-        del slope
         column = np.zeros((1, lot.state.time.shape[1], len(AXES), 1))
         column[0, :, int(place["axis"]), 0] = after(lot, place["dwell"])
         return column
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The axis and the change."""
-        del lot
         axis = AXES[int(place["axis"])]
         return f"the bias of axis {axis} of the unit changed by {1e6 * size[0]:+.0f} µg; measure the unit once more"

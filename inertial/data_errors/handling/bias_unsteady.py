@@ -42,7 +42,6 @@ class BiasUnsteady(Handling):
 
     def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """The same for every unit."""
-        del slope
         soak = soaks(lot.state)
         column = np.zeros((1, soak.size, len(AXES), int(soak.max())))
         column[0, :, int(place["axis"])] = soak[:, None] == np.arange(1, int(soak.max()) + 1)

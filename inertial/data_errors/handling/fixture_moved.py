@@ -24,12 +24,10 @@ class FixtureMoved(Handling):
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Three rotations, the same for all units."""
-        del slope
         return rotated_force(lot) * after(lot, place["dwell"])[:, None, None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The angle and its axis."""
-        del lot, place
         angle = float(np.linalg.norm(size))
         way = ", ".join(f"{v:+.2f}" for v in size / max(angle, 1e-30))
         return f"all units turned by {1e3 * angle:.3f} mrad about ({way}) of the fixture; tighten it and repeat"

@@ -27,16 +27,13 @@ class GainStep(Handling):
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """The force of the unit."""
-        del slope
         force = np.broadcast_to(lot.state.force, (*lot.state.time.shape, 3))[int(place["unit"])]
         return (force * after(lot, place["dwell"])[:, None])[None, ..., None]
 
     def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """The force."""
-        del slope
         return (common_force(lot) * after(lot, place["dwell"])[:, None])[..., None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The change."""
-        del lot, place
         return f"all scale factors of the unit changed by {1e6 * size[0]:+.0f} ppm; look at its supply and reader"

@@ -42,7 +42,6 @@ class NotSoaked(Handling):
 
     def near(self, lot: "Lot", **place: float) -> list[dict[str, float]]:
         """Time constants up to the neighbours in :meth:`places`."""
-        del lot
         step = (_SLOWEST / _FASTEST) ** (1.0 / (_GRID - 1))
         return [{**place, "tau": place["tau"] * step**x} for x in np.linspace(-1.0, 1.0, _BETWEEN)]
 
@@ -64,7 +63,6 @@ class NotSoaked(Handling):
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The time constant."""
-        del size
         behind = np.abs(_temperature(lot.state, place["tau"]) - _temperature(lot.state, 0.0))
         alone = "unit" in place
         behind = behind[int(place["unit"])] if alone else behind
@@ -77,7 +75,6 @@ class NotSoaked(Handling):
         """With the temperatures of the devices in place of the readings, each unit's time constant found by its own dwells."""
         from scipy.optimize import minimize_scalar  # noqa: PLC0415  # a quarter of a second, and few lots need it
 
-        del size
         each = np.zeros(lot.state.time.shape[0])
         middle, reach = float(np.log(place["tau"])), float(np.log(_SPREAD))
         for unit in [int(place["unit"])] if "unit" in place else range(each.size):

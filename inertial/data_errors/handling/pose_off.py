@@ -30,19 +30,16 @@ class PoseOff(Handling):
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Errors of the two angles in the dwells of one pose."""
-        del slope
         return tilts(lot.state) * (poses(lot) == int(place["pose"]))[:, None, None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
-        del lot, place
         angles = np.degrees(size)
         off = f"about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner)"
         return f"the pose was off by {off} every time; its dwells are left out"
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """Without the dwells of the pose."""
-        del size
         return without(lot, self.dwells(lot, **place))
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:

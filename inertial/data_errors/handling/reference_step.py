@@ -22,10 +22,8 @@ class ReferenceStep(Handling):
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """The force."""
-        del slope
         return (common_force(lot) * after(lot, place["dwell"])[:, None])[..., None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The change."""
-        del lot, place
         return f"the scale factors of all units changed by {1e6 * size[0]:+.0f} ppm; look at the reader's reference"

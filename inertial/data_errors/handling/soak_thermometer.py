@@ -35,7 +35,6 @@ class SoakThermometer(Exchangeable):
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
-        del lot
         return f"the thermometers read {self.short(size, **place)}; the readings are corrected by it"
 
     def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:

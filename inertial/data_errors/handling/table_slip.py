@@ -24,11 +24,9 @@ class TableSlip(Handling):
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Errors of the two angles."""
-        del slope
         return tilts(lot.state) * after(lot, place["dwell"])[:, None, None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
-        del lot, place
         off = f"{1e3 * size[0]:+.3f} mrad (outer) and {1e3 * size[1]:+.3f} mrad (inner)"
         return f"the table's angles changed by {off}; home it and repeat"

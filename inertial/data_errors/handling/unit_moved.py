@@ -28,18 +28,15 @@ class UnitMoved(Handling):
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Three rotations of one unit."""
-        del slope
         force = np.broadcast_to(lot.state.force, (*lot.state.time.shape, 3))[int(place["unit"])]
         return (turns(force) * after(lot, place["dwell"])[:, None, None])[None]
 
     def of_each_unit(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Three rotations."""
-        del slope
         return rotated_force(lot) * after(lot, place["dwell"])[:, None, None]
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The angle and its axis."""
-        del lot, place
         angle = float(np.linalg.norm(size))
         way = ", ".join(f"{v:+.2f}" for v in size / max(angle, 1e-30))
         return f"the unit turned by {1e3 * angle:.3f} mrad about ({way}) of the fixture; seat it again and repeat"

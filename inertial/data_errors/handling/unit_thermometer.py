@@ -41,7 +41,6 @@ class UnitThermometer(Exchangeable):
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The offset."""
-        del lot
         return f"the thermometer of the unit reads {self.short(size, **place)}; its readings are corrected by it"
 
     def instead(self, lot: "Lot", **place: float) -> list[dict[str, float]]:

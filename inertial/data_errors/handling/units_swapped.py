@@ -43,13 +43,11 @@ class UnitsSwapped(Handling):
 
     def looks(self, lot: "Lot", places: int) -> int:
         """Every pair at every dwell."""
-        del places
         units, n = lot.state.time.shape
         return units * (units - 1) // 2 * (n - 2 * EDGE + 1)
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """The difference of the readings of the two units, from the dwell on."""
-        del slope
         one, other, after = _places(lot, **place)
         column = np.zeros((*lot.state.time.shape, 3, 1))
         column[[one, other], ..., 0] = (lot.output[[one, other]] - _of_other(lot, one, other)) * after[:, None]
@@ -65,14 +63,12 @@ class UnitsSwapped(Handling):
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """What was exchanged and what becomes of it."""
-        del size
         one, other, after = _places(lot, **place)
         apart = 1e6 * float(np.sqrt(np.mean((lot.output[one, after] - _of_other(lot, one, other)[0, after]) ** 2)))
         return f"exchanged before this dwell, readings {apart:.0f} µg apart; they are exchanged back"
 
     def settled(self, lot: "Lot", size: Array, misfit: Misfit, **place: float) -> "Lot | None":
         """With the readings exchanged back: the temperatures, too, if the model fits better with them."""
-        del size
         one, other, _ = _places(lot, **place)
         outputs = _outputs_exchanged(lot, **place)
         whole = replace(outputs, state=_temperatures_exchanged(lot.state, **place))

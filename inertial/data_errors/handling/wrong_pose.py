@@ -26,7 +26,6 @@ class WrongPose(OfOneDwell):
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
         """Errors of the two angles in one dwell."""
-        del slope
         here = np.arange(lot.state.time.shape[1]) == int(place["at"])
         return tilts(lot.state) * here[:, None, None]
 
@@ -36,17 +35,14 @@ class WrongPose(OfOneDwell):
 
     def describe(self, lot: "Lot", size: Array, **place: float) -> str:
         """The two angles."""
-        del lot, place
         angles = np.degrees(size)
         off = f"about {angles[0]:+.3f}° (outer) and {angles[1]:+.3f}° (inner)"
         return f"the pose was off by {off} for all units; the dwell is left out"
 
     def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
         """Without the dwell: two angles identify it but do not correct it."""
-        del size
         return without(lot, [int(place["at"])])
 
     def dwells(self, lot: "Lot", **place: float) -> list[int]:
         """The one dwell."""
-        del lot
         return [int(place["at"])]

@@ -30,17 +30,14 @@ class ShockEffect(ABC):
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         """The nonlinear parameters, with bounds and starts that suit a pulse; none for an added effect."""
-        del duration_s
         return ()
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
         """The waveform (n,) with the effect."""
-        del rate_hz, values
         return wave
 
     def added(self, wave: Array, rate_hz: float) -> Array | None:
         """The waveform (n,) that is added with a coefficient of its own; None for an effect on the waveform."""
-        del wave, rate_hz
         return None
 
     @abstractmethod

@@ -25,7 +25,6 @@ class OwnClock(ShockEffect):
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
         """The parameters."""
-        del duration_s
         return (Parameter("clock_share", "1", -0.05, 0.05, (0.0,)),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:

@@ -23,5 +23,4 @@ class SecondOrder(ShockEffect):
 
     def added(self, wave: Array, rate_hz: float) -> Array:
         """The waveform (n,) of a coefficient of 1."""
-        del rate_hz
         return np.asarray(wave**2)

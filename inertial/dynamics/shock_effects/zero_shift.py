@@ -23,6 +23,5 @@ class ZeroShift(ShockEffect):
 
     def added(self, wave: Array, rate_hz: float) -> Array:
         """The waveform (n,) of a coefficient of 1."""
-        del rate_hz
         whole = np.cumsum(np.abs(wave))
         return np.asarray(whole / whole[-1])

@@ -65,5 +65,4 @@ class TransferEffect(ABC):
 
     def seen(self, points: Conditions) -> bool:
         """Whether the points can show the effect at all."""
-        del points
         return True

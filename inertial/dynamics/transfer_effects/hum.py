@@ -19,7 +19,6 @@ class Hum(TransferEffect):
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         """The parameters."""
-        del points
         return (
             Parameter("hum_real_g", "g", -100.0, 100.0, (0.0,)),
             Parameter("hum_imaginary_g", "g", -100.0, 100.0, (0.0,)),

@@ -27,7 +27,6 @@ def schema() -> Any:
         """Gives the copy that is shipped for the address in the import, and nothing for any other."""
 
         def resolve(self, system_url: str, public_id: str, context: Any) -> Any:
-            del public_id
             if system_url != SI_ADDRESS:
                 raise OSError(f"certificate: schema {system_url} is not shipped, {SI_ADDRESS} is")
             return self.resolve_string((folder / "SI_Format.xsd").read_bytes(), context, base_url=SI_ADDRESS)

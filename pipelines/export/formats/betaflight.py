@@ -47,7 +47,6 @@ def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) 
     offsets = np.rint(unit.bias[0] / nominal * counts)
 
     def applied(output: Array, temperature: float) -> Array:
-        del temperature
         return (output / nominal * counts - offsets) / counts
 
     low, high = unit.temperatures

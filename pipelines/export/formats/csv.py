@@ -22,7 +22,6 @@ SUFFIX = ".csv"
 
 def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
     """The table as text."""
-    del run, settings
     sink = io.StringIO()
     writer = csv.writer(sink, lineterminator="\n")
     writer.writerow(["unit", "quantity", "power_of_theta", "row", "column", "value", "unit_text", "certificate"])

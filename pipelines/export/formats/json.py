@@ -19,7 +19,6 @@ COMPLETE = True  # effects that have no polynomial are named in it
 
 def write(units: Sequence[UnitCalibration], run: str, settings: ExportSettings) -> str:
     """The document as text, with a line end."""
-    del settings
     document = {
         "run": run,
         "correction": "a = inverse(sum response[k] θ^k) · (output − sum bias[k] θ^k), θ = T − 25 °C, a in g",

@@ -67,7 +67,6 @@ def _without_calibration(unit: UnitCalibration) -> str:
     scale = float(np.mean(np.diag(unit.response[0])))
 
     def applied(output: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
-        del temperature
         return output / scale
 
     size = largest_error_ug(unit, applied)

@@ -36,7 +36,6 @@ def recognised(data: bytes) -> bool:
 
 def read(name: str, data: bytes, group: str) -> Content:
     """Numeric variables as columns."""
-    del group
     return Content(table_of(name, data))
 
 

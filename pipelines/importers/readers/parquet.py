@@ -33,7 +33,6 @@ def recognised(data: bytes) -> bool:
 
 def read(name: str, data: bytes, group: str) -> Content:
     """The plain columns of a Parquet file."""
-    del group
     return Content(table_of(name, data))
 
 

@@ -58,13 +58,11 @@ def read(name: str, data: bytes, group: str) -> Content:
 
 def _times(values: Any, attributes: Any) -> Any:
     """R's POSIXct: seconds since 1970, UTC."""
-    del attributes
     return pd.to_datetime(np.asarray(values, dtype=float), unit="s")
 
 
 def _long_integers(values: Any, attributes: Any) -> Any:
     """The integers of the package bit64: 64 bits, saved as if they were floating-point numbers; NA is the lowest of them."""
-    del attributes
     whole = np.asarray(values, dtype=float).view(np.int64)
     gone = whole == np.iinfo(np.int64).min
     return np.where(gone, np.nan, whole.astype(float)) if gone.any() else whole

@@ -10,12 +10,10 @@ NAME, TITLE, EXTRA, ORDER = "text", "CSV, TSV or other delimited text", "", 1000
 
 def recognised(data: bytes) -> bool:
     """Always: what no other reader recognises must be text."""
-    del data
     return True
 
 
 def read(name: str, data: bytes, group: str) -> Content:
     """The columns of a text, named as there."""
-    del group
     text, encoding = text_table.decoded(data, name)
     return text_table.content(text, name, encoding)

@@ -24,7 +24,6 @@ def recognised(data: bytes) -> bool:
 
 def read(name: str, data: bytes, group: str) -> Content:
     """Channels 1, 2, … beside `time` in s."""
-    del group
     from scipy.io import wavfile  # a third of a second
 
     with foreign(f"{name}: a WAV file that cannot be read", REMEDY):

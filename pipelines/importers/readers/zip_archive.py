@@ -20,7 +20,6 @@ def recognised(data: bytes) -> bool:
 
 def read(name: str, data: bytes, group: str) -> Content:
     """Nothing: always refused."""
-    del data, group
     raise DataRejected(
         f"{name}: a zip archive (also .xlsx, .npz), which is not read; unpack it, or export the table as CSV"
     )

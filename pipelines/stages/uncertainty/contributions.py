@@ -196,7 +196,6 @@ def _electrical(
 
 def _scattered(stated: Uncertainty, at: DwellConditions) -> Iterator[Scattered]:
     """Repeatability of the poses; left out where the fit's own scatter shows it already."""
-    del at
     if stated.pose is not None and not stated.pose.seen_in_residuals and stated.pose.standard().u > 0.0:
         u = stated.pose.standard().u
         yield Scattered("pose", u, u, stated.pose.scope, stated.pose.dof or float("inf"))

@@ -21,7 +21,6 @@ PLOTLY_SHA256 = "4ac841837b31c1bfd2ab140e3a248ddcc6c2106978fbf2c1c18a7aada930a37
 @router.get("/static/{version}/{name}")
 def static(request: Request, version: str, name: str) -> Response:
     """A file of the product, or Plotly's bundle."""
-    del version  # it changes the address when the content changes
     headers = {"cache-control": FOREVER}
     if name == PLOTLY:
         if "gzip" in request.headers.get("accept-encoding", ""):

@@ -114,7 +114,6 @@ def _result(row: dict[str, Any]) -> str:
 
 
 def _stopped(number: int, frame: object) -> NoReturn:
-    del number, frame
     raise KeyboardInterrupt
 
 

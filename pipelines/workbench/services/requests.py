@@ -65,7 +65,6 @@ def settled(settings: WorkbenchSettings, page: MissingPage) -> MissingPage:
 @lru_cache(maxsize=64)
 def _starting_model(archive: str, name: str, stamp: str) -> tuple[str, ...]:
     """The default model of a diagnosis of these dwells; a file is read by the process of the reader, within its limits."""
-    del stamp  # other content gives another result
     if is_file(name):
         return in_reader(uploads.LOOK, Path(name).name, default_model_of, archive, name)
     return default_model_of(archive, name)

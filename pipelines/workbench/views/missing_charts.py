@@ -153,11 +153,9 @@ def _groups(
     turning = table.turning[unit]
 
     def by_axis(axis: int, name: str) -> list[tuple[str, Role, Any, NDArray[np.bool_]]]:
-        del axis
         return [(f"axis {name}" if name != "norm" else name, ROLES[name], "circle", np.ones(turning.shape, dtype=bool))]
 
     def by_direction(axis: int, name: str) -> list[tuple[str, Role, Any, NDArray[np.bool_]]]:
-        del axis, name
         colours = cast("dict[int, Role]", {1: "before", -1: "after", 0: "ink"})
         return [(TURNS[turn][0], colours[turn], TURNS[turn][1], turning == turn) for turn in (1, -1, 0)]
 
@@ -176,7 +174,6 @@ def slot_chart(diagnosed: Diagnosed, page: MissingPage) -> Chart | None:
               texts=tuple(f"{unit}, {name}" for unit in table.units))
         for axis, name in enumerate(table.axes)
     ]  # fmt: skip
-    del page
     plot = Plot("", PlotAxis("slot"), PlotAxis("mean absolute residual / µg"), tuple(traces))
     return Chart("Mean absolute residual by slot", (plot,), height=280)
 

@@ -27,7 +27,6 @@ IDLE_S = 900.0  # without a line for so long the machine stops by itself
 
 def simulated(world: World, profile: Profile) -> Centrifuge:
     """A centrifuge in front of the world's bench; its input axis is z, radial."""
-    del profile
     return Centrifuge(world)
 
 

@@ -22,7 +22,6 @@ JITTER = 0.03
 
 def simulated(world: World, profile: Profile) -> Machine:
     """A machine in front of the world's bench."""
-    del profile
     return Machine(world)
 
 

@@ -36,7 +36,6 @@ class ExceptionsOff(Fault):
 
     def on_write(self, words: list[int], held: list[int] | None, write: Callable[[list[int]], None]) -> int:
         """Writes nothing and acknowledges."""
-        del words, held, write
         return 0
 
 

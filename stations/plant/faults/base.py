@@ -47,7 +47,6 @@ class Fault:
 
     def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
         """The words that the device reports in place of ``words``."""
-        del now_us, address
         return words
 
     def on_write(self, words: list[int], held: list[int] | None, write: Callable[[list[int]], None]) -> int:
@@ -59,7 +58,6 @@ class Fault:
         held : the words that the registers hold now; None where they cannot be read
         write : writes words to the registers
         """
-        del held
         write(words)
         return 0
 

@@ -151,7 +151,6 @@ class SwappedWords(Fault):
 
     def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
         """Exchanges the words of each pair."""
-        del now_us, address
         even = len(words) // 2 * 2
         return [word for i in range(0, even, 2) for word in (words[i + 1], words[i])] + words[even:]
 

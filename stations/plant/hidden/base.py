@@ -1,4 +1,3 @@
-# ruff: noqa: ARG002 - the interface passes all quantities; each effect uses those of its physics
 """Interface of the hidden effects, and the quantities at their instants."""
 
 from __future__ import annotations

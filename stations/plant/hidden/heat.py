@@ -1,4 +1,3 @@
-# ruff: noqa: ARG002 - the interface passes all quantities; each effect uses those of its physics
 """Temperature inside the package: stress with backlash, parts with thermal lag, self-heating."""
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# ruff: noqa: ARG002 - the interface passes all quantities; each effect uses those of its physics
 """Moisture in the package: the die-attach adhesive absorbs water and swells, which shifts the bias."""
 
 from __future__ import annotations

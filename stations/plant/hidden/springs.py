@@ -1,4 +1,3 @@
-# ruff: noqa: ARG002 - the interface passes all quantities; each effect uses those of its physics
 """Springs and suspensions: motion of the proof mass under load."""
 
 from __future__ import annotations
