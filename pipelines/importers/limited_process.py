@@ -49,9 +49,17 @@ def send(sink: Any, value: Any) -> None:
 
 def received(read: Callable[[int], bytes | bytearray]) -> Any:
     """A value from the other process, by a function that gives so many bytes."""
+    return _value(_pieces(read))
+
+
+def _pieces(read: Callable[[int], bytes | bytearray]) -> list[bytes | bytearray]:
     (count,) = struct.unpack(">Q", read(8))
     sizes = struct.unpack(f">{count}Q", read(8 * count))
-    head, *arrays = [read(size) for size in sizes]
+    return [read(size) for size in sizes]
+
+
+def _value(pieces: list[bytes | bytearray]) -> Any:
+    head, *arrays = pieces
     return pickle.loads(head, buffers=arrays)  # noqa: S301 - from a process of this program
 
 
@@ -66,7 +74,8 @@ def main() -> None:
     import_module("pipelines.importers.readers")  # while the other process prepares its first request
 
     while True:
-        request = requests.get()
+        # a request imports the module of its function: only here, where no other import is under way
+        request = _value(requests.get())
         kind, content = _done(*request)
         gc.collect()
         last = kind == "memory" or _pages(1) > KEPT_BYTES
@@ -89,7 +98,7 @@ def _listen(source: BinaryIO, requests: queue.SimpleQueue[Any]) -> None:
         return piece
 
     while True:
-        requests.put(received(exactly))
+        requests.put(_pieces(exactly))
 
 
 def _done(
