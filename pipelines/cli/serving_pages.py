@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from pipelines.cli.options import error_console
@@ -18,8 +19,8 @@ def run_until_stopped(server: uvicorn.Server, place: socket.socket, command: str
     """Serve until Ctrl-C, which is how these commands end, then say so in one line."""
     logging.getLogger("uvicorn.error").addFilter(_not_cancelled)
     try:
-        server.run(sockets=[place])
-    except KeyboardInterrupt:  # the server has ended by it, and raises it again
+        with suppress(KeyboardInterrupt):  # the server has ended by it, and mostly raises it again
+            server.run(sockets=[place])
         error_console().print(f"{command}: ended")
     finally:
         logging.getLogger("uvicorn.error").removeFilter(_not_cancelled)

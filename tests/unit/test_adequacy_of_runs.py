@@ -157,10 +157,18 @@ def test_a_run_without_a_multi_position_test_has_neither_line_nor_panel() -> Non
     assert model_adequacy.render(Pictured(run)) is None  # pyright: ignore[reportArgumentType]
 
 
-def test_a_certificate_is_offered_only_for_a_grade(run: Run) -> None:
+def test_a_certificate_is_offered_for_units_that_pass_by_a_budget_under_an_adequate_model(run: Run) -> None:
     document = judged(summary(run), run)
     unit = document["units"][0] | {"outcome": "pass", "basis": "budget"}
-    for grade, offered in (("industrial", True), ("none", False)):
-        lines = _next(run, document | {"units": [unit | {"grade": grade}]}, None)
+    verdict = document["adequacy"]
+    for change, adequate, offered in (
+        ({}, True, True),
+        ({"grade": "none"}, True, True),
+        ({"outcome": "fail"}, True, False),
+        ({"basis": "noise only"}, True, False),
+        ({}, False, False),
+    ):
+        seen = document | {"units": [unit | change], "adequacy": verdict | {"adequate": adequate}}
+        lines = _next(run, seen, None)
         assert any(line.startswith("tumbleline certify") for line in lines) is offered
         assert lines[0] == f"tumbleline diagnose {run.id}"
