@@ -150,7 +150,7 @@ def _triangle(values: Array, size: int) -> Array:
     return out
 
 
-def _response(estimate: Array) -> Array:
+def response_of(estimate: Array) -> Array:
     k = np.zeros((3, 3))
     for a in range(3):
         k[a, a], k[a, (a + 1) % 3], k[a, (a + 2) % 3] = estimate[a, 1:4]
@@ -164,7 +164,7 @@ def _outputs(
     force = rng.standard_normal((5, 3))
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     theta = rng.uniform(min(plan.levels), max(plan.levels), 5) - 25.0
-    inverse = np.linalg.inv(_response(estimate))
+    inverse = np.linalg.inv(response_of(estimate))
     inside: list[bool] = []
     for f, t in zip(force, theta, strict=True):
         h = np.zeros((3, 3 * width))
@@ -181,7 +181,7 @@ def _verified(
     """RMS error of verification as it was shown with its u, and as a user of the true force and temperature meets it, µg."""
     force = force_from_angles(plan.outer, plan.inner)[plan.check]
     theta = np.array(plan.levels)[plan.soak][plan.check] - 25.0
-    inverse = np.linalg.inv(_response(estimate))
+    inverse = np.linalg.inv(response_of(estimate))
     moved = np.stack([columns(force, theta, a, width) @ error[a] for a in range(3)], axis=1)
     met = (noise[plan.check] - moved) @ inverse.T
     for a, letter in enumerate("xyz"):

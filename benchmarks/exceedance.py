@@ -24,7 +24,7 @@ import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
 from scipy.stats import beta  # noqa: E402
 
-from benchmarks.budget import PRESETS, STATED, columns  # noqa: E402
+from benchmarks.budget import PRESETS, STATED, columns, response_of  # noqa: E402
 from benchmarks.budget_lots import (  # noqa: E402
     BASE,
     DWELL_S,
@@ -111,14 +111,11 @@ def _met(plan: Plan, estimate: Array, true: Array, preset: Preset, rng: np.rando
     """Largest RMS error of an axis over the poses of the verification in a use a year later, µg."""
     force = force_from_angles(plan.outer, plan.inner)[plan.check]
     theta = np.array(plan.levels)[plan.soak][plan.check] - 25.0
-    response = np.zeros((3, 3))
-    for a in range(3):
-        response[a, a], response[a, (a + 1) % 3], response[a, (a + 2) % 3] = estimate[a, 1:4]
     moved = np.stack([columns(force, theta, a, true.shape[1]) @ (estimate - true)[a] for a in range(3)], axis=1)
     later = wander(preset, plan.time, rng)[plan.check]
     later = later + 1e-6 * stability_of(preset).switch_on_ug * rng.standard_normal(3)
     later = later + 1e-6 * stability_of(preset).switch_on_ppm * rng.standard_normal(3) * force
-    error = (later - moved) @ np.linalg.inv(response).T
+    error = (later - moved) @ np.linalg.inv(response_of(estimate)).T
     return float(1e6 * np.sqrt(np.mean(error**2, axis=0)).max())
 
 

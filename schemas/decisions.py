@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import log
+from math import isnan, log
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -121,7 +121,7 @@ def decide(
     median : of a figure that is a 95 % bound; it passes where the probability of more than the limit is within the rule's, 5 %
         where that states none
     """
-    if median == median:  # noqa: PLR0124 - not a nan
+    if not isnan(median):
         return _decide_bound(limits, figure, value, median)
     guard = limits.guard_factor * standard_uncertainty
     expanded = limits.coverage_factor * standard_uncertainty

@@ -14,7 +14,6 @@ Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 _REACH = 9.0
 """Standard deviations beyond which a normal density is nothing."""
-_PIECES = 12
 
 
 @dataclass(frozen=True)
@@ -67,18 +66,8 @@ def global_risk(
 
 def _both(mean: float, process: float, u: float, limits: tuple[float, float], accepted: tuple[float, float]) -> float:
     """Probability that a unit conforms and is accepted."""
-    low, high = max(limits[0], mean - _REACH * process), min(limits[1], mean + _REACH * process)
-    if not low < high:
-        return 0.0
-    # panels end where the probability of acceptance turns, so that each is smooth on its own scale
-    turns = [a + k * u for a in accepted for k in (-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0)]
-    turns += [mean + k * process for k in (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)]
-    edges = np.unique(np.clip([*np.linspace(low, high, _PIECES + 1), *turns], low, high))
-    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
-    x = middle + half * _NODES
-    density = np.exp(-0.5 * ((x - mean) / process) ** 2) / (process * np.sqrt(2.0 * np.pi))
-    chance = ndtr((accepted[1] - x) / u) - ndtr((accepted[0] - x) / u)
-    return float(np.sum(half * _WEIGHTS * density * chance))
+    z, weight = _nodes(mean, process, [(limits, 0.0), (accepted, u)])
+    return float(weight @ (_between(z, limits, 0.0) * _between(z, accepted, u)))
 
 
 def lot_risk(
