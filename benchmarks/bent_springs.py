@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from stations.plant.device import stream
-from stations.plant.hidden.base import Untouched
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from stations.plant.hidden.base import Block
+from stations.plant.hidden.base import Block, Untouched
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LEAST, MOST = 2e-3, 4e-3  # g at 1 g, far above the uncertainty of a whole turn

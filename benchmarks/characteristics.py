@@ -14,14 +14,15 @@ import argparse
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before numpy
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "worlds"), str(HERE.parent)]
 sys.path.append(str(HERE))  # last: tests have modules of the same names
+
 
 import noise_kinds  # noqa: E402
 import numpy as np  # noqa: E402
@@ -33,9 +34,6 @@ from tables import NULLS  # noqa: E402
 from world import World  # noqa: E402
 
 from inertial import decisions  # noqa: E402
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 SEED = 66_000_000
 

@@ -6,6 +6,7 @@ the number of lots, or of looks, in which the decision is taken.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -16,8 +17,6 @@ from tables import HIDDEN, NULLS
 from world import World, make
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from inertial.criticism.examination import ExaminedRun
     from inertial.data_errors.readings import Readings
 

@@ -11,23 +11,22 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # before numpy
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "worlds"), str(HERE.parent)]
 
+
 import physics  # noqa: E402
 from scipy import stats  # noqa: E402
 from tables import FAULTS, HIDDEN, NULLS  # noqa: E402
 from world import World, make  # noqa: E402
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
 
 SEED = 63_000_000
 

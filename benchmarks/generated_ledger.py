@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 
 from pipelines.archive import Archive, files
 from pipelines.certificates.days import months_after
 from pipelines.certificates.entries import LedgerEntry
 from pipelines.certificates.ledger import Ledger
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-    from pathlib import Path
 
 VALID_MONTHS = 12
 

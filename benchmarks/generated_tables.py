@@ -6,18 +6,15 @@ results of an earlier version of the program. Re-runs fit the dwells again with 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.stats import norm
 
-from benchmarks.generated_lots import dwell_noise, lot_output, table_force
-
-if TYPE_CHECKING:
-    from benchmarks.generated_lots import Lot
-    from schemas.limits import Limits
-    from schemas.recipe import Recipe
-    from stations.plant.preset import Preset
+from benchmarks.generated_lots import Lot, dwell_noise, lot_output, table_force
+from schemas.limits import Limits
+from schemas.recipe import Recipe
+from stations.plant.preset import Preset
 
 AXES = np.array(["x", "y", "z"], dtype=object)
 EFFECTS = (

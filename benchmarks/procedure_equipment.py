@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,18 +21,13 @@ from benchmarks.procedure_pulls import PARTS, covered, station_of, tell
 from benchmarks.procedure_truths import of_axis, truths
 from inertial.dynamics.transfer_model import fit_transfer
 from pipelines.procedures import PROCEDURES, step_response
-from pipelines.procedures.base import REFERENCE, Device, ProcedureRecord, UnitRecord
+from pipelines.procedures.base import REFERENCE, Device, FigureValue, ProcedureRecord, UnitRecord
 from pipelines.procedures.sweep_points import transfer_points
 from pipelines.procedures.transfer_figures import figures_of_transfer
 from schemas.lot import Lot, Unit
 from schemas.toml_files import parse_toml
+from stations.plant.bench import Bench, Waveforms
 from stations.plant.plant import Plant
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.procedures.base import FigureValue
-    from stations.plant.bench import Bench, Waveforms
 
 NAMES = ("sweep", "transverse", "step_response")
 MODEL = ("second_order", "two_pole", "delay")  # what the simulated chain is

@@ -16,7 +16,7 @@ import argparse
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -46,12 +46,9 @@ from pipelines.schedule.steps import steps
 from schemas.lot import Lot, Unit
 from schemas.progress import silent
 from schemas.simulation import Hidden, ReferenceErrors, Simulation
-from schemas.station import load_station
+from schemas.station import StationConfig, load_station
 from stations.opening import open_station
 from stations.plant.plant import Plant
-
-if TYPE_CHECKING:
-    from schemas.station import StationConfig
 
 STATION = Path(__file__).resolve().parents[1] / "deploy" / "stations" / "simulated-32.toml"
 SCALE = 0.007

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -11,8 +12,6 @@ from benchmarks.bent_springs import bends
 from stations.plant.families.acutrol_3000 import radius_error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from stations.plant.plant import Plant
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -18,20 +18,19 @@ import importlib.util
 import os
 import sys
 import tempfile
+from importlib.machinery import ModuleSpec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+
 import numpy as np  # noqa: E402
 from scipy.stats import beta  # noqa: E402
 
 from pipelines.importers.inspection import inspect  # noqa: E402
-
-if TYPE_CHECKING:
-    from importlib.machinery import ModuleSpec
 
 AXES = "xyz"
 

@@ -16,9 +16,10 @@ import statistics
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import httpx
 import numpy as np
@@ -27,15 +28,13 @@ import pandas as pd
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
+
 from browser import Served, chromium, served, tab, until  # noqa: E402
 
 from benchmarks.archive import prepared  # noqa: E402
 from inertial import poses  # noqa: E402
 from inertial.frames import force_from_angles  # noqa: E402
 from pipelines.archive import Archive  # noqa: E402
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 EFFECTS = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 CLICKS = 8

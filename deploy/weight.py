@@ -8,20 +8,18 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterable
 from functools import cache
 from importlib import metadata
 from importlib.util import cache_from_source
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from deploy.sbom import ROOT, licence_of, project_of
 from schemas.locks import UNUSED
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 NOT_OF_USERS = {"build", "dev", "bench", "docs"}
 TESTS = frozenset({"test", "tests"})

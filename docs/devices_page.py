@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from docs.generated_page import write_or_check
+from schemas.profile import Command, Profile, Register
 from stations.devices.adapters import adapters
 from stations.devices.axis import TableAxis
 from stations.devices.equipment import Equipment
 from stations.profile_files import load_profile, profile_names
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from schemas.profile import Command, Profile, Register
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "devices.md"
 KINDS = {

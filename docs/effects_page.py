@@ -5,16 +5,13 @@ from __future__ import annotations
 import inspect
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from docs.generated_page import write_or_check
 from inertial import effects
+from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import Covariate
 from inertial.effects.formula import Formula
 from inertial.expressions import FORCES, FUNCTIONS, QUANTITIES
-
-if TYPE_CHECKING:
-    from inertial.effects.base import AnyEffect
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "effects.md"
 SCOPES = {

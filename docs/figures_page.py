@@ -6,13 +6,11 @@ import sys
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from docs.generated_page import write_or_check
 from pipelines.stages import figures
-
-if TYPE_CHECKING:
-    from pipelines.stages.figures import FigureKind
+from pipelines.stages.figures import FigureKind
 
 PAGE = Path(__file__).resolve().parent / "reference" / "figures.md"
 EMPTY: Any = SimpleNamespace(static_record_s=0.0, verification=[], effects=[])

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from docs.generated_page import write_or_check
 from inertial.dynamics.centrifuge_effects import EFFECTS as CENTRIFUGE_EFFECTS
 from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
 from inertial.dynamics.transfer_effects import EFFECTS
-from pipelines.procedures import PROCEDURES
-
-if TYPE_CHECKING:
-    from pipelines.procedures import Procedure
+from pipelines.procedures import PROCEDURES, Procedure
 
 PAGE = Path(__file__).resolve().parent / "reference" / "procedures.md"
 RECIPES = PAGE.parents[2] / "deploy" / "recipes" / "procedures"

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan, log
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol
 
 from schemas.limits import LARGEST_PFA, Limits, Rule
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
 

@@ -6,11 +6,9 @@ result, not an exception; anything that is not one of these classes is a defect 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, ClassVar
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from typing import ClassVar
 
 DONE = 0
 PART_FAILED = 1

@@ -7,14 +7,11 @@ broken file. :func:`shown` shortens what a message quotes from a file.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from schemas.errors import DataRejected, TumblelineError
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
 
 LONGEST_QUOTE = 80
 """Characters of a foreign value that a message shows."""

@@ -6,7 +6,8 @@ recipe; the whole is kept with the import, and a run that is made from it states
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -17,9 +18,6 @@ from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class ImportReferences(Strict):

@@ -8,8 +8,9 @@ an allowed probability of false acceptance needs (JCGM 106:2012, 8.3.3).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -25,9 +26,6 @@ from schemas.bounds import Name, Number, Positive
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 VALIDITY_MONTHS = 12
 """Longest that a certificate may hold where the limits file does not say: a year, the usual first interval (ILAC-G24:2022)."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 from packaging.markers import Marker
 from packaging.utils import canonicalize_name
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 """The versions that the locks are for; later ones have no wheels of these libraries."""

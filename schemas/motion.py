@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import Field
 
 from schemas.bounds import Number
 from schemas.strict import Strict
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 STANDARD_G = 9.80665
 PEAK_FACTOR = 3.0  # peaks of Gaussian vibration that the exciter must follow, over the rms: drives are clipped there

@@ -9,16 +9,14 @@ the name with different contents, a message names the file that is used and the 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterable
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from schemas.errors import RecipeInvalid
 from schemas.foreign import is_file
 from schemas.log_lines import tell
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
 
 Kind = Literal["recipes", "limits", "stations", "profiles", "presets"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

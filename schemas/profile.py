@@ -7,8 +7,9 @@ only. ``verified`` states whether it was compared with the device.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -17,9 +18,6 @@ from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.motion import Motion
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]

@@ -8,13 +8,10 @@ a shell.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from schemas.errors import DataRejected, TumblelineError
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 LONGEST_SERIAL = 64
 SERIAL_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._+-]*$"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.resources import files
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -25,10 +27,6 @@ from schemas.station_devices import Device, Devices, Equipment, built_in_equipme
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.uncertainty import TO_SI, Uncertainty
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 Angles = tuple[Degrees, Degrees]
 SIMULATED = "simulated.toml"

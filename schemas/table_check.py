@@ -9,12 +9,11 @@ import pandas as pd
 
 from schemas.columns import Seen, all_different
 from schemas.errors import DataRejected
+from schemas.table import Table
 from schemas.tables import TABLES
 
 if TYPE_CHECKING:
     from pandera.errors import SchemaError
-
-    from schemas.table import Table
 
 
 def check(name: str, frame: pd.DataFrame, *, where: str = "") -> pd.DataFrame:

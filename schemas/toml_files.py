@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
@@ -13,9 +14,6 @@ from schemas.reasons import reason_of
 from schemas.shipped import hint_of_sample
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pydantic import ValidationError
     from pydantic_core import ErrorDetails
 
 

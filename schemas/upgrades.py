@@ -6,13 +6,12 @@ of a table from the version before. ``tests/archives`` keeps an archive of every
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from schemas.version import VERSION, refuse_newer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pandas as pd
 
 UPGRADES: dict[tuple[str, int], Callable[[pd.DataFrame], pd.DataFrame]] = {}

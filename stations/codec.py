@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from schemas.profile import Register, WordOrder
+from schemas.profile import Register, WordOrder
 
 Value = float | str | list[float]
 Words = NDArray[np.uint16]

@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, StationError
+from schemas.lot import Lot
+from schemas.profile import Carrier, Profile
+from schemas.station import Limits, StationConfig
+from schemas.station_devices import Device
 from stations.clock import Clock, WallClock
 from stations.devices.adapters import axis_adapter, chamber_adapter, equipment_adapter
+from stations.devices.axis import TableAxis
+from stations.devices.chamber import ThermalChamber
 from stations.devices.commands import Commands
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
 from stations.devices.slot import Slot
 from stations.devices.table import TiltTable
+from stations.devices.values import Values
 from stations.links.gate import Permit
 from stations.links.making import Links
+from stations.plant.hidden import HiddenEffect
 from stations.profile_files import profile_of
 from stations.safety.guarded import Protection, guarded
 from stations.safety.safe_state import equipment_steps, safe_steps
 from stations.station import Station, nobody_else
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from schemas.lot import Lot
-    from schemas.profile import Carrier, Profile
-    from schemas.station import Limits, StationConfig
-    from schemas.station_devices import Device
-    from stations.devices.axis import TableAxis
-    from stations.devices.chamber import ThermalChamber
-    from stations.devices.values import Values
-    from stations.plant.hidden import HiddenEffect
     from stations.plant.plant import Plant
 
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from schemas.errors import StationError
+from schemas.lot import Lot
+from schemas.station import StationConfig
 from stations.safety.folder import state_folder
 from stations.safety.leases import holders
 from stations.safety.safety_status import unsafe_reason
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from schemas.lot import Lot
-    from schemas.station import StationConfig
-    from stations.station import Station
+from stations.station import Station
 
 AXES = ("outer", "inner")
 

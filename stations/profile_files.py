@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from importlib.resources.abc import Traversable
 
+from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.own_files import own_file, own_names
 from schemas.profile import Profile, parse_profile
 from schemas.toml_files import read_text
-
-if TYPE_CHECKING:
-    from importlib.resources.abc import Traversable
-
-    from schemas.carrier import Carried
 
 
 def profile_folder() -> Traversable:

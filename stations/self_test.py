@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from schemas.errors import StationError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from schemas.safety import SelfTest
-    from stations.station import Station
+from schemas.safety import SelfTest
+from stations.station import Station
 
 WILD = 0.05  # of full scale; the noise of a device at rest is always lower
 NOISIER = 3.0  # times the median noise of the slots; needs at least so many slots:

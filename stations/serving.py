@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from threading import Event
 from typing import TYPE_CHECKING
 
 from schemas.errors import StationError, StationRefused, WrongUse
-from stations.codec import named
+from schemas.lot import Lot
+from schemas.profile import Register
+from schemas.station import StationConfig
+from stations.codec import Value, named
 from stations.devices.commands import Commands
 from stations.devices.registers import Registers
 from stations.links.making import Links
 from stations.profile_files import profile_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from threading import Event
-
-    from schemas.lot import Lot
-    from schemas.profile import Register
-    from schemas.station import StationConfig
-    from stations.codec import Value
     from stations.plant.plant import Plant
     from stations.plant.server import PlantServer
 

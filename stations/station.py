@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import NotReached
+from schemas.station import StationConfig
+from stations.clock import Clock
+from stations.devices.chamber import ThermalChamber
+from stations.devices.table import TiltTable
 from stations.safety.safe_state import Reached, SafeStep, reach_safe_state
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from schemas.station import StationConfig
-    from stations.clock import Clock
-    from stations.devices.chamber import ThermalChamber
     from stations.devices.reader import Reader
-    from stations.devices.table import TiltTable
 
 Observe = Callable[[], list[float]]
 

@@ -15,10 +15,11 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from schemas.errors import StationError
 from schemas.safety import SAFE_WITHIN_S
@@ -30,9 +31,6 @@ from stations.safety.lease_parts import Part, addresses
 from stations.safety.leases import Leases, new_holder
 from stations.safety.safe_state import SafeStep, reach_safe_state
 from stations.safety.watchdog_protocol import BEAT, DONE, READY
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 ENDED = "the run's process has ended"
 POLL_S = 0.25

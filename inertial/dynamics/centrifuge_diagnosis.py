@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,8 @@ from inertial.dynamics import goodness
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.dynamics.centrifuge_radii import radii_as_observed
 from inertial.dynamics.missing_effects import breakers_of, missing_classes
-from inertial.dynamics.transfer_diagnosis import FEWEST_DOF
+from inertial.dynamics.transfer_diagnosis import FEWEST_DOF, EffectClass
 from inertial.errors import NotIdentified
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from inertial.dynamics.transfer_diagnosis import EffectClass
 
 Array = NDArray[np.float64]
 FOLDS = 5

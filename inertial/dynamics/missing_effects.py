@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
 from inertial.distributions import chi2_tail
 from inertial.dynamics.goodness import Fitted, adequate
 from inertial.dynamics.transfer_diagnosis import ADDED_P, CLASS_WIDTH, MOST_ADDED, EffectClass
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
 
 AnyFit = TypeVar("AnyFit", bound=Fitted)
 

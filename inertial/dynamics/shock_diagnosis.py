@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,12 +12,7 @@ from inertial.dynamics import goodness
 from inertial.dynamics.missing_effects import breakers_of, missing_classes
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockFit, ShockRecord, fit_shock, residual_percent
-from inertial.dynamics.transfer_diagnosis import FEWEST_DOF
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from inertial.dynamics.transfer_diagnosis import EffectClass
+from inertial.dynamics.transfer_diagnosis import FEWEST_DOF, EffectClass
 
 DEFAULT = ("delay",)
 FOLDS = 5

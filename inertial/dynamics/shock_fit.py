@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from inertial.dynamics.shock_effects import EFFECTS
+from inertial.dynamics.transfer_effects.base import Parameter
 from inertial.errors import NotIdentified
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from inertial.dynamics.transfer_effects.base import Parameter
 
 Array = NDArray[np.float64]
 

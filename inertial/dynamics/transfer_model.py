@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from scipy.optimize import least_squares
 from inertial.dynamics.goodness import p_value
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions, Parameter
 from inertial.errors import NotIdentified
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from inertial.dynamics.stability import short_noise, warm_up_time
 from inertial.dynamics.wander import stated_error, variance_of_sum
 from inertial.errors import NotIdentified
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 SPANS = (1.0, 2.0, 4.0, 8.0)  # windows on either side of the entry that the parabola spans
 REACH = 3.0  # least span, in standard uncertainties of the time

@@ -7,16 +7,14 @@ axis. They are of scope "data": no model is extended by them.
 
 from abc import abstractmethod
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.effects.base import Effect
+from inertial.estimation.lot import Lot
 from inertial.state import State
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
 
 Array = NDArray[np.float64]
 

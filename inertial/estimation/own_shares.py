@@ -8,7 +8,6 @@ the block, its residuals no longer deviate, and the block has the lot's shares a
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,9 @@ from numpy.typing import NDArray
 from inertial.decisions import OWN_SHARES, OWN_SUSPECT
 from inertial.estimation.noise import LONGEST
 from inertial.estimation.noise_shares import Shares
+from inertial.estimation.problem import Problem
 from inertial.estimation.shares import best_shares
-
-if TYPE_CHECKING:
-    from inertial.estimation.problem import Problem
-    from inertial.estimation.space import Space
+from inertial.estimation.space import Space
 
 Array = NDArray[np.float64]
 

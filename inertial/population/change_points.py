@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from inertial.population.memory import TO_SIGMA, drawn_in, innovations, memories_of, memory_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 FEWEST = 4  # points on either side
 LIKELY = 7.35  # −2·ln(1 − √0.95): twice the log-likelihood within which the place lies with 95 % (Hansen 2000, table 1)

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from inertial.population.memory import MOST, drawn_in, memories_of, memory_of, tail_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 D2_OF_TWO = 1.128  # mean range of two normal values over their σ (NIST/SEMATECH e-Handbook 6.3.2.2)
 RULES = (

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from inertial.population.comparison import sigma_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Index = NDArray[np.int64]
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 FEWEST = 10  # pairs of calibrations that a usual change is known from
 FOREIGN_P = 1e-9  # probability of a distance at which a calibration counts as not of its unit

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import norm
 from scipy.stats import t as student
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 MOST = 0.9  # correlation of neighbours beyond which a level and a wander are the same thing
 LARGEST = 0.97  # correlation that is considered at all

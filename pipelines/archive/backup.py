@@ -16,20 +16,15 @@ from __future__ import annotations
 import json
 import re
 import time
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
 
-from pipelines.archive import files, packs
+from pipelines.archive import Archive, files, packs
 from pipelines.archive.files import TEMPORARY
 from pipelines.archive.hash_chain import name_of_entry
+from pipelines.archive.store import Place
 from schemas.errors import ArchiveUnusable, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from pipelines.archive import Archive
-    from pipelines.archive.store import Place
 
 CHAIN, INDEX, MARK = "chain", "index", "archive.json"
 STATE = "state"  # of a capture: its one file is replaced with every record

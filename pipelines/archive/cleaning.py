@@ -5,23 +5,18 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
+from collections.abc import Generator, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipelines.archive import files, hash_chain, packs
+from pipelines.archive.archive import Archive
 from pipelines.archive.locks import CLAIM, LEASE_S, alone
 from pipelines.archive.provenance import provenance
 from pipelines.archive.run import Run
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.store import ObjectPath, Place
 from schemas.errors import OperatorNeeded
-
-if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
-
-    from pipelines.archive.archive import Archive
-    from pipelines.archive.store import Place
 
 FOLDERS = ("runs", "captures", "calibrations", hash_chain.FOLDER, "index", packs.FOLDER)
 AT_ONCE = 1000  # calibrations named by one entry of the chain

@@ -10,12 +10,13 @@ from __future__ import annotations
 import os
 import re
 import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipelines.archive import files, packs
+from pipelines.archive.archive import Archive
 from pipelines.archive.capture_journal import is_number
 from pipelines.archive.locks import LOCK, alone
 from pipelines.archive.pack_merging import merge_packs, remove_replaced
@@ -24,11 +25,6 @@ from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import START
 from pipelines.archive.run_files import SEALED
 from schemas.errors import OperatorNeeded, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from pipelines.archive.archive import Archive
 
 LEAST_AGE_S = 3600.0  # of an event of the ledger: a process that decides on the next one has read it long ago
 LEDGER = "calibrations"

@@ -12,7 +12,9 @@ import json
 import os
 import shutil
 import uuid
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.archive.names import LinkInArchive, refuse_leading_out
@@ -21,9 +23,6 @@ from pipelines.archive.store import ObjectPath, first_line
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Mapping
-    from pathlib import Path
-
     from pipelines.archive.store import Place
 
 TEMPORARY = ".tmp-"

@@ -6,6 +6,7 @@ other takes the next number. A copy of the hash of the last entry, kept elsewher
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,6 @@ from pipelines.archive.locks import alone
 from pipelines.archive.store import ObjectPath
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
     from pipelines.archive.store import Place
 
 FOLDER = "chain"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields
 from typing import TYPE_CHECKING, Any
@@ -15,8 +16,6 @@ from pipelines.archive.store import ObjectPath
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pipelines.archive.run import Run
     from pipelines.archive.store import Place
 

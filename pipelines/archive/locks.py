@@ -15,6 +15,7 @@ import random
 import threading
 import time
 import uuid
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, TextIO
 
@@ -23,8 +24,6 @@ from pipelines.archive.store import ObjectPath
 from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
     from pipelines.archive.store import Place
 
 LEASE_S = 120.0

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
     from pipelines.archive.store import Place
 
 ONE = ("capture", "run", "rerun_of", "taken_from")  # entries that name one folder of the archive

@@ -8,16 +8,13 @@ is published they are removed, and after a killed compaction by the next one.
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 from pipelines.archive import derived, files, packs
 from pipelines.archive.hash_chain import is_number
 from pipelines.archive.pack_writing import LARGEST, FolderToPack, write_pack
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 RATIO = 2  # a pack stays by itself when it is more than so many times larger than all newer ones of its month together
 PAUSE_S = 0.05  # between new pack and removal: a folder's time of change tells readers, and its clock is coarse

@@ -5,17 +5,15 @@ from __future__ import annotations
 import hashlib
 import os
 import zipfile
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from pipelines.archive import derived, files, packs
 from pipelines.archive.hash_chain import is_number
 from schemas.errors import ArchiveUnusable
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
-    Reader = Callable[[str, str], bytes]  # of a file: folder below the root, name below the folder
+Reader = Callable[[str, str], bytes]  # of a file: folder below the root, name below the folder
 
 LARGEST = 2**30  # bytes of one pack: more begins the next, so that a killed compaction has little to do again
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date of a zip; equal files give equal packs

@@ -13,16 +13,14 @@ import json
 import mmap
 import re
 import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
 
 FOLDER = "packed"
 CONTENTS, CONTAINER = ".toc", ".zip"

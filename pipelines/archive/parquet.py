@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pipelines.archive.files import hash_of
@@ -10,8 +11,6 @@ from schemas.errors import ArchiveUnusable
 from schemas.version import VERSION
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import pandas as pd
     import pyarrow as pa
 

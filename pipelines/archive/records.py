@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
 from pipelines.archive import files, parquet
@@ -12,8 +13,6 @@ from pipelines.archive.store import ObjectPath
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-
     import pandas as pd
 
     from pipelines.archive.store import Place

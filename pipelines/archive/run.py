@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from pipelines.archive import files, hash_chain
@@ -14,8 +15,6 @@ from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 from schemas.version import refuse_newer
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import pandas as pd
     import pyarrow as pa
 

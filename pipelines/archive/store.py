@@ -7,16 +7,14 @@ object store, where putting an object is atomic by itself and folders exist only
 from __future__ import annotations
 
 import io
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
 
 REMEDY = "check the address, the credentials and the network"
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pipelines.archive import Archive
 from pipelines.audit.calibrations import Calibrations, captures_of, later, load, runs_of, undated
 from pipelines.audit.certificates import Certificates, certificates_of
 from pipelines.audit.drifts import KindDrift, kind_drifts
@@ -25,17 +26,12 @@ from pipelines.audit.population import (
     odd_ones,
     yields,
 )
+from pipelines.audit.rules import Rules
 from pipelines.audit.stations_over_time import ControlChart, StationSeries, charts, slot_series, station_series
 from pipelines.audit.unit_drifts import UnitDrift, unit_drifts
+from pipelines.parallel import Distributor
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.archive import Archive
-    from pipelines.audit.rules import Rules
-    from pipelines.parallel import Distributor
-
-    Flags = NDArray[np.bool_]
+Flags = NDArray[np.bool_]
 
 LIMITED = {  # families with a limit of the value: figure, and units of the parameter per unit of the figure
     "bias": ("zero_g_offset_mg", 1e3),

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from pipelines.archive.store import Place
 from pipelines.audit.calibrations import date_of, day_of
 from pipelines.certificates.ledger_index import histories_of
-from pipelines.certificates.validity import calibrations_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from pipelines.archive.store import Place
-    from pipelines.certificates.validity import Calibration
+from pipelines.certificates.validity import Calibration, calibrations_of
 
 
 class CertificateState(NamedTuple):

@@ -6,23 +6,19 @@ A query engine with these data sets needs no access to files, so that it can be 
 from __future__ import annotations
 
 import mmap
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 
 from pipelines.archive.packed_path import member_of
-from pipelines.archive.store import first_line
+from pipelines.archive.store import Place, first_line
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from pipelines.archive.store import Place
 
 READERS = 8
 

@@ -12,11 +12,11 @@ from pipelines.audit.calibrations import date_of
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.parameters import unit_text
+from pipelines.audit.stations_over_time import ControlChart, StationSeries
+from pipelines.audit.unit_drifts import UnitDrift
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
-    from pipelines.audit.stations_over_time import ControlChart, StationSeries
-    from pipelines.audit.unit_drifts import UnitDrift
 
 MOST_UNITS = 200  # histories in the document; ``tumbleline query`` gives the others by their serial
 SCHEMA = 1

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.population.drift import (
     DeviceDrift,
@@ -18,18 +18,14 @@ from inertial.population.drift import (
     prudent,
     seating_of,
 )
+from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, pairs_of, spans_of
 from pipelines.audit.parameters import FAMILIES, FAMILY_OF, NAMES
+from pipelines.audit.rules import Rules
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.rules import Rules
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.int64]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 MONTH_D = YEAR_D / 12.0
 OWN = tuple(name for name in NAMES if FAMILIES[FAMILY_OF[name]].own)

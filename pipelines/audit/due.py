@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipelines.audit.drifts import MONTH_D
+from pipelines.audit.calibrations import Calibrations
+from pipelines.audit.certificates import Certificates
+from pipelines.audit.drifts import MONTH_D, KindDrift
+from pipelines.audit.rules import Rules
+from pipelines.audit.unit_drifts import UnitDrift
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.certificates import Certificates
-    from pipelines.audit.drifts import KindDrift
-    from pipelines.audit.rules import Rules
-    from pipelines.audit.unit_drifts import UnitDrift
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

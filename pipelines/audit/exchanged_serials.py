@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.population.fingerprints import ChangeScale, alike_below, change_scale, distance, foreign_above, nearest
+from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.parameters import FAMILY_OF, NAMES
 from pipelines.audit.parameters import NAMES as PARAMETERS
+from pipelines.audit.rules import Rules
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.rules import Rules
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.int64]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 
 YEAR_D = 365.25

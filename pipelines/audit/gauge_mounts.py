@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.population.gauge import Gauge, gauge_study
+from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import OWN
 from pipelines.audit.parameters import FAMILY_OF
+from pipelines.audit.rules import Rules
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.rules import Rules
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.int64]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 SIX_SIGMA = 6.0
 FEWEST_PARTS = 3

@@ -13,13 +13,13 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from weakref import finalize
 
 import pyarrow as pa
@@ -27,17 +27,11 @@ import pyarrow.parquet as pq
 
 from pipelines.archive import Archive, derived, files
 from pipelines.archive.locks import alone
-from pipelines.archive.store import ObjectPath, address_of, first_line
+from pipelines.archive.store import ObjectPath, Place, address_of, first_line
 from pipelines.audit.run_files import in_order_of_disk, read_runs, stamps_of
 from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
-from pipelines.parallel import map_partitions
+from pipelines.parallel import Distributor, map_partitions
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    from pipelines.archive.store import Place
-    from pipelines.parallel import Distributor
 
 FOLDER = "index"
 RUNS_PER_PART = 500

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from pipelines.archive import derived
-from pipelines.archive.store import ObjectPath
+from pipelines.archive import Archive, derived
+from pipelines.archive.store import ObjectPath, Place
 from pipelines.audit.index import FOLDER, part_folders, runs_of, standing_of, version_of_rows
 from pipelines.audit.run_files import read_runs, stamps_of
 from pipelines.audit.run_rows import SCHEMAS, TABLES, rows_of_runs
-from pipelines.integrity.findings import CHANGED
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive
-    from pipelines.archive.store import Place
-    from pipelines.integrity.findings import VerifiedPart
+from pipelines.integrity.findings import CHANGED, VerifiedPart
 
 REMEDY = "remove it, it is made again from the runs"
 

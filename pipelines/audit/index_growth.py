@@ -6,13 +6,14 @@ Each addition is a small part; when there are many they are made anew as one. Wh
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pyarrow.parquet as pq
 
+from pipelines.archive import Archive
 from pipelines.archive.locks import alone
-from pipelines.archive.store import address_of, first_line
+from pipelines.archive.store import Place, address_of, first_line
 from pipelines.audit.index import (
     FOLDER,
     MOST_SMALL,
@@ -26,12 +27,6 @@ from pipelines.audit.index import (
 )
 from pipelines.audit.run_files import stamps_among
 from schemas.errors import TumblelineError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.archive import Archive
-    from pipelines.archive.store import Place
 
 LOGGER = logging.getLogger("tumbleline.archive")
 

@@ -10,17 +10,16 @@ from inertial.uncertainty.rounding import chance
 from pipelines.audit import charts as drawn
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
-from pipelines.audit.finding import WHO
+from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.parameters import unit_text
+from pipelines.audit.stations_over_time import ControlChart, StationSeries
+from pipelines.audit.unit_drifts import UnitDrift
 from pipelines.drawing import svg_text
 from pipelines.report.numbers import THIN, significant
 from pipelines.report.templates import template
 
 if TYPE_CHECKING:
     from pipelines.audit.audit import Audit
-    from pipelines.audit.finding import AuditFinding
-    from pipelines.audit.stations_over_time import ControlChart, StationSeries
-    from pipelines.audit.unit_drifts import UnitDrift
 
 MOST_SERIES, MOST_CHARTS, MOST_HISTORIES, MOST_ROWS, MOST_OF_KIND = 8, 4, 4, 25, 40
 

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.population.agreement import e_n
+from pipelines.audit.calibrations import Calibrations
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.int64]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 
 YEAR_D = 365.25

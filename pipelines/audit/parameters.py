@@ -7,19 +7,16 @@ first (Geist 2017, NIST J. Res. 122.032: intrinsic parameters).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from schemas.units import AXES
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Numbers = NDArray[np.int64]
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 
 class Family(NamedTuple):

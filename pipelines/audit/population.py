@@ -6,26 +6,24 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.population.capability import Index as Capability
 from inertial.population.capability import cpk, fraction_interval, independent, shape_of, sigma_within
 from inertial.population.comparison import Comparison, compare, holm, outlier_limit, robust_z, unlike
 from inertial.population.memory import TO_SIGMA
 from inertial.population.two_way import group_medians
-from pipelines.audit.calibrations import codes, date_of
+from pipelines.audit.calibrations import Calibrations, codes, date_of
 from pipelines.audit.drifts import OWN
 
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Texts = NDArray[np.object_]
+Numbers = NDArray[np.int64]
+
 if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
     from pipelines.audit.index import AuditIndex
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Texts = NDArray[np.object_]
-    Numbers = NDArray[np.int64]
 
 FEWEST = 20
 FEWEST_OF_LOT = 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from inertial.counts import number_of
@@ -12,8 +13,6 @@ from pipelines.audit.parameters import unit_text
 from pipelines.report.numbers import significant
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from pipelines.audit.audit import Audit
     from pipelines.audit.population import Ability
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import tomllib
 from fnmatch import fnmatchcase
 from importlib.resources import files
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat, ValidationError, field_validator, model_validator
 
@@ -13,9 +14,6 @@ from pipelines.audit.parameters import FAMILIES
 from schemas.errors import did_you_mean
 from schemas.recipe import Strict
 from schemas.toml_files import explain, parse_toml, read_text
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 Months = Annotated[int, Field(ge=1, le=120)]

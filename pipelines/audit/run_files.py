@@ -7,21 +7,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from errno import ELOOP, ENOENT
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from pipelines.archive.packed_path import PackedPath
-from pipelines.archive.packs import read_together
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.packs import PackedFolder, read_together
+from pipelines.archive.store import ObjectPath, Place
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from pipelines.archive.packs import PackedFolder
-    from pipelines.archive.store import Place
 
 START = "run.json"
 NAMES = ("coefficients", "figures", "grades", "residuals")  # tables that are read

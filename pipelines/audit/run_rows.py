@@ -8,26 +8,22 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from pipelines.archive.parquet import SCHEMA_MARK, TABLE_MARK
 from pipelines.archive.store import first_line
 from pipelines.audit.parameters import NAMES, parameters_of
-from pipelines.audit.run_files import START
+from pipelines.audit.run_files import START, RunFiles
 from pipelines.audit.station_effects import station_values
 from schemas.errors import ArchiveUnusable
 from schemas.units import AXES
 from schemas.upgrades import upgraded
 from schemas.version import VERSION
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.audit.run_files import RunFiles
 
 _TEXT, _NUMBER = pa.string(), pa.float64()
 _FEW = pa.dictionary(pa.int32(), _TEXT)  # texts with few different values

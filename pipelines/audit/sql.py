@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import pyarrow as pa
 
+from pipelines.archive import Archive
 from pipelines.audit import datasets
 from pipelines.audit.index import AuditIndex, up_to_date
 from pipelines.audit.run_rows import SCHEMAS
 from pipelines.audit.tables_in_memory import QueryResult, rows_of_index
+from pipelines.certificates.validity import Calibration
 from schemas.errors import WrongUse, did_you_mean
 from schemas.library import library
 
 if TYPE_CHECKING:
     import duckdb
-
-    from pipelines.archive import Archive
-    from pipelines.certificates.validity import Calibration
 
 SHUT_IN: dict[
     str, str | bool | int | float | list[str]

@@ -7,22 +7,19 @@ the weights of the run's own fit have no influence.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import design, effects
 from inertial.effects import SensorEffect, StationEffect
 from inertial.errors import InertialError, MissingInput
 from inertial.state import State
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 FEWEST_UNITS = 3  # with fewer units a single outlier could be attributed to the station
 SEEN = 0.02  # share of an effect's columns outside the units' model; a smaller share cannot be separated from the units

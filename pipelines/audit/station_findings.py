@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +13,6 @@ from pipelines.audit.calibrations import date_of
 from pipelines.audit.finding import AuditFinding
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from inertial.population.change_points import ChangePoint
     from pipelines.audit.audit import Audit
     from pipelines.audit.stations_over_time import StationSeries

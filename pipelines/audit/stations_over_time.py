@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.population.change_points import ChangePoint, change_points, noise_of
 from inertial.population.control_charts import Baseline, alarms, baseline, chance_of_alarms, signals
 from inertial.population.two_way import unit_and_place
-from pipelines.audit.calibrations import codes
+from pipelines.audit.calibrations import Calibrations, codes
 from pipelines.audit.drifts import OWN
 from pipelines.audit.parameters import unit_text
+from pipelines.audit.rules import Rules
 
-if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.rules import Rules
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Texts = NDArray[np.object_]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Texts = NDArray[np.object_]
 
 LEVEL = 1e-3  # p-value of a change, shared by all series
 FEWEST = 8

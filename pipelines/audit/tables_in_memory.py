@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import threading
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,8 +18,6 @@ from pipelines.audit.run_rows import SCHEMAS
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
-
     from pipelines.audit.index import AuditIndex
 
 

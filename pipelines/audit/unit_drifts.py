@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.population.drift import (
     LatestState,
@@ -15,21 +17,15 @@ from inertial.population.drift import (
     leaves,
     standing,
 )
+from pipelines.audit.calibrations import Calibrations
 from pipelines.audit.drifts import AHEAD, KindDrift
 from pipelines.audit.pairs import YEAR_D, Pairs, changes_of, e_n_of, last_of_each, pairs_of
 from pipelines.audit.parameters import FAMILY_OF
+from pipelines.audit.rules import Rules
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from pipelines.audit.calibrations import Calibrations
-    from pipelines.audit.rules import Rules
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.int64]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from inertial.population.comparison import outlier_limit
-from pipelines.audit.calibrations import date_of
+from pipelines.audit.calibrations import Calibrations, date_of
 from pipelines.audit.finding import AuditFinding, date_or_never
 from pipelines.audit.parameters import unit_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from pipelines.audit.audit import Audit
-    from pipelines.audit.calibrations import Calibrations
     from pipelines.audit.unit_drifts import UnitDrift
 
 

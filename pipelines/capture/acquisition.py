@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -11,25 +11,20 @@ import pandas as pd
 from pipelines.capture.plausibility import Plausibility
 from pipelines.capture.power_cycling import Power
 from pipelines.capture.record import Record, TemperatureLog, readings_row
+from pipelines.capture.sink import CaptureSink
 from pipelines.capture.supervision import Supervisor, short_of_samples
 from pipelines.procedures import procedure_of
 from pipelines.procedures.base import OnEquipment, SetsEquipment
+from pipelines.schedule.steps import Step
 from schemas.errors import LinkLost, OperatorNeeded, StationError, StationTimeout
 from schemas.event import NO_RECORD
+from schemas.lot import Lot, Unit
+from schemas.recipe import Recipe
+from stations.devices.reader import Instruments
 from stations.devices.recording import RecordingSpoilt
-from stations.devices.slot import Samples, SamplesLost
+from stations.devices.slot import Identity, Samples, SamplesLost
 from stations.safety.suspenders import Reason, Suspended
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from pipelines.capture.sink import CaptureSink
-    from pipelines.schedule.steps import Step
-    from schemas.lot import Lot, Unit
-    from schemas.recipe import Recipe
-    from stations.devices.reader import Instruments
-    from stations.devices.slot import Identity
-    from stations.station import Station
+from stations.station import Station
 
 OBSERVATIONS = 5  # observations of encoders and instruments within a dwell
 HISTORY_S = 10.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from pipelines.capture.acquisition import Acquisition
 from pipelines.capture.sink import CaptureSink
@@ -12,17 +11,12 @@ from pipelines.capture.supervision import LINK_ATTEMPTS, LOST_FOR, WARMING, Stil
 from pipelines.capture.time_left import Remaining
 from pipelines.schedule.steps import Step, steps
 from schemas.errors import LeaseLost, LinkLost, NotReached, StationError, StationTimeout
-from schemas.event import MemoryLog
+from schemas.event import EventLog, MemoryLog
+from schemas.lot import Lot
+from schemas.progress import Progress
+from schemas.recipe import Recipe
 from stations.safety.suspenders import Suspended
-from stations.station import Unsettled
-
-if TYPE_CHECKING:
-    from schemas.event import EventLog
-    from schemas.lot import Lot
-    from schemas.progress import Progress
-    from schemas.recipe import Recipe
-    from stations.station import Station
-
+from stations.station import Station, Unsettled
 
 __all__ = ["CaptureSink", "Step", "capture", "check", "steps"]
 

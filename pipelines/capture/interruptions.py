@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from typing_extensions import TypedDict
 
+from pipelines.archive import Run
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
 
 KINDS = ("suspended", "spoilt", "resumed", "unit_lost", "power", "emergency_stop", "stopped")
 PAUSES = ("suspended", "spoilt")

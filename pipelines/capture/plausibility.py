@@ -5,25 +5,20 @@ Means and outliers come from the one module that decodes samples, which validati
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from inertial.pointing import TURNED_AWAY, Pointing, contradicts
+from pipelines.capture.record import Record
 from pipelines.tables.summaries import unit_means
 from schemas.errors import OperatorNeeded, StationError
+from schemas.event import Event
+from schemas.lot import Unit
+from stations.devices.reader import Reader
+from stations.devices.slot import Identity
 from stations.safety.suspenders import Reason, Suspended
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    import pandas as pd
-
-    from pipelines.capture.record import Record
-    from schemas.event import Event
-    from schemas.lot import Unit
-    from stations.devices.reader import Reader
-    from stations.devices.slot import Identity
-
 
 TABLE = "table: "
 TURNED = f"{TABLE}{TURNED_AWAY}"

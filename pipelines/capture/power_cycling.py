@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from pipelines.capture.supervision import Supervisor
+from pipelines.schedule.steps import Step
 from schemas.event import NO_RECORD
 from stations.safety.suspenders import require_released
-
-if TYPE_CHECKING:
-    from pipelines.capture.supervision import Supervisor
-    from pipelines.schedule.steps import Step
-    from stations.station import Station
+from stations.station import Station
 
 OFF_S = "off_s"
 

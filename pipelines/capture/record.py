@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.quantities import BY_ATTRIBUTE
 from pipelines.tables.summaries import first_outlier
+from schemas.lot import Unit
+from schemas.poses import Pose
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from schemas.lot import Unit
-    from schemas.poses import Pose
-    from stations.devices.reader import Instruments
-    from stations.devices.slot import Identity, Samples
+from stations.devices.reader import Instruments
+from stations.devices.slot import Identity, Samples
 
 POWER_OFF = BY_ATTRIBUTE["power_off"].column
 INSTRUMENTS = tuple(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration"))

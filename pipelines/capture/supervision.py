@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
+from pipelines.schedule.steps import Step
 from schemas.errors import LeaseLost, OperatorNeeded, StationError
-from schemas.event import NO_RECORD, Event, EventLog
+from schemas.event import NO_RECORD, Event, EventLog, Kind
+from schemas.lot import Unit
+from schemas.poses import Pose
+from stations.devices.reader import Instruments
 from stations.safety.suspenders import EmergencyStop, Reason, Suspended, Watched, require_released
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from pipelines.schedule.steps import Step
-    from schemas.event import Kind
-    from schemas.lot import Unit
-    from schemas.poses import Pose
-    from stations.devices.reader import Instruments
-    from stations.station import Station
+from stations.station import Station
 
 LINK_ATTEMPTS = 3  # attempts at a record whose device does not answer; each takes its time-outs
 FEWEST_SAMPLES = 0.99  # smallest part of the expected samples

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from pipelines.capture.soak_response import Approach
+from pipelines.schedule.steps import Step
 from pipelines.schedule.timing import schedule
-
-if TYPE_CHECKING:
-    from pipelines.capture.soak_response import Approach
-    from pipelines.schedule.steps import Step
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 MOST = (
     4.0  # bound of the correction: a soak or record that measured longer was disturbed, which says nothing of the next

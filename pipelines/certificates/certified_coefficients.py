@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.archive import Run
 from pipelines.archive.store import first_line
+from pipelines.certificates.validity import Calibration
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
-    from pipelines.certificates.validity import Calibration
 
 
 def coefficients_of(run: Run, calibration: Calibration) -> list[dict[str, Any]]:

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
-from pipelines.archive import files
+from pipelines.archive import Run, files
 from pipelines.archive.signatures import BAD, GOOD, UNSIGNED, check, public_keys
+from pipelines.archive.store import Place
 from pipelines.certificates.entries import folder_of
 from pipelines.certificates.ledger import Ledger
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from pipelines.archive import Run
-    from pipelines.archive.store import Place
-
 
 TABLES = ("coefficients", "covariance", "grades")
 

@@ -8,26 +8,21 @@ a unit one fails, reads the other's event and decides again; so every event was 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive, files, hash_chain
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.days import LAST, today
 from pipelines.certificates.entries import LedgerEntry, event_of, folder_of
 from pipelines.certificates.refusals import nothing_to_revoke, refuse_other_device, refuse_serial
 from pipelines.certificates.validity import Calibration, calibrations_of, overlapped
 from schemas.errors import ArchiveUnusable, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    from pipelines.archive.store import Place
 
 CLOCK_SLACK = timedelta(minutes=5)  # largest difference of the clocks of hosts that write into one archive
 

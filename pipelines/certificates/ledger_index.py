@@ -9,24 +9,20 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import pyarrow as pa
 
 from pipelines.archive import derived, files
 from pipelines.archive.packed_path import PackedPath
-from pipelines.archive.store import ObjectPath, first_line
+from pipelines.archive.store import ObjectPath, Place, first_line
 from pipelines.certificates.entries import FOLDER, LedgerEntry, event_of, folder_of
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    import pyarrow as pa
-
-    from pipelines.archive.store import Place
 
 INDEX_FOLDER = "index/ledger"
 VERSION = b"tumbleline.ledger 1"

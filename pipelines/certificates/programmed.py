@@ -7,17 +7,14 @@ its unit is not certified until it is programmed again.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pipelines.archive import files, hash_chain
 from pipelines.archive.provenance import provenance
+from pipelines.archive.store import Place
 from pipelines.certificates.entries import folder_of
 from schemas.errors import ArchiveUnusable, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pipelines.archive.store import Place
 
 TOP = "programming"
 SCHEMA = 1

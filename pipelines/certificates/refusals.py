@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pipelines.archive import Run
@@ -11,8 +12,6 @@ from pipelines.certificates.measured import measured_on
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pipelines.certificates.entries import LedgerEntry
     from pipelines.certificates.validity import Calibration
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NotRequired
+from typing import Any, NotRequired
 
 import numpy as np
+import pandas as pd
 from typing_extensions import TypedDict
 
+from pipelines.archive import Run
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse
 from schemas.reference import Reference
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.archive import Run
 
 
 class StatedContribution(TypedDict):

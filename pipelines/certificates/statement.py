@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
+from pipelines.archive import Run
 from pipelines.certificates.days import today
 from pipelines.certificates.ledger import Ledger
+from pipelines.certificates.validity import Calibration
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from pipelines.archive import Run
-    from pipelines.certificates.validity import Calibration
 
 
 class Stated(NamedTuple):

@@ -5,14 +5,13 @@ A new calibration ends those that are valid on its first day, so that a unit nev
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     from pipelines.certificates.entries import LedgerEntry
 
 

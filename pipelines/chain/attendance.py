@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from inertial.counts import number_of
+from pipelines.archive import Run
 from pipelines.jobs.seating import disagreements
 from pipelines.tables.frames import rows_of
 from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pipelines.archive import Run
     from pipelines.chain.runner import Done, Runner
     from pipelines.jobs.job import Job
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from inertial.decisions import ADEQUATE_ABOVE
@@ -10,22 +11,19 @@ from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from inertial.uncertainty.rounding import equal
 from pipelines.archive import Archive, Run
 from pipelines.certificates.entries import LedgerEntry
+from pipelines.certificates.ledger import Ledger
 from pipelines.certificates.measured import END, measured_span
 from pipelines.integrity import verify
 from pipelines.jobs.adequacy import adequacy_of
 from pipelines.jobs.references import contradiction, references_of
 from pipelines.jobs.terms import archived_terms
 from pipelines.stages.grade import BUDGET
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.limits import ADEQUACY_P_MIN
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-
-    from pipelines.certificates.ledger import Ledger
-    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 
 NEEDED_OF_TABLE = ("gravity", "level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose", "reader")
 """Entries of [uncertainty] without which nothing is certified that a table turned."""

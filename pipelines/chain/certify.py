@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from pipelines.archive.locks import alone
 from pipelines.archive.signatures import public_keys
 from pipelines.certificates.days import day_of, months_after, today
 from pipelines.certificates.entries import FOLDER, LedgerEntry
+from pipelines.certificates.ledger import Ledger
 from pipelines.certificates.programmed import refuse_unproved, unproved
 from pipelines.certificates.refusals import allowed_months, refuse_period
 from pipelines.chain.certifiable import (
@@ -25,11 +27,7 @@ from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-
-    from pipelines.certificates.ledger import Ledger
 
 EVIDENCE = ("dwells", "coefficients", "covariance", "grades")
 

@@ -1,10 +1,14 @@
-"""The stages of the chain, in order: what each reads, what it writes, its parameters and its code."""
+"""The stages of the chain, in order: what each reads, what it writes, its parameters; ``archive/code.py`` has their code."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
+from pipelines.archive import Records, Run
 from pipelines.jobs.terms import budget_terms
 from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
@@ -20,11 +24,6 @@ from pipelines.tables.samples import PROCEDURE
 from pipelines.tables.summaries import summarised
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    import pandas as pd
-
-    from pipelines.archive import Records, Run
     from pipelines.jobs.job import Job
 
 Tables = dict[str, "pd.DataFrame"]
@@ -38,7 +37,6 @@ class Stage:
 
     inputs : tables it reads; ``records`` are the captured samples
     parameters : what it is called with besides tables, JSON-able: part of its key
-    modules : import names whose source, with all that it imports from the product, is part of its key
     """
 
     name: str
@@ -46,7 +44,6 @@ class Stage:
     outputs: tuple[str, ...]
     parameters: Callable[[Job], dict[str, Any]]
     call: Callable[[Job, Run], Tables]
-    modules: tuple[str, ...]
 
 
 def _records(run: Run) -> Records:
@@ -170,8 +167,6 @@ def _none(job: Job) -> dict[str, Any]:
     return {}
 
 
-_TABLES = "schemas.tables"
-
 STAGES: tuple[Stage, ...] = (
     Stage(
         name="validate",
@@ -179,7 +174,6 @@ STAGES: tuple[Stage, ...] = (
         outputs=("verdicts",),
         parameters=lambda job: {"lot": job.lot.model_dump(mode="json"), "zero_output": job.recipe.zero_output},
         call=_validate,
-        modules=("pipelines.stages.validate", _TABLES),
     ),
     Stage(
         name="reduce",
@@ -187,7 +181,6 @@ STAGES: tuple[Stage, ...] = (
         outputs=("dwells",),
         parameters=_reduced_with,
         call=_reduce,
-        modules=("pipelines.stages.reduce", _TABLES),
     ),
     Stage(
         name="fit",
@@ -198,7 +191,6 @@ STAGES: tuple[Stage, ...] = (
             "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
         },
         call=_fit,
-        modules=("pipelines.stages.fit", _TABLES),
     ),
     Stage(
         name="verify",
@@ -206,7 +198,6 @@ STAGES: tuple[Stage, ...] = (
         outputs=("verification", "verification_poses"),
         parameters=_none,
         call=_verify,
-        modules=("pipelines.stages.verify", _TABLES),
     ),
     Stage(
         name="noise",
@@ -214,7 +205,6 @@ STAGES: tuple[Stage, ...] = (
         outputs=("allan", "noise"),
         parameters=_none,
         call=_noise,
-        modules=("pipelines.stages.noise", _TABLES),
     ),
     Stage(
         name="budget",
@@ -222,7 +212,6 @@ STAGES: tuple[Stage, ...] = (
         outputs=("budget", "uncertainties", "budget_covariance"),
         parameters=lambda job: budget_terms(job).document(),
         call=_budget,
-        modules=("pipelines.stages.uncertainty.budget", _TABLES),
     ),
     Stage(
         name="procedures",
@@ -230,7 +219,6 @@ STAGES: tuple[Stage, ...] = (
         outputs=("procedure_points", "procedure_figures", "procedure_findings"),
         parameters=_listed,
         call=_procedures,
-        modules=("pipelines.stages.procedures", _TABLES),
     ),
     Stage(
         name="grade",
@@ -242,7 +230,6 @@ STAGES: tuple[Stage, ...] = (
             **({} if job.recipe.tumbles else {"tumbles": False}),
         },
         call=_grade,
-        modules=("pipelines.stages.grade", _TABLES),
     ),
 )
 ORDER = ("capture", *(stage.name for stage in STAGES), "report")

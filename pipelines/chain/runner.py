@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
@@ -19,15 +20,10 @@ from pipelines.archive.locks import alone
 from pipelines.archive.run import START
 from pipelines.archive.run_files import SEALED
 from pipelines.chain.chain import BY_NAME, ORDER, RECORDS, Stage
-from schemas.progress import silent
+from schemas.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import pandas as pd
-
     from pipelines.jobs.job import Job
-    from schemas.progress import Progress
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,7 @@ def captured_tables(records: Records) -> dict[str, pd.DataFrame]:
 
 def decisive(job: Job) -> dict[str, Any]:
     """What the result of a job depends on; the report only shows it and may be made anew in its place."""
-    code = {stage.name: code_hash(stage.modules) for stage in BY_NAME.values()}
+    code = {stage.name: code_hash(stage.name) for stage in BY_NAME.values()}
     about = {key: value for key, value in job.about.items() if key != "station"}
     return {**about, "code": code}
 
@@ -132,7 +128,7 @@ class Runner:
         return was_there
 
     def _compute(self, stage: Stage) -> bool:
-        inputs, parameters, code = self._inputs(stage.inputs), stage.parameters(self.job), code_hash(stage.modules)
+        inputs, parameters, code = self._inputs(stage.inputs), stage.parameters(self.job), code_hash(stage.name)
         key = stage_key(stage.name, inputs, parameters, code)
         if self.run.has(stage.outputs, key):
             return True

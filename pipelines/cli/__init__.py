@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from inspect import cleandoc
 from pathlib import Path
@@ -23,8 +24,6 @@ from schemas.log_lines import tell
 from schemas.own_files import report_to
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from typer._click import Command, Context
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C

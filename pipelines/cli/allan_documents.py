@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inertial.noise.allan import CONFIDENCE, overlapping
-from inertial.noise.terms import NAMES, fit_terms, model_deviation
+from inertial.noise.terms import NAMES, NoiseTerms, fit_terms, model_deviation
+from pipelines.archive import Run
 from pipelines.importers.series import EvenSeries
 from pipelines.stages.noise import FEWEST, UNEXPLAINED_P, alike, limits_where_unexplained, static_record
 from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected, WrongUse
 
-if TYPE_CHECKING:
-    from inertial.noise.terms import NoiseTerms
-    from pipelines.archive import Run
-
-    Array = np.ndarray
+Array = np.ndarray
 
 ALLAN = {"statistic": "allan", "statistic_name": "overlapping Allan deviation"}
 

@@ -6,17 +6,15 @@ names of files itself where there are none.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipelines.archive import RunInfo
 from schemas.errors import TumblelineError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
     from typer._click import Command, Context, Parameter
-
-    from pipelines.archive import RunInfo
 
 
 def attach(command: Command) -> Command:

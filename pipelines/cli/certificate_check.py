@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipelines.archive import Archive
 from pipelines.cli.options import console, print_json
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.archive import Archive
     from pipelines.certificates.document.file_check import CheckedFile
 
 ENDINGS = (".pdf", ".xml", ".sig")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
+from pipelines.archive import Run
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -18,7 +19,6 @@ from pipelines.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from pipelines.archive import Run
     from pipelines.chain.certify import Certified
 
 PART = "Certificates, trace, audit"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Run
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -21,7 +22,6 @@ from pipelines.cli.options import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from pipelines.archive import Run
     from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
     from pipelines.export.recording import CorrectableRecording
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,13 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli.options import JsonOption, console, error_console, print_json, print_table, short
+from schemas.progress import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
     from pipelines.demo.measure import DemoLot
     from pipelines.demo.scenes import Scene
-    from schemas.progress import Progress
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 210

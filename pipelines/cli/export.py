@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pipelines.archive import Run
 from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
 
 PART = "Results"
@@ -27,10 +29,8 @@ for _name in _FORMATS:  # the first line of a module says what it writes
     _FORMATS[_name] = _line.strip('"').partition(": ")[2].replace("``", "")
 EPILOG = ("Formats:", *(f"{name}: {text}" for name, text in _FORMATS.items()))
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
-    from pipelines.archive import Run
+if TYPE_CHECKING:
     from pipelines.export import UnitCalibration
 
 

@@ -6,11 +6,10 @@ command. A text needs no conversion, and a parameter that is not given has no va
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from typer._click import Command, Context, Parameter
 
 

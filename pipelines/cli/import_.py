@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -21,10 +21,6 @@ from pipelines.cli.options import (
 from pipelines.cli.text.import_text import print_import, print_transfers
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 PART = "Measure"
 ORDER = 160

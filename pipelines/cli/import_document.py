@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.options import error_console
+from pipelines.importers.content import Content
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pipelines.importers.content import Content
     from pipelines.importers.mapping import Mapping
     from schemas.import_references import ImportReferences
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
+from pipelines.archive import Run
 from pipelines.cli.options import console, error_console, print_json
 from schemas.errors import DONE, PART_FAILED
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pipelines.archive import Run
 
 VERDICTS = {
     True: ("adequate", "bold green"),

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.archive import Run
 from schemas.errors import WrongUse
 
-if TYPE_CHECKING:
-    from pipelines.archive import Run
-
-MODULES = ("pipelines.report.diagnosis", "pipelines.report.imported", "pipelines.diagnosis.diagnose", "schemas.tables")
 GRADED = ("grades", "figures", "budget", "uncertainties", "verification", "lot_risks")
 
 
@@ -43,7 +40,7 @@ def make_imported_report(run: Run) -> bool:
     use_formulas_of(run)
     past = run.table("history") if "history" in run.tables() else None
     judged = [name for name in GRADED if name in run.tables()]
-    inputs, code = {name: run.manifest(name)["sha256"] for name in (*names, *judged)}, code_hash(MODULES)
+    inputs, code = {name: run.manifest(name)["sha256"] for name in (*names, *judged)}, code_hash("report of an import")
     parameters: dict[str, Any] = {"effects": effects}
     if given := certificates_of(run):
         parameters["certificates"] = {unit: list(one) for unit, one in sorted(given.items())}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pipelines.archive import Archive, Run
 from pipelines.cli.options import error_console
 
 if TYPE_CHECKING:
-    from pipelines.archive import Archive, Run
     from pipelines.jobs.job import Job
 
 CHOICES = "y or Enter measures them, n leaves it; Ctrl-C stops, and the same command continues"

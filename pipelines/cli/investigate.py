@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,14 +24,11 @@ from pipelines.cli.options import (
     short,
 )
 from pipelines.cli.run import shown
+from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractContextManager
-
     from pipelines.inquiry.inquiry import FollowUp, Inquiry
-    from pipelines.inquiry.joint_diagnosis import JointDiagnosis
     from pipelines.inquiry.loop import Approval, Consent, InquirySettings
     from pipelines.jobs.job import Request
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
 from pipelines.cli.options import JsonOption, console, print_json, print_table
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 PART = "Measure"
 ORDER = 190

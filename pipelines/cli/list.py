@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 from inertial.counts import number_of
+from pipelines.archive import RunInfo
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
-
-if TYPE_CHECKING:
-    from pipelines.archive import RunInfo
 
 PART = "Results"
 ORDER = 310

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.monitoring.alerts import Poster
 
 if TYPE_CHECKING:
-    from pipelines.monitoring.alerts import Poster
     from pipelines.monitoring.snapshot import Monitor
 
 PART = "Measure"

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipelines.cli.next_commands import command_line, print_next
 from pipelines.cli.optimise_options import OptimiseOptions, levels_of, requirement_of
 from pipelines.cli.options import console, error_console, print_table, short
 from schemas.errors import TumblelineError
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from inertial.noise.dwells import DwellNoise
     from inertial.planning.expected import Expected
     from pipelines.planning.optimise import Optimum
     from pipelines.planning.plan import PlanContext
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 TOLERANCE = 1.1
 """Largest ratio to the textbook plan's errors for which the nearest recipe is written, without required errors in the options."""

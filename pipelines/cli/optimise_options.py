@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, get_args
 from schemas.bounds import COLDEST_C, HOTTEST_C
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
+from schemas.recipe import Recipe
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
     from pipelines.planning.plan import PlanContext
     from pipelines.planning.requirement import Requirement
-    from schemas.recipe import Recipe
 
 
 @dataclass(frozen=True)

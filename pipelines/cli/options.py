@@ -5,21 +5,19 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Run
 from pipelines.tables.json_values import json_value
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import pandas as pd
     from rich.console import Console
     from rich.text import Text
-
-    from pipelines.archive import Run
 
 
 ArchiveOption = Annotated[

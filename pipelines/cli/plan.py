@@ -21,12 +21,11 @@ from pipelines.cli.plan_files import save, write_page, write_pictures
 from pipelines.cli.plan_options import DeviceOption, EffectsOption, NoiseOption, PageOption, WanderOption, with_model
 from pipelines.cli.text.plan_text import print_plan, print_procedures
 from schemas.errors import PART_FAILED
+from schemas.limits import Limits
+from schemas.recipe import Recipe
 
 if TYPE_CHECKING:
     from typer._click import Context
-
-    from schemas.limits import Limits
-    from schemas.recipe import Recipe
 
 PART = "Measure"
 ORDER = 120

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, console, print_json, print_table
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from pipelines.archive import Archive
     from pipelines.jobs.releases import Release
 
 PART = "Old data, new models"

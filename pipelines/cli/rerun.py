@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from inertial.counts import number_of
+from pipelines.archive import Archive
 from pipelines.cli.options import (
     ArchiveOption,
     DaskOption,
@@ -25,9 +27,6 @@ from pipelines.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.reproduce import Reproduction
     from pipelines.rerun.rerun import RerunOutcome

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive, Run
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -18,15 +20,11 @@ from pipelines.cli.options import (
     error_console,
     print_json,
 )
+from schemas.progress import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-    from contextlib import AbstractContextManager
-
-    from pipelines.archive import Archive, Run
     from pipelines.chain.runner import Done
     from pipelines.jobs.job import Job, Request
-    from schemas.progress import Progress
 
 PART = "Measure"
 ORDER = 110

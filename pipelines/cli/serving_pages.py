@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from pipelines.cli.options import error_console
 
 if TYPE_CHECKING:
-    import socket
-
     import uvicorn
 
 

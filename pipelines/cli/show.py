@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from inertial.counts import number_of
+from pipelines.archive import Archive, Run
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -18,9 +19,6 @@ from pipelines.cli.options import (
     short,
 )
 from schemas.errors import DONE, PART_FAILED
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive, Run
 
 PART = "Results"
 ORDER = 320

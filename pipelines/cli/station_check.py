@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,8 +12,6 @@ from pipelines.cli.options import JsonOption, StationOption, error_console, prin
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from schemas.lot import Lot
     from schemas.station import StationConfig
     from stations.self_test import CheckResult, SelfTestBench

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive
 
 STYLES = {
     "spoilt": "yellow",

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Records
 from pipelines.cli.chart import Line, chart, clock
 from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, print_json
 from pipelines.cli.station_lot import made_up
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-    from pathlib import Path
-
     from rich.console import Group
 
-    from pipelines.archive import Records
     from stations.overview import Overview
 
 MOVE_S = 5.0  # the table keeps its position until shortly before the next record

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
 from inertial.counts import number_of
-from pipelines.capture.interruptions import interruptions
+from pipelines.archive import Run
+from pipelines.capture.interruptions import Interruptions, interruptions
 from pipelines.cli.options import STYLES, console, print_table, short
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
-    import pandas as pd
     from rich.text import Text
-
-    from pipelines.archive import Run
-    from pipelines.capture.interruptions import Interruptions
 
 SHOWN = (
     ("residual_rms_ug", "fit\nµg"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from pipelines.cli.options import error_console
@@ -10,9 +12,6 @@ from pipelines.jobs.seating import Seating, scan
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractContextManager
-
     from pipelines.chain.attendance import Answer, Prompt
 
 YES = frozenset({"", "y", "yes", "go", "ok"})

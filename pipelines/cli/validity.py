@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.archive import Archive
+from pipelines.certificates import Calibration
 from pipelines.cli.options import console, print_json, print_table
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive
-    from pipelines.certificates import Calibration
-
 
 MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "who", "where", "when")
 

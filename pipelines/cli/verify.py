@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from inertial.counts import number_of
 from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+from pipelines.integrity import Report
 from schemas.errors import DONE, PART_FAILED
 
 SHOWN = 8  # consequences of one finding
 
-if TYPE_CHECKING:
-    from pipelines.integrity import Report
 
 PART = "Certificates, trace, audit"
 ORDER = 440

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pipelines.archive import Run
 from pipelines.cli.options import ArchiveOption, RunArgument, console
 
 if TYPE_CHECKING:
-    from pipelines.archive import Run
     from pipelines.export.waveforms import Channel
 
 PART = "Results"

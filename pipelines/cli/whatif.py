@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
+from pipelines.archive import Archive
 from pipelines.cli.options import (
     ArchiveOption,
     DaskOption,
@@ -23,7 +24,6 @@ from pipelines.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
 
 PART = "Old data, new models"

@@ -6,7 +6,8 @@ Drivers and registers are those of a production station; only the physics is sim
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,16 +20,11 @@ from pipelines.stages.reduce import reduce
 from schemas.errors import WrongUse
 from schemas.lot import Lot, Unit
 from schemas.poses import Pose
-from schemas.progress import silent
+from schemas.progress import Progress, silent
 from schemas.recipe import Recipe
 from schemas.simulation import Hidden
 from schemas.station import Soak, StationConfig, load_station
 from stations import open_station
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from schemas.progress import Progress
 
 UNITS = 4
 QUIET = {

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
@@ -12,11 +15,12 @@ from inertial.criticism.left_out import left_out
 from inertial.effects import StationEffect
 from inertial.errors import InertialError
 from inertial.estimation.alternative import Handling
-from inertial.estimation.comparison import estimate, residuals_of, rms
+from inertial.estimation.comparison import Estimate, estimate, residuals_of, rms
 from inertial.estimation.freedom import refuse_without_freedom
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import intervals, settled, terms_of
+from inertial.estimation.term import Term
 from inertial.planning.reasons import drivers_of
 from pipelines.diagnosis.confirmation import progress
 from pipelines.diagnosis.doubts import doubt_of_run
@@ -24,16 +28,7 @@ from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from inertial.estimation.comparison import Estimate
-    from inertial.estimation.term import Term
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def compare(

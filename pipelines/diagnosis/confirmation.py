@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from inertial.criticism.left_out import left_out
-from inertial.criticism.reproduced_change import reproduced_change, without_own_bias
+from inertial.criticism.left_out import Kind, LeftOut, left_out
+from inertial.criticism.reproduced_change import ReproducedChange, reproduced_change, without_own_bias
 from inertial.decisions import BLOCKS, CONFIRMED, LEFT_OUT, RISES
 from inertial.estimation.comparison import estimate, residuals_of, rms
-from inertial.estimation.problem import Problem
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
 from pipelines.diagnosis.result_rows import known
 from schemas.units import MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import NDArray
-
-    from inertial.criticism.left_out import Kind, LeftOut
-    from inertial.criticism.reproduced_change import ReproducedChange
-    from inertial.estimation.model import Model
-    from inertial.estimation.problem import Lot
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 _TOLD = {"blocks of time": "stretches of time"}

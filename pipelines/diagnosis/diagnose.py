@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from inertial import effects as catalogue
+from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.diagnosis import diagnose as diagnose_lot
+from inertial.data_errors.faults import Fault
 from inertial.errors import InertialError
 from pipelines.diagnosis.compare import compare, without_history
-from pipelines.diagnosis.next_measurement import proposed
+from pipelines.diagnosis.next_measurement import Proposed, proposed
 from pipelines.diagnosis.result_rows import (
     Names,
     classes_of,
@@ -26,18 +30,9 @@ from pipelines.diagnosis.result_rows import (
     without_influence,
 )
 from pipelines.diagnosis.suggested_formula import what_follows
+from pipelines.tables.dwells import Measured
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, gaps, generator, probability, sound_lot
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    import pandas as pd
-
-    from inertial.criticism.diagnosis import Diagnosis
-    from inertial.data_errors.faults import Fault
-    from pipelines.diagnosis.next_measurement import Proposed
-    from pipelines.tables.dwells import Measured
 
 __all__ = ["compare", "default_model", "diagnose", "document", "examined"]
 

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from inertial.criticism.diagnosis import diagnose
 from inertial.criticism.verdict import judged
+from inertial.data_errors.bad_dwells import BadDwell
 from inertial.data_errors.faults import find_faults
 from inertial.errors import InertialError
+from inertial.estimation.problem import Lot
 from pipelines.diagnosis.result_rows import BAD_DWELL
+from pipelines.tables.dwells import Measured
 from pipelines.tables.sound_lot import generator
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from inertial.data_errors.bad_dwells import BadDwell
-    from inertial.estimation.problem import Lot
-    from pipelines.tables.dwells import Measured
 
 
 def doubt_of_run(measurement: Measured, lot: Lot, before: Sequence[str], after: Sequence[str]) -> str | None:

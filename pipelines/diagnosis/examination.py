@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from inertial import effects as catalogue
+from inertial.criticism.diagnosis import Diagnosis
 from inertial.planning.reasons import reason
 from pipelines.diagnosis.diagnose import default_model, document, examined
 from pipelines.diagnosis.suggested_formula import as_toml, offer
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    import pandas as pd
-
-    from inertial.criticism.diagnosis import Diagnosis
-    from pipelines.tables.dwells import Measured
+from pipelines.tables.dwells import Measured
 
 
 @dataclass(frozen=True)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from pipelines.diagnosis.imported_norms import norm
 from pipelines.importers.faces import six_faces
+from pipelines.importers.judged import FitAnswer
+from pipelines.importers.mapping import Mapping
 from pipelines.importers.plane import plane, shown_turn
 from pipelines.importers.pose_check import silent_axis
 from pipelines.importers.ramp import ramp
 from schemas.errors import DataRejected
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pipelines.importers.judged import FitAnswer
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
 METHODS: dict[str, Callable[[Imported, Mapping], FitAnswer]] = {

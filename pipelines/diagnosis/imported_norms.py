@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from inertial.counts import degrees_of_freedom
@@ -13,21 +16,16 @@ from inertial.state import T_REFERENCE
 from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
+from pipelines.importers.mapping import Mapping
 from pipelines.stages.unknown_poses.fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
 from pipelines.tables.condense import MOST
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
+Array = NDArray[np.float64]
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
-
-    Array = NDArray[np.float64]
 
 COVERAGE = 2.0
 TEMPERATURE = "bias_temperature"

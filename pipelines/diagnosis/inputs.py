@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from pipelines.archive import Archive
 from pipelines.importers.exchange import read_dwells, read_history
@@ -12,11 +14,6 @@ from pipelines.jobs.model_files import chosen_effects, use_formulas, use_formula
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 from schemas.recipe import FormulaSpec
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
 
 WHY = "entered as a formula"
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from inertial.decisions import CONFIRMED, LEFT_OUT
 from pipelines.diagnosis.confirmation import fall_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pipelines.jobs.model_files import Version
 
 FIGURES = {

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inertial import effects as catalogue
+from inertial.criticism.classes import EffectClass
+from inertial.criticism.diagnosis import Diagnosis
 from inertial.errors import MissingInput
 from inertial.next_measurement.proposals import Circumstances, Proposal, proposal, sighting, twins
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from inertial.criticism.classes import EffectClass
-    from inertial.criticism.diagnosis import Diagnosis
-    from inertial.planning.sequences import SequenceStep
+from inertial.planning.sequences import SequenceStep
 
 BREAKER_POSE = (0.0, 0.0, 25.0)
 """Pose of a row without steps (``measurable`` is false): its text states what is needed."""

@@ -7,16 +7,14 @@ both.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 from pydantic import ValidationError
 
 from schemas.poses import Pose, SoakPart
 from schemas.recipe import Recipe
 from schemas.toml_files import explain
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 SAME_SOAK_K = 0.5
 """Steps whose chamber temperature differs by less from the soak before them are part of that soak."""

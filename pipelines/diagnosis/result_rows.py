@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inertial import effects as catalogue
+from inertial.criticism.diagnosis import Diagnosis, Named
+from inertial.criticism.influence import CarriedEvidence
+from inertial.data_errors.bad_dwells import BadDwell
 from inertial.estimation.model import Model
 from inertial.estimation.refinement import intervals, settled, terms_of
 from pipelines.tables.sound_lot import probability
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from inertial.criticism.diagnosis import Diagnosis, Named
-    from inertial.criticism.influence import CarriedEvidence
-    from inertial.data_errors.bad_dwells import BadDwell
 
 BAD_DWELL = "bad_dwell"
 """Id of a fault of a single dwell of one unit."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from inertial.expressions import NAMES, QUANTITIES
 from inertial.quantities import formula_name
+from inertial.state import State
 
 if TYPE_CHECKING:
     from inertial.criticism.diagnosis import Unexplained
-    from inertial.state import State
 
 
 _PARTS = {

@@ -5,14 +5,11 @@ from __future__ import annotations
 import os
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from pipelines.archive.files import TEMPORARY
-from pipelines.archive.store import first_line
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
-    from pipelines.doctor.documents import State
+from pipelines.archive.store import Place, first_line
+from pipelines.doctor.documents import State
 
 LARGEST_OFFSET_S = 5.0
 """Largest difference of two clocks, s: the order of runs and the days of certificates follow the clock of the host."""

@@ -7,23 +7,18 @@ import platform
 import sys
 from datetime import UTC, datetime
 from importlib import metadata
-from typing import TYPE_CHECKING
+from pathlib import Path
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pipelines.doctor.archive import archive_checks, key_checks
 from pipelines.doctor.check import Check, of_error, unwritable, write_probe
+from pipelines.doctor.documents import CheckDocument, DoctorDocument
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.doctor.software import software_checks
 from schemas.errors import TumblelineError
 from schemas.shipped import PRODUCT, shipped
+from stations.overview import Overview
 from stations.safety.folder import VARIABLE, state_folder
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pipelines.doctor.documents import CheckDocument, DoctorDocument
-    from stations.overview import Overview
-
 
 LEAST_FREE_GB = 1.0
 """Free space that an archive needs, GB, by default."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -14,9 +15,6 @@ from packaging.utils import canonicalize_name
 from pipelines.doctor.check import Check
 from schemas.locks import UNUSED, pins
 from schemas.shipped import PRODUCT, shipped
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 PART = "software"
 LOCK = "requirements-run.lock"

@@ -6,14 +6,12 @@ A page, a file of a report and a CSV file are drawn from the same description, s
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 Role = Literal["x", "y", "z", "fourth", "norm", "accent", "before", "after", "muted", "limit", "good", "ink"]
 Style = Literal["points", "line", "band", "bars", "density", "labels"]

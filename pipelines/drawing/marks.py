@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL
 
+Array = NDArray[np.float64]
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
     from pipelines.drawing.chart import Anchor, ColourScale, Trace
-
-    Array = NDArray[np.float64]
 
 OUTLINE = "#555555"
 INSIDE = 1e-6

@@ -5,18 +5,12 @@ Mollweide's projection (Snyder, Map Projections: A Working Manual, USGS 1395, 19
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
-from pipelines.drawing.chart import Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Anchor, Plot, PlotAxis, Trace
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.drawing.chart import Anchor
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 _STEPS = 30
 LETTERS: dict[str, tuple[tuple[float, float, float], Anchor]] = {

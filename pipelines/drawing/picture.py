@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from pipelines.drawing.chart import Chart
 from pipelines.drawing.vector import WIDTH, alone, svg_text
 from schemas.errors import WrongUse
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pipelines.drawing.chart import Chart
 
 ENDINGS = (".svg", ".png", ".pdf")
 EXTRA = "pdf"

@@ -9,13 +9,12 @@ import base64
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.drawing.chart import DIVERGING, SEQUENTIAL
 from pipelines.drawing.ticks import log_ticks
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 
 MANY = 4000

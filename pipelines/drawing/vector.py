@@ -10,17 +10,16 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.drawing.chart import ROLES
 from pipelines.drawing.marks import DRAW, Place, marks, shade
 from pipelines.drawing.ticks import Ticks, date_ticks, linear_ticks, log_ticks
 
+Array = NDArray[np.float64]
+
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
-
-    Array = NDArray[np.float64]
 
 WIDTH = 1150.0
 """Of the picture, in its own pixels; a page shows it as wide as it is itself."""

@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from inertial import static_intervals
 from inertial.correction import correct, output_covariance, remaining_step
 from inertial.noise.bias_filter import Track, track
-from inertial.noise.gauss_markov import bias_model, flicker_of_steps
+from inertial.noise.gauss_markov import FlickerTerms, bias_model, flicker_of_steps
 from inertial.noise.likely_terms import LikelyTerms, likely_terms
-from pipelines.export.polynomials import unit_calibrations
-from pipelines.export.unit_noise import curve_of_unit, required_noise
+from pipelines.archive import Run
+from pipelines.export.polynomials import UnitCalibration, unit_calibrations
+from pipelines.export.recording import CorrectableRecording
+from pipelines.export.unit_noise import UnitCurve, curve_of_unit, required_noise
 from pipelines.importers.exchange import refuse_other_procedures
 from pipelines.tables.calibration import read_calibration
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.units import AXES, MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
-
-    from numpy.typing import NDArray
-
-    from inertial.noise.gauss_markov import FlickerTerms
-    from pipelines.archive import Run
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.recording import CorrectableRecording
-    from pipelines.export.unit_noise import UnitCurve
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 CONVERGED_G = 1e-6

@@ -24,20 +24,16 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.export.fixed_point import FixedPoint, fixed_point, thousandths
-from pipelines.export.polynomials import ORDER
+from pipelines.export.polynomials import ORDER, UnitCalibration
 from schemas.errors import WrongUse
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.export.polynomials import UnitCalibration
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 Form = Literal["float32", "q24"]
 FORMS: dict[Form, int] = {"float32": 1, "q24": 2}

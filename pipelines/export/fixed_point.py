@@ -6,20 +6,15 @@ M is a polynomial that was fitted over the measured temperatures alone: beyond t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipelines.export.polynomials import ORDER
+from pipelines.export.polynomials import ORDER, UnitCalibration
 from schemas.errors import WrongUse
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.export.polynomials import UnitCalibration
-
-    Array = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 BITS = 24
 ONE = 1 << BITS

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pipelines.export.polynomials import UnitCalibration
 from schemas.units import MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.export.polynomials import UnitCalibration
-
-    Array = NDArray[np.float64]
-    Applied = Callable[[Array, float], Array]
+Array = NDArray[np.float64]
+Applied = Callable[[Array, float], Array]
 
 TEMPERATURES = 33  # what is left of a fitted cubic has its largest values between the ends
 LEAST_UG = 1e-3

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.export.comments import comment
-from pipelines.export.omissions import ACROSS, ACROSS_T, BIAS_T, SCALE_T, comment_lines, largest_error_ug, omitted
+from pipelines.export.omissions import (
+    ACROSS,
+    ACROSS_T,
+    BIAS_T,
+    SCALE_T,
+    Applied,
+    comment_lines,
+    largest_error_ug,
+    omitted,
+)
+from pipelines.export.polynomials import UnitCalibration
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.export.omissions import Applied
-    from pipelines.export.polynomials import UnitCalibration
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

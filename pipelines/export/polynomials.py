@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.fits.linear import axis_rows
 from inertial.state import T_REFERENCE
-from pipelines.certificates.statement import stated
+from pipelines.archive import Run
+from pipelines.certificates.statement import Stated, stated
 from pipelines.export.unit_noise import noise_of_units
 from pipelines.importers.exchange import refuse_other_procedures
-from pipelines.tables.calibration import read_calibration
+from pipelines.tables.calibration import Calibration, read_calibration
 from schemas.errors import RecipeInvalid, WrongUse
 from stations.plant.preset import load_preset
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.archive import Run
-    from pipelines.certificates.statement import Stated
     from pipelines.export.unit_noise import UnitNoise
-    from pipelines.tables.calibration import Calibration
 
 BIAS = ("bias", "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic")
 SCALE = ("scale", "scale_temperature", "scale_temperature_quadratic")

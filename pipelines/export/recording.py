@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST
 from inertial.state import State
 from pipelines.importers import files
+from pipelines.stages.reduce import FollowedSupply
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from pipelines.stages.reduce import FollowedSupply
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 TIME = "time_s"
 USUAL = (("x", "y", "z"), ("out_x", "out_y", "out_z"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,6 @@ from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import shown
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from pipelines.export.polynomials import UnitCalibration
 
 ARITHMETICS = ("double", "float", "q24")

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pipelines.archive import Run
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from pipelines.archive import Run
 
 TERMS = ("N", "B", "K")
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from prefect import flow, task
 from prefect.artifacts import create_markdown_artifact, create_table_artifact
 from prefect.cache_policies import NO_CACHE
 
 from inertial.counts import number_of
+from pipelines.archive import Archive
 from pipelines.archive.files import ELSEWHERE, json_bytes, publish
-from pipelines.audit.audit import Scope, audit
+from pipelines.audit.audit import Audit, Scope, audit
 from pipelines.audit.calibrations import date_of, day_of
 from pipelines.audit.document import counts, document
-from pipelines.audit.finding import WHO
+from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.findings import findings
 from pipelines.audit.page import render
 from pipelines.audit.rules import load_rules
@@ -23,11 +24,6 @@ from pipelines.certificates.days import today
 from pipelines.flows.dask_cluster import on_dask
 from pipelines.orchestrator.archive_address import archive_of
 from pipelines.tables.json_values import json_value
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive
-    from pipelines.audit.audit import Audit
-    from pipelines.audit.finding import AuditFinding
 
 KEY = "tumbleline-audit"
 MOST_ROWS = 500  # rows of the table of findings; page and document have all findings

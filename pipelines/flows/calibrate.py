@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from prefect import flow, task
 from prefect.cache_policies import NO_CACHE
@@ -18,7 +19,7 @@ from prefect.runtime import flow_run
 from prefect.states import Cancelled
 
 from pipelines.audit.index_growth import add_runs
-from pipelines.chain.attendance import JUDGED, Attendance
+from pipelines.chain.attendance import JUDGED, Attendance, Operator
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Done, Runner
 from pipelines.flows.operator import Paused
@@ -27,13 +28,7 @@ from pipelines.orchestrator.archive_address import archive_of
 from pipelines.orchestrator.policy import policy_of_tags
 from pipelines.orchestrator.queue_rules import newer_run
 from schemas.errors import LinkLost, NotReached, StationTimeout
-from schemas.progress import silent
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from pipelines.chain.attendance import Operator
-    from schemas.progress import Progress
+from schemas.progress import Progress, silent
 
 HISTORY_S = 20.0
 AUTO = "auto-scheduled"  # tag of Prefect on the runs of a schedule

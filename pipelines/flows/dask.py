@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from prefect import flow, task
 from prefect.cache_policies import NO_CACHE
@@ -12,9 +13,6 @@ from prefect_dask.task_runners import DaskTaskRunner
 from pipelines.orchestrator.settings import LOCAL
 from pipelines.parallel import in_one_thread, one_thread_each
 from schemas.errors import LinkLost
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 CONNECT_S = 10
 

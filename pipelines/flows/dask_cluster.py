@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.flows.local import own_server, reach_named
 from pipelines.orchestrator.settings import LOCAL
+from pipelines.parallel import Distributor
 from schemas.errors import WrongUse
 from schemas.library import require
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
-
-    from pipelines.parallel import Distributor
 
 SCHEMES = ("tcp://", "tls://", "ucx://", "ws://", "wss://")
 

@@ -6,28 +6,25 @@ operator: from the server's page, from ``tumbleline operator``, or from any clie
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from prefect import flow
 
+from pipelines.archive import Archive
 from pipelines.chain.attendance import Prompt
 from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Done, Runner
 from pipelines.flows.calibrate import requested, stage
 from pipelines.flows.local import reached
 from pipelines.flows.operator import Paused
+from pipelines.inquiry.inquiry import FollowUp, Inquiry
+from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from pipelines.inquiry.loop import Consent, InquirySettings, Participants, always, run_inquiry
+from pipelines.jobs.job import Request
 from pipelines.orchestrator.archive_address import archive_of
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    from pipelines.archive import Archive
-    from pipelines.chain.runner import Done, Runner
-    from pipelines.inquiry.inquiry import FollowUp, Inquiry
-    from pipelines.inquiry.joint_diagnosis import JointDiagnosis
-    from pipelines.jobs.job import Request
 
 _participants: list[Participants] = []
 

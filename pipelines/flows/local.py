@@ -12,14 +12,17 @@ import time
 import urllib.error
 import urllib.request
 import uuid
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import code_hash
+from pipelines.archive import Archive, Run, code_hash
+from pipelines.chain.attendance import Operator
 from pipelines.chain.chain import BY_NAME, ORDER
+from pipelines.chain.runner import Done
 from pipelines.orchestrator.credentials import without_credentials
 from pipelines.orchestrator.quick_imports import quick_imports
 from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder
@@ -29,15 +32,10 @@ from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
 from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
 from schemas.installed import missing_in
+from schemas.progress import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from pipelines.archive import Archive, Run
-    from pipelines.chain.attendance import Operator
-    from pipelines.chain.runner import Done
     from pipelines.jobs.job import Job, Request
-    from schemas.progress import Progress
 
 POLL_S = 0.1
 PRIVATE = 0o600
@@ -77,10 +75,8 @@ def _prepare(job: Job) -> None:
     with quick_imports():
         for name in (*NEEDED, *(SIMULATED if job.station.simulation is not None else ())):
             import_module(name)
-    from pipelines.report import MODULES
-
-    for modules in (*(stage.modules for stage in BY_NAME.values()), MODULES):
-        code_hash(modules)  # keeps what each source imports
+    for name in (*BY_NAME, "report"):
+        code_hash(name)  # is kept
 
 
 @contextmanager

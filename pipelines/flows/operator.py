@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 from uuid import UUID
 
 from httpx import HTTPStatusError
@@ -17,8 +17,7 @@ from prefect.client.schemas.filters import FlowRunFilter, FlowRunFilterState, Fl
 from prefect.client.schemas.objects import FlowRun, StateType
 from prefect.input import RunInput
 
-if TYPE_CHECKING:
-    from pipelines.chain.attendance import Answer, Prompt
+from pipelines.chain.attendance import Answer, Prompt
 
 PATIENCE_S = 7 * 24 * 3600
 POLL_S = 1

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.importers import values
 from pipelines.importers.mapping import TIME_UNITS
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import foreign, shown
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 EPOCH_S = (9.46e8, 4.1e9)
 """Unix time of the years 2000 to 2099."""

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Mapping_
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
+from pipelines.importers.judged import FitAnswer
+from pipelines.importers.mapping import Mapping
 from schemas.units import AXES, MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping as Mapping_
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.importers.judged import FitAnswer
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
 

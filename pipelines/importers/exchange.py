@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.importers import files, values
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN, REQUIRED
 from schemas import table_check, tables
 from schemas.errors import DataRejected, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 from schemas.serials import refuse_unusable_serials
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-
-    from pipelines.archive import Run
-
 
 _TEXTS = ("kind", "pose", "out_unit", "status")
 _CORRECT = "correct it in the file"

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import shlex
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pandas as pd
 
 from inertial.counts import number_of
 from pipelines.importers.exchange import read_dwells
 from pipelines.importers.guesses import Guess, Guesses
 from pipelines.tables.dwell_columns import ANGLES, DEVIATIONS, FORCE, KNOWN
 from schemas.errors import TumblelineError
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pandas as pd
 
 FORMAT = "the exchange format"
 MEANINGS = {

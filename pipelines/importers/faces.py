@@ -5,20 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.fits.ferraris import Faces, faces, ferraris
 from inertial.probability import passes
 from inertial.uncertainty.rounding import equal
 from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
-from pipelines.importers.mapping import FACES
+from pipelines.importers.mapping import FACES, Mapping
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
 MODEL = ("bias", "scale", "misalignment")

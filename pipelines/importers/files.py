@@ -6,18 +6,16 @@ import hashlib
 import stat
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
+
+from pipelines.importers.content import Content
 from pipelines.importers.limited import in_reader, limits_for
 from pipelines.importers.unpacking import MOST_BYTES, gunzipped, refuse_cells
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import is_file as is_there
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.importers.content import Content
 
 _GZIP = b"\x1f\x8b"
 LONGEST_NAME = 200

@@ -5,20 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.quantities import LARGEST
 from pipelines.importers import clocks, unit_check, values
 from pipelines.importers.clocks import typical_step
+from pipelines.importers.content import Content
 from pipelines.importers.stated_units import TEMPERATURE, output_unit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.importers.content import Content
 
 _TIME = re.compile(r"time|stamp|elapsed|epoch|zeit|^t$|^ts$|^t[_ \[(]|sec(ond)?s?\b|x_value|date|clock", re.IGNORECASE)
 _COUNT = re.compile(r"sample|index|count|number|^n$|^#|window|row", re.IGNORECASE)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FEWEST_FITTED = 12
 """Smallest number of dwells of a unit for the fit; the fit of a model with more coefficients states a larger one."""

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import change_of_level, record_faults, static_intervals
 from pipelines.importers import clocks, files, sample_faults, sources, unit_check, values
+from pipelines.importers.content import Content
+from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument
 from pipelines.importers.exchange_inspection import (
     command_of_dwells,
     content_of_dwells,
@@ -23,15 +27,6 @@ from pipelines.importers.record_time import GAP
 from pipelines.importers.stated_units import TEMPERATURE
 from pipelines.tables.dwell_columns import is_exchange
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from pipelines.importers.content import Content
-    from pipelines.importers.documents import ColumnDocument, InspectDocument, IntervalDocument
 
 _NAMED = ("time", "x", "y", "z", "sd_x", "sd_y", "sd_z", "temperature", "dwell")
 _MOST_INTERVALS = 2000

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
+from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, WrongUse
 from schemas.units import AXES
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
 

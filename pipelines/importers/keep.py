@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from pipelines.archive import Archive, code_hash, stage_key
+from pipelines.archive import Archive, Run, code_hash, stage_key
+from pipelines.importers.files import SourceFile
+from pipelines.importers.judged import FitAnswer
+from pipelines.importers.mapping import Mapping
+from schemas.import_references import ImportReferences
 
 if TYPE_CHECKING:
-    from pipelines.archive import Run
-    from pipelines.importers.files import SourceFile
-    from pipelines.importers.judged import FitAnswer
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
-    from schemas.import_references import ImportReferences
 
 
 def keep(
@@ -33,7 +32,7 @@ def keep(
     """
     inputs = {"source": source.sha256}
     parameters = {"mapping": how.model_dump(mode="json"), "fit": None if judged is None else judged.method}
-    code = code_hash(("pipelines.importers", "pipelines.tables.norms", "inertial.fits", "inertial.static_intervals"))
+    code = code_hash("import")
     if references is not None:
         parameters["references"] = references.model_dump(mode="json")
     key = stage_key("import", inputs, parameters, code)

@@ -14,15 +14,13 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 from pipelines.importers import limited_process
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Given = ParamSpec("Given")
 Result = TypeVar("Result")

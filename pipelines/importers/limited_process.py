@@ -16,15 +16,13 @@ import struct
 import sys
 import threading
 import traceback
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 from schemas.errors import TumblelineError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 KEPT_BYTES = 192 * 2**20
 """A process that holds more after a reading ends, so that the memory is free again."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from datetime import date
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
@@ -13,9 +14,6 @@ from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import shown
 from schemas.toml_files import parse_toml, read_text
 from schemas.units import STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 NEEDED = ("x", "y", "z")
 MEANINGS: dict[str, str] = {

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.counts import number_of
 from inertial.errors import NotIdentified
@@ -12,18 +14,15 @@ from inertial.fits.plane import FEWEST_DOF, PlaneFit, fit_plane, fit_plane_norm,
 from inertial.probability import passes
 from inertial.uncertainty.rounding import equal
 from pipelines.importers.judged import FitAnswer, coefficient, gravity_of, imported_dwells
+from pipelines.importers.mapping import Mapping
 from pipelines.tables.dwells import measured
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
+Array = NDArray[np.float64]
+
 if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
-
-    Array = NDArray[np.float64]
 
 OUT, SPREAD = ([f"{kind}_{axis}" for axis in AXES] for kind in ("out", "sd"))
 FEWEST = 4

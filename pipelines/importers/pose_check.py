@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 from scipy.optimize import linear_sum_assignment
 
 from inertial.fits.plane import quiet_axis
+from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.importers.mapping import Mapping
 
 _DEAD = 0.2
 _CLEAR = 0.6

@@ -8,11 +8,11 @@ import numpy as np
 
 from inertial.fits.polynomial import fit_temperature_curve
 from pipelines.importers.judged import FitAnswer
+from pipelines.importers.mapping import Mapping
 from schemas.errors import WrongUse
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
-    from pipelines.importers.mapping import Mapping
     from pipelines.importers.record import Imported
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.importers import clocks, exchange, held_out, pose_check, sample_faults, unit_check, values
-from pipelines.importers.content import row_of
+from pipelines.importers.content import Content, row_of
+from pipelines.importers.documents import SampleFaultDocument
 from pipelines.importers.mapping import FACES, MEANINGS, OUTPUT_UNITS, Mapping
 from pipelines.importers.record_time import backwards, gaps_of, seconds, time_doubts
 from pipelines.importers.stated_units import column_name
@@ -18,14 +20,6 @@ from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.serials import refuse_unusable_serials
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.importers.content import Content
-    from pipelines.importers.documents import SampleFaultDocument
 
 
 @dataclass(frozen=True)

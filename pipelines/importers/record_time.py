@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping as Columns
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.counts import number_of
 from pipelines.importers import clocks, values
 from pipelines.importers.clocks import RecordingClock
+from pipelines.importers.content import Content
 from pipelines.importers.mapping import TIME_UNITS, Mapping
+from pipelines.importers.stretches import Stretches
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping as Columns
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.importers.content import Content
-    from pipelines.importers.stretches import Stretches
 
 FASTEST_K_S = 5.0
 """Rate of temperature that no chamber reaches."""

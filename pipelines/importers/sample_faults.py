@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import record_faults
+from pipelines.importers.documents import SampleFaultDocument
+from pipelines.importers.mapping import Mapping
 from pipelines.importers.stretches import Stretches
 from schemas.errors import DataRejected
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.importers.documents import SampleFaultDocument
-    from pipelines.importers.mapping import Mapping
 
 _MOST_LISTED = 5
 

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from pipelines.archive import Run
 from pipelines.importers import files
 from pipelines.importers.files import is_file
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.units import AXES
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.archive import Run
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 UNEVEN = 0.5
 """Largest deviation of a time from the even grid, in steps; above it a sample is missing or duplicated."""

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.importers import clocks, files, values
+from pipelines.importers.content import Content
 from pipelines.importers.stated_units import column_name
 from schemas.errors import DataRejected, WrongUse
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from pipelines.importers.content import Content
 
 
 @dataclass(frozen=True)

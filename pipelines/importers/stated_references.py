@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from datetime import UTC, date, datetime
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from schemas.errors import RecipeInvalid, WrongUse
 from schemas.import_references import ImportReferences, read_references
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 GRAVITY_SIGMAS = 3.0
 

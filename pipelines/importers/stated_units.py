@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping as Columns
+from typing import Any
 
+from pipelines.importers.content import Content
+from pipelines.importers.mapping import Mapping
 from schemas.errors import WrongUse
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping as Columns
-
-    from pipelines.importers.content import Content
-    from pipelines.importers.mapping import Mapping
 
 OUTPUT = {
     **dict.fromkeys(("g", "gn", "g0", "g_n", "grav"), "g"),

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import change_of_level, static_intervals
+from pipelines.importers.mapping import Mapping
 from schemas.errors import DataRejected, did_you_mean
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.importers.mapping import Mapping
 
 _MOST_LISTED = 6
 

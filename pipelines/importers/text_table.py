@@ -6,8 +6,9 @@ import io
 import re
 import warnings
 from bisect import bisect_left
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,9 +18,6 @@ from pipelines.importers.text_layout import BLANKS, Layout, filled_lines, is_com
 from pipelines.importers.thousands import without_thousands
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _MORE = "\0more"
 MOST_COLUMNS = 10_000

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from pipelines.importers.text_layout import fields_of, is_comment, is_number
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _SURE = ("'", "\N{RIGHT SINGLE QUOTATION MARK}", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", "\N{THIN SPACE}")
 """Signs that stand in no number for anything else."""

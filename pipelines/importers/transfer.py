@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,18 +13,12 @@ from inertial.dynamics.transfer_diagnosis import diagnose_transfer
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points
 from inertial.errors import InertialError
-from pipelines.archive import Archive, code_hash, stage_key
+from pipelines.archive import Archive, Run, code_hash, stage_key
 from pipelines.importers import files
 from pipelines.importers.documents import TransferImport, TransferParameter
 from pipelines.procedures.columns import finding_table, gathered_points
 from pipelines.procedures.transfer_figures import bandwidth_of, diagnosis_text
 from schemas.errors import DataRejected, WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.archive import Run
 
 NEEDED = ("frequency_hz", "magnitude", "phase_deg", "magnitude_uncertainty_percent", "phase_uncertainty_deg")
 OPTIONAL = {"level_g": 1.0, "temperature_C": np.nan, "record_s": np.nan}
@@ -138,7 +134,7 @@ def _keep(
 ) -> Run:
     """The run that holds the import, with a manifest that names the source."""
     inputs, parameters = {"source": source.sha256}, {"procedure": "sweep", "effects": effects, "unit": unit}
-    code = code_hash(("pipelines.importers.transfer", "inertial.dynamics.transfer_diagnosis"))
+    code = code_hash("import of a transfer function")
     key = stage_key("import", inputs, parameters, code)
     about = {
         "name": f"transfer function of {unit}",

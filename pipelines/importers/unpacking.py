@@ -9,13 +9,10 @@ from __future__ import annotations
 import gzip
 import io
 import zlib
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 MOST_BYTES = 2**30
 """Of a file, unpacked."""

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.quantities import BY_COLUMN, FORCE_COLUMNS, LARGEST, LARGEST_TIME_S, RECORDED, SPREAD_COLUMNS
-from pipelines.importers.content import row_of
+from pipelines.importers.content import Content, row_of
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.importers.content import Content
 
 _FORCE_G = 1e4
 ANGLES = ("outer", "inner")

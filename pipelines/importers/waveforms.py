@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from pydantic import ValidationError
 
 from inertial.errors import InertialError
-from pipelines.archive import Archive, code_hash, stage_key
+from pipelines.archive import Archive, Run, code_hash, stage_key
 from pipelines.importers import files
-from pipelines.importers.content import unit_in
+from pipelines.importers.content import Content, unit_in
 from pipelines.importers.documents import WaveformFigure, WaveformImport
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import (
@@ -31,13 +33,6 @@ from schemas.foreign import shown
 from schemas.poses import Pose
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from pipelines.archive import Run
-    from pipelines.importers.content import Content
 
 ACCELERATION = {"g": 1.0, "m/s^2": 1.0 / 9.80665, "m/s²": 1.0 / 9.80665, "m/s2": 1.0 / 9.80665, "mg": 1e-3}
 VOLT = {"V": 1.0, "mV": 1e-3}
@@ -274,7 +269,7 @@ def _keep(
     """
     whole = hashlib.sha256("".join(one.sha256 for one in sources).encode()).hexdigest()
     inputs, parameters = {"source": whole}, {"procedure": procedure, "unit": unit, **stated}
-    code = code_hash(("pipelines.importers.waveforms", f"pipelines.procedures.{procedure}"))
+    code = code_hash("import of waveforms")
     key = stage_key("import", inputs, parameters, code)
     about = {
         "name": f"{PROCEDURES[procedure].title} of {unit}, recorded elsewhere",

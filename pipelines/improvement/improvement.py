@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -9,8 +10,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 from schemas.errors import WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
-
     import pandas as pd
 
     from pipelines.jobs.model_files import Version

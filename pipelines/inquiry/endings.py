@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-if TYPE_CHECKING:
-    from pipelines.inquiry.joint_diagnosis import JointDiagnosis
-
+from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 
 End = Literal[
     "adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"

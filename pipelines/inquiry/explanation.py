@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,13 +11,11 @@ from inertial import frames
 from inertial.next_measurement.menus import Kind
 from inertial.planning.reasons import begins_again, confounding_feature, constant_feature, reason
 from inertial.planning.remedies import Driver
+from inertial.planning.sequences import SequenceStep
+from inertial.state import State
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from inertial.next_measurement.proposals import Proposal
-    from inertial.planning.sequences import SequenceStep
-    from inertial.state import State
 
 DRAWN_OUT_S = 5.0
 VARIED: dict[Kind, tuple[Driver, ...]] = {

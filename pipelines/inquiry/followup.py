@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -16,9 +17,6 @@ from pipelines.schedule.timing import StationPose, drive_of, lag_of, minutes, ru
 from schemas.poses import Pose, SoakPart
 from schemas.recipe import Recipe
 from stations.profile_files import profile_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 VARIED_K = 5.0
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from pipelines.archive import code_hash, files, stage_key
+from inertial.criticism.diagnosis import Diagnosis
+from inertial.next_measurement.proposals import Proposal
+from inertial.planning.sequences import SequenceStep
+from pipelines.archive import Archive, Records, Run, code_hash, files, stage_key
 from pipelines.chain.runner import Runner
 from pipelines.diagnosis.diagnose import document, examined
 from pipelines.diagnosis.next_measurement import Proposed, proposed, rows_of
@@ -17,18 +21,9 @@ from pipelines.inquiry.followup import circumstances, follow_up
 from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from pipelines.inquiry.lineage import RunSequence
 from pipelines.jobs.job import Job
+from pipelines.tables.dwells import Measured
+from schemas.progress import Progress
 from schemas.recipe import Recipe
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from inertial.criticism.diagnosis import Diagnosis
-    from inertial.next_measurement.proposals import Proposal
-    from inertial.planning.sequences import SequenceStep
-    from pipelines.archive import Archive, Records, Run
-    from pipelines.tables.dwells import Measured
-    from schemas.progress import Progress
-
 
 EXTRA = 0.3
 """Default budget of follow-ups, as a share of the first run's station time."""
@@ -37,7 +32,6 @@ MOST_ROUNDS = 6
 
 
 FOLLOW_UP = ("capture", "validate", "reduce")
-SOURCES = ("inertial", "pipelines.diagnosis.diagnose", "pipelines.tables.dwells")
 FILE = "inquiry.json"
 
 
@@ -196,7 +190,7 @@ class Inquiry:
         for parent in self.lineage.runs[:-1]:
             inputs[f"dwells of {parent.id}"] = parent.manifest("dwells")["sha256"]
         parameters = {"effects": list(self.effects), "parents": list(self.lineage.ids[:-1])}
-        code = code_hash(SOURCES)
+        code = code_hash("inquiry")
         key = stage_key("inquiry", inputs, parameters, code)
         if run.has_report(key):
             return

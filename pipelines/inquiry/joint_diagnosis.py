@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from inertial.state import State
+from pipelines.inquiry.lineage import RunSequence
+
 if TYPE_CHECKING:
     from inertial.criticism.diagnosis import Diagnosis
-    from inertial.state import State
     from pipelines.diagnosis.next_measurement import Proposed
-    from pipelines.inquiry.lineage import RunSequence
     from pipelines.tables.dwells import Measured
 
 

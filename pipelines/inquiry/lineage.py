@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from pipelines.archive import Run
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.archive import Run
 
 NUMBERED = ("dwell", "record")
 

@@ -5,23 +5,18 @@ The stages run as plain calls or as tasks of the orchestrator; approval of extra
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
+from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
+from pipelines.chain.runner import Done, Runner
 from pipelines.inquiry.endings import Ending
 from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, Inquiry, begin
 from pipelines.inquiry.joint_diagnosis import JointDiagnosis
-from schemas.progress import silent
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from pipelines.archive import Archive
-    from pipelines.chain.runner import Done
-    from pipelines.jobs.job import Job
-    from schemas.progress import Progress
+from pipelines.jobs.job import Job
+from schemas.progress import Progress, silent
 
 Consent = Literal["go", "stop", "nobody"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from pipelines.archive.packs import CONTAINER, CONTENTS, Contents
 from pipelines.archive.packs import FOLDER as PACKS
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.signatures import GOOD, UNKNOWN, UNSIGNED
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.entries import FOLDER as LEDGER
 from pipelines.certificates.ledger_index import DIGITS, INDEX_FOLDER, all_read, indexed_events, stamps_of
 from pipelines.integrity.calibrations import check_shard
@@ -29,11 +30,7 @@ from pipelines.integrity.surroundings import SHOWN, check_links, check_mark, che
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-
-    from pipelines.archive.store import Place
 
 
 NEEDED = "a signature by the own key, or by one given with --key, is needed"

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import files
 from pipelines.archive.hash_chain import is_number
+from pipelines.archive.store import Place
 from pipelines.certificates.entries import SCHEMA, folder_of
 from pipelines.integrity.findings import CHANGED, EDITED, MISSING, VerifiedPart
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
 
 
 def check_shard(shard: Place, checked: VerifiedPart) -> VerifiedPart:

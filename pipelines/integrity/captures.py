@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import files
 from pipelines.archive.capture_journal import FOLDER, Events
 from pipelines.archive.hash_chain import is_number
 from pipelines.archive.records import COMPLETE
+from pipelines.archive.store import Place
 from pipelines.integrity.findings import CHANGED, EDITED, FOREIGN, MISSING, VerifiedPart
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
 
 
 def check_capture(path: Place, checked: VerifiedPart, schema: int) -> VerifiedPart:

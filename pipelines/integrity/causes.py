@@ -6,17 +6,13 @@ folder gives one finding for each file.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING
 
+from pipelines.archive.store import Place
 from pipelines.integrity.findings import CHANGED, EDITED, MISSING, SIGNATURE, IntegrityFinding
 from pipelines.integrity.seals import OF_ANOTHER
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-    from pipelines.archive.store import Place
 
 FEWEST_GONE = 2  # missing files of a missing folder from which on the folder is reported instead
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING
 
 from pipelines.archive import files, hash_chain
+from pipelines.archive.store import Place
 from pipelines.integrity.findings import EDITED, MISSING, VerifiedPart
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
 
 
 @dataclass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +11,11 @@ from pipelines.archive import files
 from pipelines.archive.names import NameLeadsOut
 from pipelines.archive.packed_path import member_of
 from pipelines.archive.signatures import BAD, UNKNOWN, UNSIGNED, check
-from pipelines.archive.store import ObjectPath, first_line
+from pipelines.archive.store import ObjectPath, Place, first_line
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-
-    from pipelines.archive.store import Place
 
 CHANGED, MISSING, EDITED, FOREIGN, NEWER, UNREADABLE, SIGNATURE, UNCHAINED = (
     "changed", "missing", "edited", "foreign", "newer", "unreadable", "signature", "unchained",

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.archive import files, parquet, stage_key
+from pipelines.archive import Run, files, parquet, stage_key
 from pipelines.archive.listing import SEALED
 from pipelines.archive.packed_path import member_of
 from pipelines.archive.records import COMPLETE
 from pipelines.archive.run import START
-from pipelines.archive.store import ObjectPath
+from pipelines.archive.store import ObjectPath, Place
 from pipelines.certificates.coefficient_remarks import differing_libraries
 from pipelines.integrity.findings import EDITED, FOREIGN, MISSING, VerifiedPart
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
-    from pipelines.archive.store import Place
 
 OURS = ("run.json", SEALED, "lock")
 KEYED = ("stage", "inputs", "parameters", "code", "key")

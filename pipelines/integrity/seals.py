@@ -6,23 +6,21 @@ writer may still be active gives a remark and no finding.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import files, hash_chain
+from pipelines.archive import Run, files, hash_chain
 from pipelines.archive.hash_chain import is_number
 from pipelines.archive.keys import digest
 from pipelines.archive.listing import stages_of
 from pipelines.archive.provenance import provenance
 from pipelines.archive.signatures import ENTRY
+from pipelines.archive.store import Place
 from pipelines.integrity.findings import EDITED, MISSING, UNCHAINED, UNREADABLE, VerifiedPart
 from schemas.errors import ArchiveUnusable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from pipelines.archive import Run
-    from pipelines.archive.store import Place
     from pipelines.integrity.chain import Chain
 
 JUST_NOW = timedelta(minutes=5)  # clocks of hosts may differ by as much: see the ledger

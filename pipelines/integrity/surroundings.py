@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipelines.archive import files
+from pipelines.archive import Archive, files
+from pipelines.archive.store import Place
 from pipelines.integrity.findings import CHANGED, FOREIGN, MISSING, SIGNATURE, UNREADABLE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from pipelines.archive import Archive
-    from pipelines.archive.store import Place
     from pipelines.integrity.findings import VerifiedPart
 
 OURS = re.compile(

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from typing import Annotated
 
+import pandas as pd
 from threadpoolctl import threadpool_limits
 from typing_extensions import TypedDict
 
 from inertial import effects as catalogue
 from inertial.errors import InertialError
+from pipelines.archive import Run
 from pipelines.importers.exchange import dwells_of_run, history_of_run
 from pipelines.jobs.model_files import use_formulas_of
 from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, sound_lot
 from schemas.errors import DataRejected, RecipeInvalid
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from pipelines.archive import Run
 
 
 class AdequacyDocument(TypedDict):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.archive import Archive, Run
 from pipelines.jobs.job import ANALYSIS_KEYS, job_of_run, measured_again
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive, Run
 
 
 def fresh_run_of(archive: Archive, run: Run) -> Run | None:

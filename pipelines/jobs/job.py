@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from inertial.errors import InertialError
+from pipelines.archive import Archive, Run
 from pipelines.archive.keys import digest
 from pipelines.jobs.model_files import read_model, refuse_unknown_effects, use_formulas
 from pipelines.jobs.range_of_station import refuse_beyond_station
@@ -22,16 +24,10 @@ from schemas.errors import RecipeInvalid, WrongUse
 from schemas.fault import parse_fault
 from schemas.limits import Limits, limits_of
 from schemas.lot import Lot
-from schemas.own_files import contents
+from schemas.own_files import Kind, contents
 from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station, with_faults
 from stations.profile_files import recorded_columns
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.archive import Archive, Run
-    from schemas.own_files import Kind
 
 ANALYSIS_KEYS = {
     "name",

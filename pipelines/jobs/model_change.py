@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from inertial.effects import add_file
 from pipelines.jobs.model_files import chosen_effects, read_model, use_formulas
 from pipelines.jobs.recipes import read_limits
 from schemas.limits import Limits
 from schemas.recipe import FormulaSpec
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tomlkit
@@ -12,21 +14,15 @@ import tomlkit
 from inertial import effects
 from inertial.effects.formula import Formula
 from inertial.errors import InertialError, UnknownEffect
-from pipelines.archive import files
+from pipelines.archive import Run, files
 from schemas.errors import RecipeInvalid, WrongUse, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
-from schemas.model import load_model, parse_model
+from schemas.model import ModelFile, VersionStep, load_model, parse_model
 from schemas.recipe import FormulaSpec
 from schemas.toml_files import read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
-
     from tomlkit.items import Array, Table
-
-    from pipelines.archive import Run
-    from schemas.model import ModelFile, VersionStep
 
 STARTING_MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
 """The effects of a new model file: the standard thermal model."""

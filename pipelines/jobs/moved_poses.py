@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from pydantic import ValidationError
 
@@ -13,9 +13,6 @@ from schemas.foreign import shown
 from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.toml_files import explain
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 Angles = tuple[float, float]
 FULL_TURN = 360.0

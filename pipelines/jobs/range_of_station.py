@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 from schemas.errors import RecipeInvalid, TumblelineError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 
 def refuse_beyond_station(recipe: Recipe, station: StationConfig) -> None:

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 import tomlkit
-from tomlkit.items import Array
+from tomlkit.items import Array, Item, Table
 
 from schemas.errors import WrongUse
-from schemas.recipe import RecipeFile
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
-
-    from tomlkit.items import Item, Table
-
-    from schemas.poses import Pose
-    from schemas.recipe import Recipe
+from schemas.poses import Pose
+from schemas.recipe import Recipe, RecipeFile
 
 WIDTH = 100
 RESOLVED = {"poses", "verification", "static_pose", "model_name", "model_version", "formulas"}

@@ -5,12 +5,13 @@ Nothing here touches a station: what cannot work is refused before anything move
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from inertial import poses
@@ -27,11 +28,6 @@ from schemas.serials import refuse_unusable_serials
 from schemas.shipped import hint_of_sample
 from schemas.toml_files import explain, read_text
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 MAIN_JOB = "production"
 SAME_POSE_DEG = 1.0

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from threadpoolctl import threadpool_limits
 from typing_extensions import TypedDict
 
 from inertial.errors import InertialError
-from inertial.uncertainty.contradiction import LEVEL
+from inertial.uncertainty.contradiction import LEVEL, Size
 from inertial.uncertainty.rounding import equal
+from pipelines.archive import Run
 from pipelines.jobs.model_files import use_formulas_of
 from pipelines.jobs.terms import archived_terms
 from pipelines.stages.uncertainty.budget_terms import BudgetTables
@@ -18,11 +19,7 @@ from pipelines.stages.uncertainty.contradiction import JUDGED, LotReferences, lo
 from pipelines.stages.uncertainty.tables import LABELS
 from schemas.errors import DataRejected, RecipeInvalid
 from schemas.stated import TO_SI
-
-if TYPE_CHECKING:
-    from inertial.uncertainty.contradiction import Size
-    from pipelines.archive import Run
-    from schemas.uncertainty import Uncertainty
+from schemas.uncertainty import Uncertainty
 
 READ = ("dwells", "history", "coefficients", "covariance", "wander", "verification", "verification_poses", "noise")
 IMITATED = {"seat": "the misalignment of each unit", "gravity": "the scale factors"}

@@ -7,11 +7,12 @@ future applies, and of two with the same date the one that was written last.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import files, hash_chain
+from pipelines.archive import Archive, files, hash_chain
 from pipelines.archive.keys import digest
 from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
@@ -19,9 +20,6 @@ from schemas.errors import RecipeInvalid, WrongUse
 from schemas.recipe import FormulaSpec
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import ModelChange
 
 FOLDER, EVIDENCE = "releases", "whatif"

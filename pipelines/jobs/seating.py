@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from schemas.errors import WrongUse
 from schemas.foreign import foreign, shown
+from schemas.lot import Lot
 from schemas.serials import refuse_unusable_serials, serial_fault
 from schemas.toml_files import parse_toml, read_text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from schemas.lot import Lot
-    from stations.station import Station
+from stations.station import Station
 
 SCAN = "scan"
 COLUMNS = ["slot", "serial"]

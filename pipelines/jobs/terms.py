@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,18 +12,12 @@ from pipelines.stages.uncertainty.budget_terms import BudgetTerms, terms_of
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
 from schemas.errors import RecipeInvalid
-from schemas.limits import VALIDITY_MONTHS
+from schemas.limits import VALIDITY_MONTHS, Limits
+from schemas.recipe import Recipe
 from schemas.reference import Reference
-from schemas.station import Pace, refuse_untraced
+from schemas.station import Pace, StationConfig, refuse_untraced
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from schemas.limits import Limits
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 GRAVITY_SIGMAS = 3.0
 

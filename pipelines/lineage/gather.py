@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.archive import files
+from pipelines.archive import Archive, Run, files
 from pipelines.archive.keys import digest
 from pipelines.archive.listing import SEALED
 from pipelines.archive.records import COMPLETE
-from pipelines.certificates.entries import folder_of
+from pipelines.certificates.entries import LedgerEntry, folder_of
 from pipelines.certificates.ledger import Ledger
+from pipelines.certificates.validity import Calibration
 from pipelines.lineage.graph import Graph, Node, ProvActivity
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive, Run
-    from pipelines.certificates.entries import LedgerEntry
-    from pipelines.certificates.validity import Calibration
 
 MADE = ("who", "where", "when", "code", "key", "software", "libraries", "schema", "parameters", "taken_from")
 RAW = "records"

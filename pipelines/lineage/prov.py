@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
-if TYPE_CHECKING:
-    from pipelines.lineage.graph import Graph, Node, ProvActivity
-    from pipelines.lineage.targets import Lineage
+from pipelines.lineage.graph import Graph, Node, ProvActivity
+from pipelines.lineage.targets import Lineage
 
 BASE = "urn:x-tumbleline:"
 SETTINGS = {"run", "recipe", "limits", "station", "reference"}  # used, but no result is derived from them

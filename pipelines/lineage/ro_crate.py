@@ -5,17 +5,14 @@ from __future__ import annotations
 import json
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
-from pipelines.archive import files
+from pipelines.archive import Archive, files
 from pipelines.archive.names import is_below
+from pipelines.lineage.graph import Graph, Node, ProvActivity
+from pipelines.lineage.targets import Lineage
 from schemas.errors import ArchiveUnusable, WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.archive import Archive
-    from pipelines.lineage.graph import Graph, Node, ProvActivity
-    from pipelines.lineage.targets import Lineage
 
 VERSION = "https://w3id.org/ro/crate/1.1"
 METADATA = "ro-crate-metadata.json"

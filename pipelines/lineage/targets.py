@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.archive import files
+from pipelines.archive import Archive, Run, files
 from pipelines.certificates.ledger import Ledger
 from pipelines.lineage.gather import Gatherer
 from schemas.errors import ArchiveUnusable, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pipelines.archive import Archive, Run
     from pipelines.lineage.graph import Graph
 
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from rich.text import Text
 from rich.tree import Tree
 
-if TYPE_CHECKING:
-    from pipelines.lineage.graph import Graph, Node, ProvActivity
-    from pipelines.lineage.targets import Lineage
+from pipelines.lineage.graph import Graph, Node, ProvActivity
+from pipelines.lineage.targets import Lineage
 
 SHORT = 12
 ABOVE = "  ↑ see above"

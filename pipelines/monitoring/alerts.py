@@ -10,19 +10,18 @@ import json
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from http.client import HTTPException
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from pipelines.archive.files import json_bytes, publish
+from pipelines.monitoring.documents import Alert
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from pipelines.monitoring.documents import Alert
     from pipelines.monitoring.snapshot import Snapshot
 
 TIMEOUT_S = 10.0

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from pipelines.archive import files
+from pipelines.archive import Archive, files
+from pipelines.archive.listing import RunInfo
 from pipelines.archive.run_files import SEALED
+from pipelines.archive.store import Place
 from pipelines.capture.interruptions import interruptions
 from pipelines.certificates.days import today
 from pipelines.certificates.ledger import Ledger
 from schemas.errors import ArchiveUnusable, TumblelineError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from pipelines.archive import Archive
-    from pipelines.archive.listing import RunInfo
-    from pipelines.archive.store import Place
 
 DUE_DAYS = (0, 30)
 """Periods, days: a certificate is due where it ends within the period."""

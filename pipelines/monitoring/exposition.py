@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from datetime import datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import GaugeMetricFamily
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from datetime import datetime
+from pipelines.monitoring.queue_numbers import QueueNumbers
+from pipelines.monitoring.station_numbers import StationNumbers
 
+if TYPE_CHECKING:
     from pipelines.monitoring.archive_numbers import ArchiveNumbers
-    from pipelines.monitoring.queue_numbers import QueueNumbers
     from pipelines.monitoring.snapshot import Snapshot
-    from pipelines.monitoring.station_numbers import StationNumbers
 
 LINE = ("station", "recipe")
 

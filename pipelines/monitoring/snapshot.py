@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
+from pipelines.archive import Archive
 from pipelines.monitoring.archive_numbers import ArchiveNumbers, ArchiveReader
+from pipelines.monitoring.documents import HealthDocument
 from pipelines.monitoring.queue_numbers import QueueNumbers, configured, read_queues
 from pipelines.monitoring.station_numbers import StationNumbers, read_stations
 from schemas.errors import TumblelineError
 from stations.safety.folder import state_folder
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.archive import Archive
-    from pipelines.monitoring.documents import HealthDocument
 
 KEEP_S = 10.0
 """Time for which a snapshot is reused, s: several scrapers cause one reading."""

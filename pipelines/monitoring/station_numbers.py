@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from stations.safety.folder import read_log
 from stations.safety.lease_files import read_holder
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @dataclass

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import secrets
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from prefect.server.api.server import create_app
@@ -18,8 +19,6 @@ from starlette.responses import JSONResponse, PlainTextResponse
 from pipelines.orchestrator.credentials import REFUSED, credentials_in
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 STORED = ("/api/flow_runs/", "/api/deployments/")

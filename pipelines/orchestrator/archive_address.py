@@ -7,15 +7,13 @@ from a Secret block of the orchestrator, which is encrypted.
 from __future__ import annotations
 
 import os
+from collections.abc import Generator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Archive
 from pipelines.orchestrator.credentials import BLOCK, VARIABLE, refuse_credentials, without_credentials
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
 
 
 def archive_of(parameter: str | None) -> Archive:

@@ -10,11 +10,8 @@ import ctypes
 import os
 import signal
 import subprocess
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from types import FrameType
+from collections.abc import Callable, Sequence
+from types import FrameType
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 STOPS = (signal.SIGTERM, signal.SIGINT)

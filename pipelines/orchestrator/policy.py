@@ -12,14 +12,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 from schemas.errors import WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 Busy = Literal["wait", "skip"]
 Missed = Literal["cancel", "latest"]

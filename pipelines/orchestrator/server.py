@@ -15,6 +15,7 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,8 +38,6 @@ from schemas.log_lines import JSON, tell, wants_json
 from stations.safety.folder import state_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import uvicorn
 
 LOOK_S = 1.0

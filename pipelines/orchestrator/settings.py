@@ -5,13 +5,10 @@ from __future__ import annotations
 import os
 import secrets
 import stat
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 LOCAL = "local"
 """In place of the address of a Dask scheduler: a cluster of processes on this computer."""

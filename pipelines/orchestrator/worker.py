@@ -17,11 +17,13 @@ import fcntl
 import os
 import platform
 import re
+import subprocess
 import sys
 import time
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager, nullcontext
 from datetime import timedelta
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from pipelines.orchestrator.child_reaper import run_until_orphans_end
 from pipelines.orchestrator.server_check import POLL_S, check_server
@@ -30,11 +32,6 @@ from pipelines.orchestrator.worker_health import heartbeat_of, period_s, watched
 from schemas.errors import OperatorNeeded, TumblelineError, WrongUse
 from schemas.log_lines import JSON, tell, wants_json
 from stations.safety.folder import state_folder
-
-if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Generator, Sequence
-    from pathlib import Path
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import threading
 import time
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from schemas.log_lines import tell
-
-if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Callable, Generator
 
 VARIABLE = "PREFECT_WORKER_HEARTBEAT_SECONDS"
 PERIOD_S = 30.0

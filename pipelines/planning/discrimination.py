@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import design
 from inertial.planning.discrimination import Discrimination
@@ -13,14 +15,10 @@ from pipelines.planning.requirement import Requirement, candidates, temperature_
 from schemas.errors import WrongUse
 from schemas.units import MICRO
 
+Array = NDArray[np.float64]
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
     from pipelines.planning.plan import PlanContext
-
-    Array = NDArray[np.float64]
 
 ENOUGH = 50.0
 """χ² of the wrong effect over a lot from which two effects count as discriminated."""

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import permutations
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+from pipelines.planning.timed_design import PlanDesign, TimedDesign
 
-    from numpy.typing import NDArray
-
-    from pipelines.planning.timed_design import PlanDesign, TimedDesign
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 FEWEST = 4
 """Minimum number of dwells of a soak: the reference pose at both ends, and two other poses between."""

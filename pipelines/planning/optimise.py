@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import design
 from inertial.errors import NotIdentified
+from inertial.planning.expected import Expected
 from inertial.planning.pose_exchange import exchanged
 from inertial.planning.visibility import visibilities
 from pipelines.planning.dwell_counts import FEWEST, MOST, fewest_dwells
 from pipelines.planning.lower_bound import lower_bound
-from pipelines.planning.plan import identified, plan_context
+from pipelines.planning.plan import PlanContext, identified, plan_context
+from pipelines.planning.requirement import Requirement
 from pipelines.planning.soak_orders import mirrored, orders
 from pipelines.planning.textbook import PART_SEEN
 from pipelines.planning.timed_design import PlanDesign, TimedDesign, spanned
@@ -22,19 +25,10 @@ from pipelines.planning.verification_poses import apart, numbered, turns
 from pipelines.schedule.timing import spent
 from schemas.errors import RecipeInvalid
 from schemas.poses import SoakPart
+from schemas.recipe import Recipe
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from inertial.planning.expected import Expected
-    from pipelines.planning.plan import PlanContext
-    from pipelines.planning.requirement import Requirement
-    from schemas.recipe import Recipe
-
-    Array = NDArray[np.float64]
-    Progress = Callable[[str], None]
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
 
 TRIED = 3
 """Number of orders of soaks in which poses are exchanged."""

@@ -2,45 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import effects as catalogue
 from inertial.effects import SensorEffect
 from inertial.errors import NotIdentified
-from inertial.noise.dwells import dwell_covariance
+from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import RATIO, constants_of_means
 from inertial.noise.measurands import DAY_S, against_mean, between_means, flicker_mean, walk_mean
-from inertial.planning.expected import expected_errors, expected_gain
+from inertial.planning.expected import Expected, expected_errors, expected_gain
 from inertial.planning.reasons import reason
-from inertial.planning.visibility import SEEN, visibilities
+from inertial.planning.visibility import SEEN, Visibility, visibilities
+from inertial.state import State
 from pipelines.planning.reach import reach
 from pipelines.planning.shown_by_verification import OF_VERIFICATION, REMEDY, shown_by_verification
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import schedule, spent
+from pipelines.schedule.timing import Activity, schedule, spent
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.tables.calibration import unit_texts
 from schemas.errors import RecipeInvalid
+from schemas.limits import Limits
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 from schemas.units import AXES, MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    from numpy.typing import NDArray
-
-    from inertial.noise.dwells import DwellNoise
-    from inertial.planning.expected import Expected
-    from inertial.planning.visibility import Visibility
-    from inertial.state import State
-    from pipelines.schedule.timing import Activity
-    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
-    from schemas.limits import Limits
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 NO_SWITCH_ON = "no repeatability of switching on is stated for this device"
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from inertial.noise.dwells import DwellNoise
 from inertial.noise.flicker import FLICKER_FLOOR
+from schemas.recipe import Recipe
 from stations.plant.preset import load_preset
-
-if TYPE_CHECKING:
-    from schemas.recipe import Recipe
 
 UG = 1e-6  # of g
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
-from pipelines.procedures import PROCEDURES, parts_of
+from pipelines.procedures import PROCEDURES, FigureSpec, parts_of
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import schedule, spent
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pipelines.procedures import FigureSpec
-    from schemas.limits import Limit, Limits
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
+from schemas.limits import Limit, Limits
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 
 def plan_of_procedures(recipe: Recipe, station: StationConfig, limits: Limits | None) -> dict[str, Any]:

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inertial.noise.dwells import DwellNoise
 from inertial.uncertainty.period import Windows, flicker_within
 from pipelines.schedule.planned_dwells import planned_dwells
+from pipelines.schedule.timing import Activity
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.reachable import PlannedDwells, reachable, unreachable
 from pipelines.stages.uncertainty.tables import LABELS
+from schemas.limits import Limits
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 from schemas.units import MICRO
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from inertial.noise.dwells import DwellNoise
-    from pipelines.schedule.timing import Activity
-    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
-    from schemas.limits import Limits
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 class Planning(Protocol):

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import poses
-from inertial.planning.pose_exchange import CRITERIA, ratios
+from inertial.planning.discrimination import Discrimination
+from inertial.planning.pose_exchange import CRITERIA, Criterion, ratios
 from inertial.state import T_REFERENCE
 from pipelines.planning.verification_poses import WHOLE_DEG
+from schemas.station import StationConfig
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
-    from inertial.planning.discrimination import Discrimination
-    from inertial.planning.pose_exchange import Criterion
-    from schemas.station import StationConfig
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 CANDIDATES = 26
 QUARTERS = 4

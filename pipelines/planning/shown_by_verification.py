@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from inertial.planning.visibility import SEEN, visibilities
 from pipelines.schedule.planned_state import state_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.schedule.timing import Activity
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
+from pipelines.schedule.timing import Activity
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 OF_VERIFICATION = "only the verification poses show it, which a diagnosis uses and a fit leaves out"
 REMEDY = "move poses from 'verification' to 'poses', and verify in others"

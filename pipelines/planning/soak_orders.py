@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise, product
-from typing import TYPE_CHECKING
 
 from pipelines.schedule.timing import StationPose, soaked
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from schemas.station import StationConfig
+from schemas.station import StationConfig
 
 FEWEST, MOST = 3, 6
 MANY = 250

@@ -3,35 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import design
 from inertial.frames import force_from_angles
-from inertial.noise.dwells import dwell_covariance
+from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.noise.flicker import flicker_of_means
 from inertial.planning.pose_exchange import PlanSlots
+from pipelines.planning.requirement import Requirement
 from pipelines.planning.verification_poses import numbered, turns
 from pipelines.schedule.planned_state import settled_state
 from pipelines.schedule.timing import StationPose, move_seconds, soaked
-from schemas.recipe import FEWEST_SAMPLES
+from schemas.recipe import FEWEST_SAMPLES, Recipe
+from schemas.station import StationConfig
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from inertial.noise.dwells import DwellNoise
-    from pipelines.planning.requirement import Requirement
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
-
-    Array = NDArray[np.float64]
-    Choice = NDArray[np.intp]
+Array = NDArray[np.float64]
+Choice = NDArray[np.intp]
 
 SHORTEST_DWELL_S = 1.0
 LONGEST_DWELLS = 3.0

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import poses
 from inertial.frames import force_from_angles
 from schemas.poses import Pose
+from schemas.recipe import Recipe
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from schemas.recipe import Recipe
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 WHOLE_DEG = 5.0
 

@@ -6,9 +6,10 @@ procedure: recipes, capture, the stage ``procedures``, limits, the report and th
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -24,13 +25,9 @@ from pipelines.procedures.base import (
     SetsEquipment,
 )
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 from schemas.toml_files import explain
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 __all__ = [
     "FIGURES",

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field
 
+from pipelines.drawing.chart import Chart
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.recipe import Strict
+from schemas.poses import Pose
+from schemas.recipe import Recipe, Strict
+from schemas.station import StationConfig
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
-
-    import pandas as pd
-
     from inertial.dynamics.wandering_means import IdentifiedNoise
-    from pipelines.drawing.chart import Chart
-    from schemas.poses import Pose
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 Array = NDArray[np.float64]
 REFERENCE = "@reference"

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from pydantic import Field, model_validator
 
 from inertial.dynamics.centrifuge import TERMS, Polynomial, columns, fit_polynomial
@@ -37,15 +39,9 @@ from pipelines.procedures.columns import points as point_table
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid
 from schemas.poses import Pose
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 from stations.profile_files import profile_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 INPUT = 2  # the input axis is z, radial
 CLOSEST = 1.02  # ratio of two radii

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from inertial.dynamics.centrifuge import STANDARD_GRAVITY, columns, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
@@ -12,11 +14,6 @@ from pipelines.drawing.chart import SEVERAL, Trace
 from pipelines.procedures.base import FigureValue
 from pipelines.procedures.wording import verdict_of, with_uncertainty
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
 
 OF_RADII = ("centrifuge_mass_offset_um", "centrifuge_radius_consistency_ppm")
 """Figures that one radius cannot determine."""

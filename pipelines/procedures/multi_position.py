@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pipelines.procedures.base import Part, Procedure, ProcedureStep
-
-if TYPE_CHECKING:
-    from schemas.recipe import Recipe
+from schemas.recipe import Recipe
 
 
 class MultiPositionPart(Part):

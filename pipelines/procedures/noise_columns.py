@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
 from inertial.dynamics.stability import ShortNoise
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 EARLIER_SHARE = 0.8  # relative standard deviation of F² from two Allan variances, in points of earlier versions
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from pydantic import Field, field_validator
 from scipy.signal import welch
 
@@ -31,15 +33,9 @@ from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.wording import signed
 from schemas.bounds import Positive
 from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
 from schemas.vibration_profile import load_vibration_profile, vibration_profiles
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from schemas.recipe import Recipe
 
 REST_S = 0.8  # used of the second of rest before and after
 GUARD_S = 0.2  # left out at the ends of the vibration

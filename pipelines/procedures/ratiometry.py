@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
+import pandas as pd
 from pydantic import Field, model_validator
 
 from inertial.dynamics.ratiometry import Follows, departures, largest_departure, zero_and_sensitivity
 from inertial.dynamics.stability import difference_error, short_noise
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -29,17 +31,10 @@ from pipelines.procedures.worst import worst
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
 from schemas.poses import Pose
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 from schemas.units import AXES, MICRO
 from stations.profile_files import profile_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from pipelines.drawing.chart import Role
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 FACES = {"z": ((0.0, 0.0), (180.0, 0.0)), "y": ((90.0, 0.0), (-90.0, 0.0)), "x": ((90.0, 90.0), (-90.0, 90.0))}
 """Angles (outer, inner) of the table with each axis along and against gravity; the order is found from the outputs."""

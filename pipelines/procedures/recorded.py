@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+
+import pandas as pd
 
 from pipelines.procedures.base import Array, Device, ProcedureRecord, ProcedureStep, UnitRecord
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    import pandas as pd
 
 
 def procedure_record(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
+import pandas as pd
 from pydantic import Field, model_validator
 
 from inertial.dynamics.pulses import Pulse, measured_pulse, velocity_change
@@ -12,7 +14,7 @@ from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 from pipelines.procedures import shock_waves
 from pipelines.procedures.base import (
     REFERENCE,
@@ -36,15 +38,8 @@ from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.shock_bias import STUCK, bias_points, bias_shift
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from pipelines.drawing.chart import Role
-    from schemas.recipe import Recipe
 
 BEFORE_S = 0.04
 

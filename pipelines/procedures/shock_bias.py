@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
-from pipelines.procedures.base import FigureValue
+from pipelines.procedures.base import FigureValue, ProcedureRecord, UnitRecord
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
 from pipelines.procedures.worst import worst
 from schemas.units import AXES, MICRO
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.procedures.base import ProcedureRecord, UnitRecord
 
 STUCK = 1e-9
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
@@ -14,14 +16,8 @@ from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
+from pipelines.procedures.base import UnitRecord
 from pipelines.procedures.wording import improvement, not_separated, probability, with_uncertainty
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from pipelines.procedures.base import UnitRecord
 
 CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D
 DRAWN = 400  # points of a waveform in the picture

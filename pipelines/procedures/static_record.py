@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pipelines.procedures.base import Part, Procedure, ProcedureStep
 from schemas.errors import RecipeInvalid
-
-if TYPE_CHECKING:
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 
 class StaticRecordPart(Part):

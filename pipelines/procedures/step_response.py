@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from pydantic import Field
 
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
@@ -28,14 +30,8 @@ from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.worst import worst
 from schemas.bounds import Positive
 from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import pandas as pd
-
-    from schemas.recipe import Recipe
 
 SETTLING, OVERSHOOT, RISE = "step_settling_ms", "step_overshoot_percent", "step_rise_ms"
 BEFORE_SHARE = 0.25  # of the step's duration, recorded before the edge

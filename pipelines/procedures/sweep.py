@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
+import pandas as pd
 
 from inertial.dynamics.sine_fit import fit_tone_and_frequency
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
@@ -31,15 +33,9 @@ from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
 from schemas.errors import RecipeInvalid
 from schemas.poses import Pose
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 MOST_KEPT = 64
 

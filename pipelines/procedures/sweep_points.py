@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency, harmonic_distortion
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points
 from pipelines.procedures.base import REFERENCE, Array, Device, Finding, ProcedureRecord, UnitRecord
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import pandas as pd
-
-    from pipelines.procedures.sweep_plan import SweepPart
+from pipelines.procedures.sweep_plan import SweepPart
 
 SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
+import pandas as pd
 from pydantic import Field, model_validator
 from scipy.stats import norm
 
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import (
     Device,
     Evaluated,
@@ -25,15 +27,8 @@ from pipelines.procedures.columns import points
 from pipelines.procedures.worst import worst
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from pipelines.drawing.chart import Role
-    from schemas.recipe import Recipe
 
 FEWEST_ANGLES = 6
 MICRO, MILLI = 1e6, 1e3

@@ -6,18 +6,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.dynamics.transfer_effects import Conditions
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
+
+Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
     from inertial.dynamics.transfer_model import Points, TransferFit
-    from pipelines.drawing.chart import Role
-
-    Array = NDArray[np.float64]
 
 COVERAGE = 2.0
 FINE = 300

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
+from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.dynamics.transfer_effects import Conditions
-from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, TransferFit, best_of_exchange, factor
+from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, factor
 from pipelines.procedures.base import FigureValue
 from pipelines.procedures.wording import probability
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
-    from inertial.dynamics.transfer_model import Points
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 WORD = {"delay_s": "delay", "natural_hz": "natural frequency", "damping": "damping ratio"}
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from pydantic import Field, model_validator
 
 from inertial.dynamics.goodness import adequate
@@ -33,14 +35,8 @@ from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from schemas.recipe import Recipe
 
 FEWEST_ANGLES = 8
 SILENT = 8.0  # standard uncertainties by which a tone must exceed the noise to give the clock

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import pandas as pd
 from pydantic import Field
 from scipy.stats import norm
 
@@ -29,14 +31,8 @@ from pipelines.procedures.columns import points
 from pipelines.procedures.worst import worst
 from schemas.bounds import Positive
 from schemas.poses import Pose
+from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from schemas.recipe import Recipe
 
 
 class WarmUpPart(NominalScale):

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from inertial.counts import degrees_of_freedom
-from inertial.dynamics.goodness import adequate, p_value
+from inertial.dynamics.goodness import Fitted, adequate, p_value
 from inertial.uncertainty.rounding import equal, rounded
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from inertial.dynamics.goodness import Fitted
 
 MINUS = "−"
 SMALLEST_FIXED, LARGEST_FIXED = 1e-5, 1e8  # of U in fixed notation

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inertial.distributions import normal_upper
 from inertial.uncertainty.deviation_law import DeviationLaw
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.procedures.base import FigureValue
+from pipelines.procedures.base import FigureValue
 
 TAIL = 0.025
 REACH_95 = float(normal_upper(TAIL))

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.export.device_block import unpack
+from pipelines.programming.outcome import ProgrammingOutcome
 from schemas.errors import StationRefused
 from schemas.units import MICRO
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.programming.outcome import ProgrammingOutcome
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 RESOLUTION_UG = 2.0
 TEMPERATURE_SLACK_K = 2.0

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import Archive, Run, files
 from pipelines.archive.locks import alone
@@ -13,8 +14,9 @@ from pipelines.certificates import Ledger
 from pipelines.certificates.days import today
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.programmed import TOP, add
+from pipelines.certificates.validity import Calibration
 from pipelines.chain.certify import certify
-from pipelines.export import unit_calibrations
+from pipelines.export import UnitCalibration, unit_calibrations
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from pipelines.programming.process import Programmer
 from schemas.errors import WrongUse
@@ -22,12 +24,6 @@ from schemas.lot import Lot
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from stations import open_station
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Mapping, Sequence
-
-    from pipelines.certificates.validity import Calibration
-    from pipelines.export import UnitCalibration
 
 REASON = "coefficients are written into the device"
 

@@ -6,10 +6,11 @@ import zlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from stations.devices.memory import Copy, UnitMemory
+
 if TYPE_CHECKING:
     from pipelines.export.device_block import CoefficientBlock, Form
     from pipelines.export.polynomials import UnitCalibration
-    from stations.devices.memory import Copy, UnitMemory
 
 
 @dataclass(frozen=True)

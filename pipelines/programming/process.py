@@ -6,33 +6,28 @@ a device uses it only when it is complete.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
+from pipelines.archive.store import Place
 from pipelines.certificates.programmed import add
 from pipelines.export.device_block import block_of, pack, unpack
+from pipelines.export.polynomials import UnitCalibration
 from pipelines.programming.checks import InPose, require_in_pose, require_moved, write_offsets_again
 from pipelines.programming.outcome import Choice, ProgrammingOutcome
 from schemas.errors import OperatorNeeded, StationError, StationRefused, TumblelineError, WrongUse
+from schemas.recipe import Recipe
 from schemas.units import STANDARD_GRAVITY_M_S2
-from stations.devices.memory import COPIES
+from stations.devices.memory import COPIES, UnitMemory
 from stations.safety.suspenders import require_released
+from stations.station import Station
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.archive.store import Place
-    from pipelines.export.polynomials import UnitCalibration
-    from schemas.recipe import Recipe
-    from stations.devices.memory import UnitMemory
-    from stations.station import Station
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 OFF_S, BOOT_S = 2.0, 1.0
 POSES = 2

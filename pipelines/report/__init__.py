@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.archive import code_hash, stage_key
+from pipelines.archive import Run, code_hash, stage_key
 from pipelines.certificates.statement import stated
 from pipelines.report.run_page import render
 from pipelines.report.templates import page_hash
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
 
 __all__ = ["INPUTS", "make_report", "render", "renew_report"]
 
@@ -24,7 +21,6 @@ OPTIONAL = (
     *("wander", "budget", "uncertainties", "lot_risks"),
     *("procedure_points", "procedure_figures", "procedure_findings"),
 )
-MODULES = ("schemas.decisions", "schemas.tables", "pipelines.report", "pipelines.procedures")
 
 
 def make_report(run: Run) -> bool:
@@ -33,7 +29,7 @@ def make_report(run: Run) -> bool:
         return True  # a follow-up has no decisions: its report is the diagnosis of all runs together
     _refuse_unfinished(run)
     names = [*INPUTS, *(name for name in OPTIONAL if name in run.tables())]
-    inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash(MODULES)
+    inputs, code = {name: run.manifest(name)["sha256"] for name in names}, code_hash("report")
     certificates = stated(run, run.table("grades")["unit"])
     parameters: dict[str, Any] = (
         {"certificates": {unit: list(one) for unit, one in sorted(certificates.items())}} if certificates else {}

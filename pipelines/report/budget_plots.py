@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from html import escape
-from typing import TYPE_CHECKING
 
 from pipelines.drawing.vector import LETTER, WIDTH, part, text_at
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 SMALLEST = 0.01
 COLOURS = (

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from pipelines.archive import Run
+from pipelines.certificates.statement import Stated
 from pipelines.report.reasons import plain_reason
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import pandas as pd
-
-    from pipelines.archive import Run
-    from pipelines.certificates.statement import Stated
 
 TABLES = (
     *("verdicts", "dwells", "coefficients", "residuals", "verification", "verification_poses"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import effects
+from inertial.criticism.diagnosis import Diagnosis
 from inertial.data_errors.handling import named as handled
 from inertial.uncertainty.rounding import chance, equal
 from pipelines.report.diagnosis_pictures import driver_chart, model_chart, pose_chart
@@ -14,13 +16,8 @@ from pipelines.report.interactive import figure_of, interactive
 from pipelines.report.numbers import significant
 from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals
 from pipelines.report.templates import template
+from pipelines.tables.dwells import Measured
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from inertial.criticism.diagnosis import Diagnosis
-    from pipelines.tables.dwells import Measured
 
 FEWEST_POSES = 4  # fewer make no map
 

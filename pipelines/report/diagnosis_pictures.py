@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, symmetric
+from inertial.state import State
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, symmetric
 from pipelines.drawing.mollweide import project, sphere
-from pipelines.report.residuals import band, direction
+from pipelines.report.residuals import DriverValues, LotResiduals, band, direction
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from inertial.state import State
-    from pipelines.drawing.chart import Role, Symbol
-    from pipelines.report.residuals import DriverValues, LotResiduals
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 TURNS: tuple[tuple[int, Symbol, str], ...] = (
     (1, "triangle-up", "heating"),

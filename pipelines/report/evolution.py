@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-
-if TYPE_CHECKING:
-    from pipelines.drawing.chart import Role, Symbol
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, level
 
 LADDER: tuple[tuple[str, str, Role, Symbol], ...] = (
     ("fitted_ug", "fitted to this run", "before", "circle"),

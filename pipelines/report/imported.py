@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.certificates.statement import stated
+from pipelines.archive import Run
+from pipelines.certificates.statement import Stated, stated
 from pipelines.report.context import OPTIONAL, TABLES, ReportContext
 from pipelines.report.panels import budget, certificates
 from pipelines.report.templates import fill
 from pipelines.report.unit_panels import figures
 from pipelines.stages.unknown_poses.budget import OF_POSES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pipelines.archive import Run
-    from pipelines.certificates.statement import Stated
 
 FEWEST_OF_A_LOT = 3
 """Units from which on the risk of a lot is known."""

@@ -12,13 +12,10 @@ from base64 import b64encode
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
+from pipelines.drawing.chart import Chart
 from pipelines.drawing.plotly_figure import plotly_figure
 from pipelines.drawing.vector import svg_text
-
-if TYPE_CHECKING:
-    from pipelines.drawing.chart import Chart
 
 MOST_BYTES = 5_000_000
 """Size of a report up to which figures can be zoomed; those behind it stay pictures."""

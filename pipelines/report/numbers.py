@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from decimal import Decimal
-from typing import TYPE_CHECKING
 
 from inertial.uncertainty.rounding import rounded
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 MINUS = "−"
 THIN = "\u202f"  # narrow no-break space between groups of three digits

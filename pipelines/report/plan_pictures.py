@@ -5,21 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
 from inertial.planning.visibility import confounding
-from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.schedule.timing import temperatures
 from schemas.units import AXES
 
+Array = NDArray[np.float64]
+
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.drawing.chart import Role
     from pipelines.planning.plan import PlanContext
-
-    Array = NDArray[np.float64]
 
 KINDS = (
     ("dwell", "fit", "accent", "circle"),

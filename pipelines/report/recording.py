@@ -5,19 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
-from pipelines.drawing.chart import between
+from pipelines.drawing.chart import Role, between
 from pipelines.report.templates import template
 from schemas.units import AXES
 
+Array = NDArray[np.float64]
+
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.drawing.chart import Role
     from pipelines.importers.inspection import Inspection
-
-    Array = NDArray[np.float64]
 
 _PIXELS = 1500
 ROOM = 0.05  # of the range, above and below

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.drivers import drivers_of
 from inertial.errors import InertialError
 from inertial.estimation.comparison import estimate, residuals_of
@@ -17,17 +20,9 @@ from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
 from inertial.quantities import shown_factor
 from pipelines.report.residuals import LABELS, direction
-from pipelines.tables.dwells import lot_of, measured
+from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from inertial.criticism.diagnosis import Diagnosis
-    from pipelines.tables.dwells import Measured
 
 Array = NDArray[np.float64]
 

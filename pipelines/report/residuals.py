@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.drivers import curve, drivers_of
 from inertial.estimation.comparison import estimate, residuals_of
 from inertial.quantities import axis_labels, shown_factor
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from inertial.criticism.diagnosis import Diagnosis
 
 Array = NDArray[np.float64]
 

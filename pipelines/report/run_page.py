@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
+from pipelines.archive import Run
+from pipelines.certificates.statement import Stated
 from pipelines.report.context import ReportContext
 from pipelines.report.interactive import interactive
 from pipelines.report.panel import rendered
 from pipelines.report.templates import template
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pipelines.archive import Run
-    from pipelines.certificates.statement import Stated
 
 PANELS = "pipelines.report.panels"
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
-from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace
 from schemas.units import AXES
 
-if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.drawing.chart import Role
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 RESIDUAL = "residual / µg"
 POINT = 5.0

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
+from pipelines.archive import Run
 from pipelines.archive.signatures import ENTRY
 from pipelines.jobs.job import Job
+from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.model_files import refuse_unknown_effects
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import refuse_limits_without_figures
@@ -17,10 +19,6 @@ from schemas.lot import Lot
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.toml_files import explain
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
-    from pipelines.jobs.model_change import ModelChange
 
 PROVENANCE = ("who", "where", "when", "software", "libraries", ENTRY, "rerun_of", "because", "measured")
 

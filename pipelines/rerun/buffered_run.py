@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.archive import Run, files
+import pandas as pd
+import pyarrow as pa
+
+from pipelines.archive import Archive, Run, files
 from pipelines.archive.parquet import decoded
 from pipelines.archive.run import START
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-    import pyarrow as pa
-
-    from pipelines.archive import Archive
 
 
 class BufferedRun(Run):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.archive import Run
 from pipelines.chain.chain import BY_NAME
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
 
 ORDER = ("import", "capture", *BY_NAME)
 DATA = ("records", "source")

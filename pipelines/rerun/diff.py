@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from pipelines.archive import Run
 from pipelines.rerun.causes import causes
 from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
 
 COEFFICIENT = ["unit", "axis", "effect", "name"]
 FIGURE = ["unit", "figure"]

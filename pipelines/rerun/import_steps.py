@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
-from pipelines.archive import code_hash
+from pipelines.archive import Run, code_hash
 from pipelines.chain.chain import BY_NAME, Tables
 from pipelines.importers.plane import plane_answer
 from pipelines.stages.uncertainty.budget import budget
-from pipelines.stages.uncertainty.budget_terms import BudgetTables
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.unknown_poses.budget import norm_budget
 from pipelines.stages.unknown_poses.verify import verify_norms
 from pipelines.tables.frames import empty_table
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pipelines.archive import Run
-    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 
 
 @dataclass(frozen=True)
@@ -56,7 +51,7 @@ def verify_norms_step(gravity: float, *, history: bool) -> StageCall:
             dwells, run.table("history") if history else None, coefficients, covariance, wander, gravity
         )
 
-    code = code_hash(("pipelines.stages.unknown_poses.verify", "schemas.tables"))
+    code = code_hash("verify of norms")
     inputs = (*names, "history") if history else names
     return StageCall("verify", inputs, stage.outputs, {"gravity_g": gravity}, code, call)
 
@@ -69,7 +64,7 @@ def plane_step(across: int, gravity: float) -> StageCall:
         answer = plane_answer(dwells, across, gravity, str(dwells["out_unit"].iloc[0]))
         return {"coefficients": pd.DataFrame(answer.coefficients)}
 
-    code = code_hash(("pipelines.importers.plane", "schemas.tables"))
+    code = code_hash("fit in a plane")
     return StageCall("fit", ("dwells",), ("coefficients",), {"plane_across": across, "gravity_g": gravity}, code, call)
 
 
@@ -95,6 +90,6 @@ def budget_step(terms: BudgetTerms, *, history: bool, known: bool) -> StageCall:
         )
         return budget(whole, terms) if known else norm_budget(whole, terms)
 
-    module = "pipelines.stages.uncertainty.budget" if known else "pipelines.stages.unknown_poses.budget"
+    code = code_hash("budget" if known else "budget of norms")
     inputs = ("dwells", *(("history",) if history else ()), *names)
-    return StageCall("budget", inputs, stage.outputs, terms.document(), code_hash((module, "schemas.tables")), call)
+    return StageCall("budget", inputs, stage.outputs, terms.document(), code, call)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from inertial.correction import correct
 from inertial.errors import InertialError
 from pipelines.archive import Archive, Run
+from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.terms import budget_terms
 from pipelines.rerun.archived_job import archived_job
 from pipelines.rerun.buffered_run import BufferedRun
-from pipelines.rerun.selection import entry_of
+from pipelines.rerun.selection import SelectedRun, entry_of
 from pipelines.stages.fit import fit_in_memory
 from pipelines.stages.grade import GradeEvidence, grade
 from pipelines.stages.uncertainty.budget_terms import BudgetTables
@@ -26,13 +29,7 @@ from schemas.errors import DataRejected, TumblelineError
 from schemas.units import MICRO
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import pandas as pd
-
-    from pipelines.jobs.model_change import ModelChange
     from pipelines.rerun.partition import Batch
-    from pipelines.rerun.selection import SelectedRun
 
 Sums = dict[str, tuple[float, int]]
 """Sum of squared errors, µg², and their number, by unit."""

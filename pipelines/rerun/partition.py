@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from inertial.errors import InertialError
 from pipelines.archive import Archive
@@ -11,9 +11,6 @@ from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.reproduce import Reproduction, check
 from pipelines.rerun.rerun import RerunOutcome, again
 from schemas.errors import TumblelineError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 MOST = 32
 """Runs in a batch; the work of one batch is lost when a worker dies."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -13,12 +12,9 @@ from pipelines.archive import Archive, Run, files, parquet
 from pipelines.archive.keys import libraries
 from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.rerun import raw_samples
-from pipelines.rerun.steps import RAW, plan_of
+from pipelines.rerun.steps import RAW, StageCall, plan_of
 from schemas import table_check, tables
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from pipelines.rerun.steps import StageCall
 
 SAME, OTHER, LEFT_OUT = "same bytes", "other bytes", "not checked"
 

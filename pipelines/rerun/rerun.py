@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
@@ -14,14 +14,11 @@ from pipelines.archive.locks import alone
 from pipelines.archive.provenance import provenance
 from pipelines.archive.run import START
 from pipelines.chain.chain import RECORDS
+from pipelines.jobs.model_change import ModelChange
 from pipelines.rerun.buffered_run import BufferedRun
-from pipelines.rerun.steps import RAW, plan_of
+from pipelines.rerun.steps import RAW, Plan, StageCall, plan_of
+from pipelines.tables.leave_out import Dwells
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from pipelines.jobs.model_change import ModelChange
-    from pipelines.rerun.steps import Plan, StageCall
-    from pipelines.tables.leave_out import Dwells
 
 THERE, TAKEN, KEPT, COMPUTED = "there", "taken over", "kept", "computed"
 """What became of a stage: in the new run already; from the old run, whose key is the same; from the old run, because the raw

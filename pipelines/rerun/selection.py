@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.archive import files
+from pipelines.archive import Archive, files
 from schemas.errors import WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.archive import Archive
 
 KEYS = ("device", "station", "unit", "recipe", "since", "until")
 ALL, LATEST = "all", "latest"

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
-from pipelines.archive import Archive, code_hash
+from pipelines.archive import Archive, Run, code_hash
 from pipelines.chain.chain import BY_NAME, RECORDS, STAGES, Stage, Tables
 from pipelines.chain.runner import captured_tables
 from pipelines.diagnosis.diagnose import default_model
 from pipelines.importers.plane import axis_of_plane
 from pipelines.jobs.job import Job
+from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.model_files import refuse_unknown_effects, use_formulas
 from pipelines.jobs.terms import archived_terms
 from pipelines.rerun.archived_job import ArchivedJob, archived_job, model_keys, without_provenance
@@ -35,12 +37,6 @@ from schemas.errors import DataRejected, WrongUse
 from schemas.limits import Limits, limits_of
 from schemas.recipe import FormulaSpec
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pipelines.archive import Run
-    from pipelines.jobs.model_change import ModelChange
 
 CAPTURED = ("readings", "history")
 RAW = ("validate", "reduce", "noise")
@@ -80,9 +76,9 @@ def _captured(run: Run, change: ModelChange) -> Plan:
     for stage in STAGES:
         call = _called(stage.call, job)
         steps.append(
-            StageCall(stage.name, stage.inputs, stage.outputs, stage.parameters(job), code_hash(stage.modules), call)
+            StageCall(stage.name, stage.inputs, stage.outputs, stage.parameters(job), code_hash(stage.name), call)
         )
-    code = {stage.name: code_hash(stage.modules) for stage in STAGES}
+    code = {stage.name: code_hash(stage.name) for stage in STAGES}
     decisive = {key: value for key, value in job.about.items() if key != "station"}
     return Plan(job.recipe.name, tuple(steps), job.about, {**decisive, "code": code})
 
@@ -238,13 +234,13 @@ def _fit_step(model: dict[str, Any], history: bool, gravity: float | None) -> St
             past = run.table("history") if history else None
             return fit_of_norms(run.table("dwells"), past, model["effects"], gravity)
 
-        code = code_hash(("pipelines.stages.unknown_poses.fit", "schemas.tables"))
+        code = code_hash("fit of norms")
         return StageCall("fit", inputs, stage.outputs, {**parameters, "gravity_g": gravity}, code, of_norms)
 
     def call(run: Run) -> Tables:
         return fit(run.table("dwells"), recorded_history(run), model["effects"])
 
-    return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.modules), call)
+    return StageCall("fit", inputs, stage.outputs, parameters, code_hash(stage.name), call)
 
 
 def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
@@ -255,7 +251,7 @@ def _verify_step(history: bool) -> StageCall:  # noqa: FBT001
         names = ("coefficients", "covariance", "predictions")
         return verify(run.table("dwells"), recorded_history(run), *(run.table(name) for name in names))
 
-    return StageCall("verify", inputs, stage.outputs, {}, code_hash(stage.modules), call)
+    return StageCall("verify", inputs, stage.outputs, {}, code_hash(stage.name), call)
 
 
 def _grade_step(limits: Limits, zero: float, *, budgeted: bool) -> StageCall:
@@ -270,4 +266,4 @@ def _grade_step(limits: Limits, zero: float, *, budgeted: bool) -> StageCall:
         return grade(GradeEvidence(verdicts=pd.DataFrame(sound), **tables, noise=no_noise()), limits, zero)
 
     parameters = {"limits": limits.model_dump(mode="json"), **({"zero_output": zero} if zero else {})}
-    return StageCall("grade", names, stage.outputs, parameters, code_hash(stage.modules), call)
+    return StageCall("grade", names, stage.outputs, parameters, code_hash(stage.name), call)

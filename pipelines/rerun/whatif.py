@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.counts import number_of
+from pipelines.archive import Archive
+from pipelines.jobs.model_change import ModelChange
 from pipelines.jobs.releases import keep_evidence
-from pipelines.parallel import map_partitions
+from pipelines.parallel import Distributor, map_partitions
 from pipelines.rerun import lot_comparison
-from pipelines.rerun.lot_comparison import FreshTask, LotComparison
+from pipelines.rerun.lot_comparison import Fresh, FreshTask, LotComparison, Side, Sums
 from pipelines.rerun.partition import parts
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.archive import Archive
-    from pipelines.jobs.model_change import ModelChange
-    from pipelines.parallel import Distributor
-    from pipelines.rerun.lot_comparison import Fresh, Side, Sums
 
 FALLS = 0.005
 """Smallest relative change of an error that counts."""

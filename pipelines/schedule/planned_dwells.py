@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inertial.state import State
 from pipelines.schedule.planned_state import state_of
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import schedule
+from pipelines.schedule.timing import Activity, schedule
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from inertial.state import State
-    from pipelines.schedule.timing import Activity
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 class Planned(NamedTuple):

@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
 from inertial.quantities import BY_ATTRIBUTE, BY_COLUMN, Quantity
 from inertial.state import History, State
 from pipelines.schedule.steps import steps
-from pipelines.schedule.timing import schedule, temperatures
+from pipelines.schedule.timing import Activity, schedule, temperatures
 from pipelines.tables.dwell_table import HISTORY_POINTS
-from schemas.station import load_station
+from schemas.recipe import Recipe
+from schemas.station import StationConfig, load_station
 from schemas.units import STANDARD_GRAVITY_M_S2
 from stations.profile_files import recorded_columns
 
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.schedule.timing import Activity
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def planned_state(

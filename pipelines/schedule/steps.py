@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from pipelines.procedures import PROCEDURES, parts_of
-
-if TYPE_CHECKING:
-    from pipelines.procedures import ProcedureStep
-    from schemas.poses import Pose
-    from schemas.recipe import Recipe
+from pipelines.procedures import PROCEDURES, ProcedureStep, parts_of
+from schemas.poses import Pose
+from schemas.recipe import Recipe
 
 Kind = Literal["dwell", "verification", "allan", "procedure"]
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 from inertial import timing
+from schemas.poses import Pose
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pipelines.schedule.steps import Step
-    from schemas.poses import Pose
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
 
 ActivityKind = Literal["soak", "move", "dwell", "verification", "allan", "procedure"]
 

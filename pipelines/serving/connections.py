@@ -16,13 +16,12 @@ import socket
 import sys
 import termios
 import time
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST = 512

@@ -6,29 +6,23 @@ docs/decisions/statistics-of-records.md.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import allantools
 import numpy as np
 from allantools import ci
+from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from inertial.distributions import chi2_quantile
-from inertial.noise.allan import CONFIDENCE
+from inertial.noise.allan import CONFIDENCE, AllanCurve
 from inertial.noise.flicker import FLICKER_FLOOR
+from inertial.noise.terms import NoiseTerms
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from inertial.noise.allan import AllanCurve
-    from inertial.noise.terms import NoiseTerms
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 POWER = {"Q": 2, "N": 0, "B": -1, "K": -2}
 """Exponent α of the frequency in the density of each noise term, as the degrees of freedom need it; a ramp is no noise."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.errors import InertialError
 from inertial.fits.wander import student
@@ -17,12 +19,7 @@ from pipelines.tables.frames import empty_table, picked
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 LONG_S = 3600.0  # shortest record whose walk is extrapolated over a day: it then grows by a factor of three at most

@@ -6,15 +6,11 @@ to the next is known from its own earlier records and from the other units at th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import pandas as pd
-    from numpy.typing import NDArray
+import pandas as pd
+from numpy.typing import NDArray
 
 SAME_K = 1e-9  # means of equal readings differ by rounding
 BY_CHANCE = 1e-6  # probability that a sound thermometer is refused

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.procedures import PROCEDURES, figures_of_recipe
 from pipelines.stages.figures import FIGURES, Figure, LotCoefficients, UnitTables, figures_of
@@ -26,14 +28,10 @@ from schemas.decisions import (
 )
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits
+from schemas.recipe import Recipe
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import NDArray
-
     from pipelines.stages.uncertainty.decision_budget import DecisionBudget
-    from schemas.recipe import Recipe
 
 NO_GRADE = "none"
 FIGURE_TEXTS, FIGURE_NUMBERS = "unit figure unit_text outcome rule", "value uncertainty limit accept pfa pfr"

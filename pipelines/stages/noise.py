@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -14,15 +14,10 @@ from inertial.noise.terms import NoiseTerms, fit_terms, model_deviation
 from pipelines.stages.bias_stability import TERM, bias_stability
 from pipelines.stages.coarse_digits import Coarse, remark, without_digits
 from pipelines.stages.static_record import StaticSeries, Warmed, warmed
-from pipelines.tables.calibration import read_calibration
+from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.frames import empty_table
 from pipelines.tables.samples import by_record
 from schemas.units import AXES, MICRO
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from pipelines.tables.calibration import Calibration
 
 MOST_SAMPLES = (
     2**18

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import design
 from inertial.fits.linear import LotFit, felt_force, fit_lot, own_axes, pseudo_inverses
@@ -15,12 +17,7 @@ from pipelines.tables.dwells import LotArrays
 from schemas.errors import DataRejected
 from schemas.units import STANDARD_GRAVITY_M_S2
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which the kind of its noise cannot be estimated
 _PER_G = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
 """Output per g by the name of the output's unit, for models without a scale."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import effects as catalogue
 from inertial.estimation.problem import Lot, Problem
@@ -12,10 +14,6 @@ from inertial.estimation.refinement import terms_of
 from inertial.fits.linear import fit_lot
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
     from pipelines.tables.dwells import LotArrays
 
 PLAIN = ("bias", "scale", "misalignment")

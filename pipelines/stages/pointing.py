@@ -6,19 +6,15 @@ that differ between units are errors of the units, not of the table.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.pointing import _force, pointing_error
 from pipelines.tables.samples import STATIC
 from schemas.units import AXES
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from inertial.dynamics.wandering_means import IdentifiedNoise
 from inertial.errors import InertialError
 from pipelines.procedures import PROCEDURES, parts_of, steps_of
-from pipelines.procedures.base import Evaluated, FigureValue, Outcome
+from pipelines.procedures.base import Device, Evaluated, FigureValue, Outcome, Part, ProcedureRecord
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
 from pipelines.procedures.recorded import nominal_device, procedure_record
 from pipelines.tables.calibration import read_calibration
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    import pandas as pd
-
-    from pipelines.procedures.base import Device, Part, ProcedureRecord
-    from schemas.recipe import Recipe
+from schemas.recipe import Recipe
 
 
 def procedures(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE
@@ -13,12 +16,6 @@ from pipelines.tables.samples import PROCEDURE, STATIC
 from pipelines.tables.summaries import MEANS, SPREADS, summarised
 from schemas.errors import DataRejected
 from schemas.units import AXES, STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    import pandas as pd
-    from numpy.typing import NDArray
 
 KEPT = (
     *("unit", "slot", "record", "kind", "pose", "soak", "duration_s"),

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial import design
 from inertial.fits.linear import force_along_axes
 from inertial.frames import force_from_angles
 from inertial.noise.resolution import step_of
 from inertial.state import State
+from pipelines.tables.calibration import Calibration
 from schemas.units import AXES
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    from pipelines.tables.calibration import Calibration
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 COUNTED = 1000
 """Different values of a channel that are counted: an output with more values has no coarse digits."""

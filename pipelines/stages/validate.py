@@ -5,10 +5,12 @@ A unit with a fault is refused completely: it gets a verdict, but no coefficient
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
 from inertial.pointing import contradicts
@@ -16,14 +18,8 @@ from pipelines.stages.frozen import frozen
 from pipelines.stages.pointing import pointing_of
 from pipelines.tables.samples import PROCEDURE, STATIC
 from pipelines.tables.summaries import HIGHS, LOWS, means, summarised
+from schemas.lot import Unit
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from schemas.lot import Unit
 
 FEWEST_TO_JUDGE = 10  # samples: fewer equal values in a row happen by chance where the step is coarse
 CHAMBER_MOVED_K = 5.0

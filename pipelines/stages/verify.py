@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.correction import correct, station_change
 from pipelines.stages.rms_error import OF_UNITS, rms_columns
@@ -14,10 +13,7 @@ from pipelines.tables.dwells import LotArrays, LotTables
 from pipelines.tables.frames import empty_table, picked
 from schemas.units import AXES, MICRO
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def verify(

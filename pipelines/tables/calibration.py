@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial import design, effects
+from inertial.design import Values
 from inertial.effects import SensorEffect, StationEffect
-from inertial.fits.linear import response_matrix
+from inertial.fits.linear import LotFit, response_matrix
 from inertial.state import State
 from pipelines.tables.frames import picked
 from schemas.errors import DataRejected
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from inertial.design import Values
-    from inertial.fits.linear import LotFit
 
 ALL_AXES = "*"
 PROBE_T_C = 31.0

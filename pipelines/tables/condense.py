@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.quantities import BY_COLUMN
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 MOST = 500
 """Largest number of dwells of a unit for a full covariance: its size grows with the square, the work with the cube."""

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS, KNOWN_COLUMNS, SPREAD_COLUMNS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 REQUIRED = ("unit", "dwell", "time_s", "out_x", "out_y", "out_z")
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial import frames
 from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, FORCE_COLUMNS, RECORDED, is_covariate
 from inertial.state import History, State
 
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 HISTORY_POINTS = 4000
 FEWEST_POINTS = 2

@@ -6,11 +6,14 @@ needs every dwell of every unit and a reference force, as a fit in the output's 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.data_errors.readings import Readings, robust_fit
 from inertial.estimation.problem import Lot
@@ -21,13 +24,7 @@ from pipelines.tables.dwell_table import DwellTable, state_of_table
 from pipelines.tables.norms import lot_of_norms
 from schemas.errors import DataRejected
 
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 KINDS = ("dwell", "verification")
 

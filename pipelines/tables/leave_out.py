@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
+import pandas as pd
 
 from schemas.errors import DataRejected, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
 
 Dwells: TypeAlias = "tuple[tuple[str, int], ...]"
 """Units and numbers of dwells."""

@@ -7,23 +7,18 @@ finding that point: it would carry their error into all the others.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inertial.data_errors.readings import Readings
 from inertial.errors import NotIdentified
 from inertial.estimation.problem import Lot
-from inertial.fits.ellipsoid import EllipsoidFit, fit_ellipsoid
+from inertial.fits.ellipsoid import EllipsoidFit, Shape, fit_ellipsoid
 from inertial.fits.plane import quiet_axis
+from inertial.state import State
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from inertial.data_errors.readings import Readings
-    from inertial.fits.ellipsoid import Shape
-    from inertial.state import State
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 WARM = 5.0
 """K over which a temperature must move for its own offset of the bias to be part of the point of expansion."""

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from inertial.counts import number_of
-from inertial.data_errors.faults import find_faults, missing_dwells
+from inertial.data_errors.faults import Fault, find_faults, missing_dwells
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.errors import InertialError
+from inertial.estimation.problem import Lot
 from pipelines.tables.condense import condense
-from pipelines.tables.dwells import lot_of, measured
+from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
-    import pandas as pd
-
-    from inertial.data_errors.faults import Fault
-    from inertial.estimation.problem import Lot
-    from pipelines.tables.dwells import Measured
 
 MISSING = frozenset({"dropped_samples", "truncated_file"})
 """Names of the faults of a unit without dwells that other units have."""

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.tables.samples import by_record
 from schemas.units import AXES
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 MEANS, SPREADS, LOWS, HIGHS = (tuple(f"{name}_{axis}" for axis in AXES) for name in ("out", "sd", "low", "high"))
 NUMBERS = (*MEANS, *SPREADS, *LOWS, *HIGHS, "wild_value")

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.types import ASGIApp
 
 from inertial.errors import InertialError
 from pipelines.workbench.bodies import SmallBodies
@@ -20,16 +21,10 @@ from pipelines.workbench.security import Guard
 from pipelines.workbench.services import lots
 from pipelines.workbench.services.jobs import Jobs
 from pipelines.workbench.services.lots import Stale
+from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import PageState
 from schemas.errors import TumblelineError
 from schemas.installed import not_installed
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Callable
-
-    from starlette.types import ASGIApp
-
-    from pipelines.workbench.settings import WorkbenchSettings
 
 ROUTES = "pipelines.workbench.routes"
 

@@ -5,38 +5,33 @@ from __future__ import annotations
 import hashlib
 import math
 import secrets
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 from urllib.parse import parse_qsl, urlsplit
 
+import pandas as pd
 from fastapi import Body, Request
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from pydantic import AfterValidator
 from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from pipelines.archive import Archive
-from pipelines.drawing import csv_text, plotly_figure
+from pipelines.drawing import Chart, csv_text, plotly_figure
 from pipelines.drawing.picture import picture
 from pipelines.report.numbers import significant
 from pipelines.report.reasons import plain_reason
 from pipelines.report.unit_panels.budget import without_nothing
 from pipelines.workbench.services.index import RecentIndex
 from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.settings import WorkbenchSettings
+from pipelines.workbench.state import PageState
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import pandas as pd
-
-    from pipelines.drawing import Chart
-    from pipelines.workbench.settings import WorkbenchSettings
-    from pipelines.workbench.state import PageState
 
 State = TypeVar("State", bound="PageState")
 

@@ -10,19 +10,15 @@ from __future__ import annotations
 import secrets
 from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import parse_qsl, quote, urlencode
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from pipelines.workbench.access import SESSION_S, change_proof, session, session_holds
-from pipelines.workbench.settings import LOOPBACK_HOSTS
-
-if TYPE_CHECKING:
-    from starlette.types import ASGIApp, Message, Receive, Scope, Send
-
-    from pipelines.workbench.settings import WorkbenchSettings
+from pipelines.workbench.settings import LOOPBACK_HOSTS, WorkbenchSettings
 
 READING = frozenset({"GET", "HEAD"})
 CHANGING = frozenset({"POST", "PUT", "DELETE"})

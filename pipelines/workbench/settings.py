@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from pipelines.workbench.access import refuse_weak
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 LOOPBACK_HOSTS = frozenset({*LOOPBACK, "[::1]"})

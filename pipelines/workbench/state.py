@@ -6,16 +6,14 @@
 from __future__ import annotations
 
 import shlex
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Iterable
+from typing import Annotated, Any, ClassVar, Literal, Self
 from urllib.parse import urlencode
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from schemas.foreign import shown
 from schemas.reasons import reason_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 Text = Annotated[str, Field(max_length=200)]
 Texts = Annotated[tuple[Annotated[str, Field(min_length=1, max_length=400)], ...], Field(max_length=60)]

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
+from schemas.station import Limits
 
 if TYPE_CHECKING:
-    from schemas.station import Limits
     from stations.devices.registers import Registers
 
 SETTLING_DEG = 0.5  # largest distance from the target while an axis settles

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
-
-if TYPE_CHECKING:
-    from stations.devices.values import Values
+from stations.devices.values import Values
 
 READ_BACK_K = 1e-3
 AUTOMATIC = "automatic"

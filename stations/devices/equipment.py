@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-if TYPE_CHECKING:
-    from stations.clock import Clock
-    from stations.devices.values import Values
+from stations.clock import Clock
+from stations.devices.values import Values
 
 
 class Equipment(ABC):

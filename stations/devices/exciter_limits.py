@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import OperatorNeeded
 from schemas.motion import Motion
+from schemas.profile import Profile
 from schemas.vibration_profile import load_vibration_profile
 from stations.devices.recording import RecordingSpoilt
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
 
 Array = NDArray[np.float64]
 FLAT_SHARE = (

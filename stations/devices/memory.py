@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
+from stations.clock import Clock
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from stations.clock import Clock
     from stations.codec import Value
     from stations.devices.registers import Registers
 

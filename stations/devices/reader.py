@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from schemas.errors import StationRefused
 from stations.codec import named
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from stations.devices.registers import Registers
-    from stations.devices.slot import Slot
+from stations.devices.registers import Registers
+from stations.devices.slot import Slot
 
 RATE_HZ = 1e-3  # allowed difference of the rate read back
 POSSIBLE_C = (-100.0, 250.0)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
+from schemas.profile import Profile, Register, Space
 from stations.clock import steady
 from stations.codec import NotEncodable, Value, decode, encode, named
-
-if TYPE_CHECKING:
-    from collections.abc import Generator, Mapping
-
-    from schemas.profile import Profile, Register, Space
-    from stations.links.link import Link
+from stations.links.link import Link
 
 
 class Registers:

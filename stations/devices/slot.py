@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
-from stations.codec import SEQUENCE, WORDS_PER_SAMPLE, Packing, named, unpack_samples
+from stations.clock import Clock
+from stations.codec import SEQUENCE, WORDS_PER_SAMPLE, Packing, Value, named, unpack_samples
 from stations.devices.memory import UnitMemory
-
-if TYPE_CHECKING:
-    from stations.clock import Clock
-    from stations.codec import Value
-    from stations.devices.registers import Registers
+from stations.devices.registers import Registers
 
 LONGEST_READ = 125  # registers in one request
 FEWEST_COUNTS, MOST_COUNTS = 100, 2**31  # in a full scale; a wrong word order gives values outside

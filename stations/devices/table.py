@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from schemas.errors import StationTimeout
+from stations.clock import Clock
 from stations.devices.axis import TableAxis
-
-if TYPE_CHECKING:
-    from stations.clock import Clock
 
 __all__ = ["TableAxis", "TiltTable"]
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from schemas.profile import Profile
+
 if TYPE_CHECKING:
-    from schemas.profile import Profile
     from stations.codec import Value
 
 

@@ -6,12 +6,9 @@ Source: Modbus Application Protocol 1.1b3, 6.1–6.12 and 7; Modbus over serial 
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from schemas.profile import Space
+from schemas.profile import Space
 
 READ = {"coil": 1, "discrete": 2, "holding": 3, "input": 4}
 WRITE_COIL, WRITE_COILS, WRITE_REGISTERS = 5, 15, 16

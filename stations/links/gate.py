@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from schemas.errors import StationRefused, StationTimeout
+from schemas.profile import Command, Profile, Space
 from stations.clock import steady
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from schemas.profile import Command, Profile, Space
-    from stations.links.link import Carrier, TextCarrier
+from stations.links.link import Carrier, TextCarrier
 
 
 class Lease(Protocol):

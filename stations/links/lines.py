@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import socket
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.links.wires import discard_undelivered
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 END = b"\r\n"
 REFUSED = "NA:"

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid
+from schemas.profile import Carrier, Profile
+from schemas.station import StationConfig
 from schemas.station_devices import Devices
 from stations.links.gate import GatedLines, GatedLink, Permit
 from stations.links.lines import LineLink
 from stations.links.modbus import WireLink
 from stations.links.serial_wire import SerialWire
-from stations.links.wires import TcpWire, tls_context
+from stations.links.wires import TcpWire, Wire, tls_context
 from stations.profile_files import load_profile
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from schemas.carrier import Carried
-    from schemas.profile import Carrier, Profile
-    from schemas.station import StationConfig
-    from stations.links.wires import Wire
 
 Address = tuple[str, int]
 Key = tuple[str, str, int]

@@ -5,17 +5,12 @@ After a failed write it is unknown whether the device acted: the adapter reads b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
+from schemas.profile import Space
 from stations.links.frames import Malformed, Refused, read_request, values_in, write_request
-from stations.links.wires import Broken, Silence, TcpWire
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from schemas.profile import Space
-    from stations.links.wires import Wire
+from stations.links.wires import Broken, Silence, TcpWire, Wire
 
 GATEWAY = {10, 11}
 REASONS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import termios
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import serial
 from serial import PARITY_EVEN, PARITY_NONE, PARITY_ODD, Serial
@@ -20,9 +20,6 @@ from stations.links.frames import (
     reply_size,
 )
 from stations.links.wires import CHUNK, Broken, Silence, reason_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 PARITIES = {"none": PARITY_NONE, "even": PARITY_EVEN, "odd": PARITY_ODD}
 EXCEPTION_FRAME = 5  # device, function, code, check

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
+from schemas.profile import Profile, Register, Space
 from stations.codec import NotEncodable, Value, decode, encode
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile, Register, Space
 
 Source = Callable[[], Value]
 Sink = Callable[[dict[str, Value]], None]

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
+from schemas.profile import Profile
+from schemas.station_devices import Device, Devices
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, Busy, number
+from stations.plant.line_device import LineDevice
 from stations.plant.memory_bank import MemoryBank
 from stations.plant.simulations import axis_bank, chamber_bank, chamber_line_device
+from stations.plant.world import World
 from stations.profile_files import profile_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from schemas.profile import Profile
-    from schemas.station_devices import Device, Devices
-    from stations.plant.line_device import LineDevice
-    from stations.plant.world import World
 
 UNITS = {"V": "volt", "LSB": "lsb"}
 

@@ -7,21 +7,17 @@ stage and a delay, with a nonlinear spring between, sampled by a clock of the de
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from stations.plant.device import stream
+from stations.plant.device import PlantDevices, Truth, stream
+from stations.plant.preset import Preset
 from stations.plant.rig import DynamicTruth, Rig, directions, two_pole_behind
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from stations.plant.device import PlantDevices, Truth
-    from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from stations.plant.world import World
+from stations.plant.world import World
 
 
 class PlantClock:

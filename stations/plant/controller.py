@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
+from schemas.profile import Profile
 from stations.codec import Value
 from stations.plant.bank import Bank, Sink, Source, number
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.chamber import Chamber
-    from stations.plant.world import World
+from stations.plant.chamber import Chamber
+from stations.plant.world import World
 
 DEFAULT_LIMITS_C = (-100.0, 250.0)  # for profiles without limits
 HUMIDITY_PCT = 40.0

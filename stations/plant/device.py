@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from stations.plant.preset import Preset
+from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from schemas.profile import Profile
+from stations.codec import Value
 from stations.plant.bank import Busy, number
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.codec import Value
-    from stations.plant.table import Axis
-    from stations.plant.world import World
+from stations.plant.table import Axis
+from stations.plant.world import World
 
 ABSOLUTE = 1
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
-if TYPE_CHECKING:
-    from stations.plant.preset import Preset
+from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
 

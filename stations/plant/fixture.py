@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.simulation import Simulation
 from stations.plant.chamber import STEP_S, Chamber
 from stations.plant.device import stream
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from schemas.simulation import Simulation
-    from stations.plant.hidden import HiddenEffect
-    from stations.plant.moisture import Moisture
-
+from stations.plant.hidden import HiddenEffect
+from stations.plant.moisture import Moisture
 
 Array = NDArray[np.float64]
 

@@ -12,15 +12,13 @@ from array import array
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from schemas.errors import ArchiveUnusable, DataRejected
 from schemas.fault import FaultOrder
+from schemas.lot import Lot
 from schemas.profile import Space
-
-if TYPE_CHECKING:
-    from schemas.lot import Lot
-    from schemas.station import StationConfig
+from schemas.station import StationConfig
 
 VERSION = 1
 SPACES: tuple[Space, ...] = get_args(Space)

@@ -5,14 +5,11 @@ from __future__ import annotations
 import socketserver
 import threading
 from contextlib import suppress
-from typing import TYPE_CHECKING, Self
+from types import TracebackType
+from typing import Self
 
 from schemas.errors import StationRefused
-
-if TYPE_CHECKING:
-    from types import TracebackType
-
-    from stations.plant.plant import Plant
+from stations.plant.plant import Plant
 
 LOOPBACK = "127.0.0.1"
 END = b"\r\n"

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from stations.codec import NotEncodable, Value
-from stations.plant.bank import Busy, number
-
-if TYPE_CHECKING:
-    from stations.plant.bank import Source
-    from stations.plant.flash import Flash
-    from stations.plant.world import World
+from stations.plant.bank import Busy, Source, number
+from stations.plant.flash import Flash
+from stations.plant.world import World
 
 PART = 64
 PARTS = 3

@@ -6,16 +6,13 @@ Draws are made sample by sample in order, so that a record does not depend on th
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from stations.plant.preset import Preset
+from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
 

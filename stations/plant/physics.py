@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stations.plant.device import rotate
-from stations.plant.hidden import Block
-from stations.plant.table import turn
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from stations.codec import Counts
-    from stations.plant.device import PlantDevices
-    from stations.plant.dynamics import Dynamics
-    from stations.plant.fixture import Fixture
-    from stations.plant.hidden import HiddenEffect
-    from stations.plant.noise import UnitNoise
-    from stations.plant.table import Axis
+from stations.codec import Counts
+from stations.plant.device import PlantDevices, rotate
+from stations.plant.dynamics import Dynamics
+from stations.plant.fixture import Fixture
+from stations.plant.hidden import Block, HiddenEffect
+from stations.plant.noise import UnitNoise
+from stations.plant.table import Axis, turn
 
 Array = NDArray[np.float64]
 

@@ -5,24 +5,20 @@ Clients change it by writes to registers and by lines of text, and by nothing el
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
+from schemas.fault import FaultOrder
+from schemas.lot import Lot
+from schemas.profile import Space
 from schemas.simulation import Simulation
 from schemas.station import StationConfig
 from stations.plant.banks import build_banks, build_line_devices
+from stations.plant.faults.base import Fault
 from stations.plant.faults.catalogue import build_fault
+from stations.plant.hidden import HiddenEffect
 from stations.plant.journal import Injection, Journal, LineOrder, Write, fingerprint
 from stations.plant.world import World
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from schemas.fault import FaultOrder
-    from schemas.lot import Lot
-    from schemas.profile import Space
-    from stations.plant.faults.base import Fault
-    from stations.plant.hidden import HiddenEffect
 
 
 class Plant(World):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from importlib.resources import files
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, ValidationError
 
@@ -14,9 +15,6 @@ from schemas.own_files import own_file, own_names
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml, read_text
 from schemas.validity import Stability
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]

@@ -6,15 +6,11 @@ Written from the mechanisms, independently of the budget that is to cover them.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stations.plant.hidden.base import Untouched
-
-if TYPE_CHECKING:
-    from schemas.simulation import ReferenceErrors
-    from stations.plant.hidden.base import Array
+from schemas.simulation import ReferenceErrors
+from stations.plant.hidden.base import Array, Untouched
 
 REFERENCE_C = 25.0
 ORDERS = (1, 2)

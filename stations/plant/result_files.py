@@ -5,15 +5,13 @@ from __future__ import annotations
 import shutil
 import tempfile
 import weakref
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scipy.io import savemat
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from stations.plant.bench import Waveforms
+from stations.plant.bench import Waveforms
 
 
 class ResultFiles:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from stations.plant.preset import Preset
+from stations.plant.preset import Preset
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

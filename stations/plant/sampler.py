@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stations.codec import WORDS_PER_SAMPLE, pack_samples
-
-if TYPE_CHECKING:
-    from stations.codec import Counts, Packing
+from stations.codec import WORDS_PER_SAMPLE, Counts, Packing, pack_samples
 
 Array = NDArray[np.float64]
 CHUNK = 1024

@@ -9,7 +9,8 @@ import asyncio
 import logging
 import threading
 from functools import partial
-from typing import TYPE_CHECKING, Self, get_args
+from types import TracebackType
+from typing import Self, get_args
 
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import NoSuchIdException
@@ -19,16 +20,11 @@ from pymodbus.server.requesthandler import ServerRequestHandler
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from schemas.errors import StationRefused
-from schemas.profile import BITS, Space
+from schemas.profile import BITS, Profile, Space
 from stations.codec import NotEncodable
 from stations.plant.bank import Busy
 from stations.plant.faults.base import MUTE
-
-if TYPE_CHECKING:
-    from types import TracebackType
-
-    from schemas.profile import Profile
-    from stations.plant.plant import Plant
+from stations.plant.plant import Plant
 
 LOOPBACK = "127.0.0.1"
 WORD = 16

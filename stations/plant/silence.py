@@ -6,13 +6,10 @@ not, and keep their set point. The time is wall time, so the function exists onl
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from schemas.station_devices import Devices
-    from stations.plant.plant import Plant
+from schemas.station_devices import Devices
+from stations.plant.plant import Plant
 
 
 class IdleStop:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import pkgutil
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from schemas.profile import Profile
 from stations.plant import families
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.bank import Bank
-    from stations.plant.line_device import LineDevice
-    from stations.plant.table import Axis
-    from stations.plant.world import World
+from stations.plant.bank import Bank
+from stations.plant.line_device import LineDevice
+from stations.plant.table import Axis
+from stations.plant.world import World
 
 
 def family_names() -> list[str]:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.simulation import Simulation
 from stations.plant.device import stream
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from schemas.simulation import Simulation
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 import heapq
 import math
 import threading
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.errors import WrongUse
+from schemas.lot import Lot
 from schemas.simulation import Simulation
 from schemas.station import StationConfig
 from schemas.station_devices import MOST_SLOTS
@@ -22,7 +23,7 @@ from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, str
 from stations.plant.dynamics import Dynamics
 from stations.plant.fixture import Fixture
 from stations.plant.flash import Flash
-from stations.plant.hidden import hidden_effect
+from stations.plant.hidden import HiddenEffect, hidden_effect
 from stations.plant.keyed import keyed_normal
 from stations.plant.moisture import Moisture
 from stations.plant.noise import UnitNoise
@@ -33,12 +34,6 @@ from stations.plant.sampler import Sampler
 from stations.plant.supplies import Supplies
 from stations.plant.table import Axis
 from stations.profile_files import load_profile
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from schemas.lot import Lot
-    from stations.plant.hidden import HiddenEffect
 
 Array = NDArray[np.float64]
 

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from schemas.errors import LeaseLost, OperatorNeeded
+from schemas.station import StationConfig
 from stations.safety.folder import log_event, state_folder
 from stations.safety.lease_parts import addresses
 from stations.safety.leases import Leases, new_holder
+from stations.safety.safe_state import Reached
 from stations.safety.watchdog_client import Watchdog
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from schemas.station import StationConfig
-    from stations.safety.safe_state import Reached
 
 SAFE_STATE_S = 10.0  # time in which a run that ends makes its station safe; its watchdog continues afterwards
 

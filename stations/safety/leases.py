@@ -12,10 +12,12 @@ import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TextIO
+from pathlib import Path
+from typing import Any, TextIO
 
 from schemas.errors import LeaseLost, OperatorNeeded, StationRefused
 from schemas.safety import SAFE_WITHIN_S
+from schemas.station import StationConfig
 from stations.clock import steady
 from stations.safety.folder import log_event
 from stations.safety.lease_files import (
@@ -27,11 +29,6 @@ from stations.safety.lease_files import (
     write_holder,
 )
 from stations.safety.lease_parts import Part, addresses
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from schemas.station import StationConfig
 
 __all__ = ["Holder", "Leases", "holders", "new_holder"]
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import StationError
+from stations.devices.chamber import ThermalChamber
+from stations.devices.table import TableAxis
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from schemas.safety import Safety
-    from stations.devices.chamber import ThermalChamber
     from stations.devices.reader import Reader
-    from stations.devices.table import TableAxis
 
 AGAIN_S = 1.0
 

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import fcntl
 import time
-from typing import TYPE_CHECKING
+from pathlib import Path
 
-from stations.safety.lease_files import lease_file, read_holder
+from schemas.station import StationConfig
+from stations.safety.lease_files import Holder, lease_file, read_holder
 from stations.safety.lease_parts import addresses
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from schemas.station import StationConfig
-    from stations.safety.lease_files import Holder
-
 
 AGAIN_S = 0.5
 

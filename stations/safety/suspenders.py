@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from schemas.errors import OperatorNeeded
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from schemas.safety import Suspenders
     from schemas.station import Soak
     from stations.devices.reader import Guarded, Instruments

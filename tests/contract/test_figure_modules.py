@@ -10,6 +10,7 @@ import pytest
 from deploy.release import unpack
 from docs.figures_page import PAGE, page
 from pipelines.archive import Archive
+from pipelines.archive.code import CODE
 from pipelines.archive.keys import sources
 from pipelines.stages.figures import FIGURES, UNITS, FigureKind, IncompleteFigure, find_figures
 from pipelines.stages.grade import GradeEvidence, grade, refuse_limits_without_figures
@@ -106,7 +107,7 @@ def test_the_page_of_the_figures_is_up_to_date() -> None:
 
 
 def test_every_figure_is_part_of_the_key_of_grade() -> None:
-    assert {f"pipelines.stages.figures.{name.lower()}" for name in FIGURES} <= set(sources(("pipelines.stages.grade",)))
+    assert {f"pipelines.stages.figures.{name.lower()}" for name in FIGURES} <= set(sources(CODE["grade"]))
 
 
 def figures_in(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> dict[str, FigureKind]:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 import pytest
@@ -14,12 +14,10 @@ from schemas.fault import FaultOrder
 from schemas.station import load_station, with_faults
 from schemas.station_devices import Device, Equipment
 from stations import open_station
+from stations.clock import Clock
 from stations.devices.families.scpi_supply import ScpiSupply
 from stations.devices.recording import RecordingSpoilt
-
-if TYPE_CHECKING:
-    from stations.clock import Clock
-    from stations.devices.values import Values
+from stations.devices.values import Values
 
 FAMILIES = Path(__file__).resolve().parents[2] / "stations" / "devices" / "families"
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import fcntl
+from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from pipelines.orchestrator import server
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import pytest
 
 

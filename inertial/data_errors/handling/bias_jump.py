@@ -1,13 +1,11 @@
 """The bias of one axis of one unit changed during the run."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial.estimation.alternative import Array, Handling, after, times
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 AXES = "xyz"
 

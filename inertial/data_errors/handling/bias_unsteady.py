@@ -1,14 +1,12 @@
 """The bias of one axis of one unit is another in every soak."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial.data_errors.handling.bias_jump import AXES
 from inertial.estimation.alternative import Array, Handling, soaks
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 _FEWEST = 3
 """Soaks from which it is not the same as a bias with a temperature coefficient."""

@@ -1,13 +1,11 @@
 """One unit's gain changed during the run: its reading, its supply, its connector."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial.estimation.alternative import Array, Handling, after, common_force, times
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class GainStep(Handling):

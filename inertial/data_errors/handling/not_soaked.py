@@ -1,16 +1,14 @@
 """The devices were behind the temperature that was read: they had not soaked, and the reading is the chamber's."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial import operators
 from inertial.estimation.alternative import Array, Handling, Misfit
+from inertial.estimation.lot import Lot
 from inertial.state import History, State
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
 
 _FASTEST, _SLOWEST, _GRID = 30.0, 3000.0, 12  # s, s, values of the time constant
 _BETWEEN = 9  # values between two of the grid

@@ -1,13 +1,11 @@
 """The table was not at the commanded angles in every dwell of one pose."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial.estimation.alternative import Array, Handling, poses, tilts, without
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class PoseOff(Handling):

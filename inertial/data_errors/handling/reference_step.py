@@ -1,11 +1,9 @@
 """The reference of all units changed during the run: the reader's, or what the outputs are ratioed to."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from inertial.estimation.alternative import Array, Handling, after, common_force, times
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class ReferenceStep(Handling):

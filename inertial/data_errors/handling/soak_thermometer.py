@@ -1,16 +1,14 @@
 """All thermometers have the same offset in one soak."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.estimation.alternative import Array, Exchangeable, soaks
+from inertial.estimation.lot import Lot
 from inertial.state import History
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
 
 
 class SoakThermometer(Exchangeable):

@@ -1,11 +1,9 @@
 """The table slipped on its drives during the run."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from inertial.estimation.alternative import Array, Handling, after, tilts, times
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class TableSlip(Handling):

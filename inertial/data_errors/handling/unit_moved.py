@@ -1,13 +1,11 @@
 """One unit turned in its seat during the run."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial.estimation.alternative import Array, Handling, after, rotated_force, times, turns
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class UnitMoved(Handling):

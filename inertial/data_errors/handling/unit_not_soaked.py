@@ -1,12 +1,10 @@
 """One unit lagged the temperature reading: it had not soaked, or its contact with the plate is poor."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from inertial.data_errors.handling.not_soaked import NotSoaked
 from inertial.estimation.alternative import Array
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class UnitNotSoaked(NotSoaked):

@@ -1,14 +1,12 @@
 """The thermometer of one unit has an offset in one soak."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial.data_errors.handling.soak_thermometer import SoakThermometer, corrected
 from inertial.estimation.alternative import Array, Exchangeable, soaks
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class UnitThermometer(Exchangeable):

@@ -1,17 +1,15 @@
 """Two units were exchanged during the run: from a dwell on, each has the readings of the other."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.data_errors.exchanged import EDGE, PlainFit
 from inertial.estimation.alternative import Array, Handling, Misfit, by_block
+from inertial.estimation.lot import Lot
 from inertial.state import History, State
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
 
 _OF_ONE = 1.25
 """Factor within which the coefficient must be one: part of a difference between two units is no exchange."""

@@ -1,13 +1,11 @@
 """The table was not at the commanded angles in one dwell."""
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from inertial.estimation.alternative import Array, OfOneDwell, tilts, without
-
-if TYPE_CHECKING:
-    from inertial.estimation.lot import Lot
+from inertial.estimation.lot import Lot
 
 
 class WrongPose(OfOneDwell):

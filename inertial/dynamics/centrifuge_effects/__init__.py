@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from inertial.dynamics.centrifuge_effects.base import CentrifugeEffect, Spins
 from inertial.dynamics.effect_modules import effects_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 __all__ = ["EFFECTS", "CentrifugeEffect", "Spins"]
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from inertial.dynamics.effect_modules import effects_of
 from inertial.dynamics.transfer_effects.base import Conditions, Parameter, TransferEffect
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 __all__ = ["EFFECTS", "Conditions", "Parameter", "TransferEffect"]
 

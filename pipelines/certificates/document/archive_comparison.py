@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import takewhile, zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
 from pipelines.archive import Archive, Run
-from pipelines.certificates import Ledger
+from pipelines.certificates import Calibration, Ledger
 from pipelines.certificates.days import today
 from pipelines.certificates.document.compose import compose
+from pipelines.certificates.document.content import CertificateContent
 from pipelines.certificates.document.dcc import dcc
+from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.signature_check import canonical, parsed
 from pipelines.certificates.document.stated_laboratory import NOBODY, laboratory_in, said_by
+from pipelines.certificates.document.xml_facts import CertificateFacts
 from schemas.errors import ArchiveUnusable, TumblelineError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from pipelines.certificates import Calibration
-    from pipelines.certificates.document.content import CertificateContent
-    from pipelines.certificates.document.laboratory import LaboratoryFile
-    from pipelines.certificates.document.xml_facts import CertificateFacts
 
 SHOWN = 3  # different places that are named
 LONGEST = 90  # of a text that is shown

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.correction import correct
 from pipelines.archive import Run
+from pipelines.certificates import Calibration
 from pipelines.certificates.document.content import Adjustment
 from pipelines.tables.calibration import read_calibration
 from pipelines.tables.dwells import lot_arrays
 from schemas.errors import TumblelineError
 from schemas.units import MICRO
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.certificates import Calibration
 
 
 def adjustment(run: Run, calibration: Calibration, known: list[Calibration]) -> Adjustment:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from inertial.counts import number_of
+from pipelines.archive import Run
+from pipelines.certificates import Calibration
 from pipelines.certificates.document.as_found import adjustment
 from pipelines.certificates.document.content import (
     Amendment,
@@ -17,6 +19,7 @@ from pipelines.certificates.document.content import (
     ReferenceStandard,
     Result,
 )
+from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.numbers import probability, significant
 from pipelines.certificates.measured import measured_on, measured_span
 from pipelines.certificates.stated_budget import StatedBudget, StatedQuantity, stated_budget
@@ -28,11 +31,6 @@ from pipelines.tables.frames import rows_of
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR, MEDIAN, exceedance
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.uncertainty import Uncertainty
-
-if TYPE_CHECKING:
-    from pipelines.archive import Run
-    from pipelines.certificates import Calibration
-    from pipelines.certificates.document.laboratory import LaboratoryFile
 
 QUANTITIES = {
     "bias": "bias at the reference temperature",

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
+from pipelines.certificates.document.content import CertificateContent, Conformity, Result
 from pipelines.certificates.document.numbers import least_of, si_unit
 from pipelines.certificates.document.schema_files import EXTRA, WHERE, validate
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from pipelines.certificates.document.content import CertificateContent, Conformity, Result
 
 DCC, SI, VERSION = "https://ptb.de/dcc", "https://ptb.de/si", "3.0.0"
 COVERAGE = 0.9545

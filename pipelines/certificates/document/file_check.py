@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+from cryptography.x509 import Certificate
+
+from pipelines.archive import Archive
 from pipelines.certificates.document.archive_comparison import compare
+from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.schema_files import DocumentInvalid, validate
 from pipelines.certificates.document.signature_check import (
     ATTACHMENT,
@@ -20,14 +25,6 @@ from pipelines.certificates.document.signature_check import (
 from pipelines.certificates.document.signers import WHERE, Signer, not_trusted, time_of
 from pipelines.certificates.document.xml_facts import CertificateFacts, facts_of
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from cryptography.x509 import Certificate
-
-    from pipelines.archive import Archive
-    from pipelines.certificates.document.laboratory import LaboratoryFile
 
 State = Literal["good", "bad", "not checked"]
 

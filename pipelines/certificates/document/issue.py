@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from pipelines.archive import Archive, Run, files
-from pipelines.certificates import Ledger
+from pipelines.certificates import Calibration, Ledger
 from pipelines.certificates.document.compose import compose
 from pipelines.certificates.document.dcc import dcc
+from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.pdf import pdf
 from pipelines.certificates.document.schema_files import WHERE
-from pipelines.certificates.document.signing import sign_pdf, sign_xml
+from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.certificates import Calibration
-    from pipelines.certificates.document.laboratory import LaboratoryFile
-    from pipelines.certificates.document.signing import SigningKey
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from datetime import date as Day  # noqa: N812 - a field has its name
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -12,9 +13,6 @@ from schemas.bounds import Text
 from schemas.errors import WrongUse
 from schemas.strict import Strict
 from schemas.toml_files import explain, parse_toml, read_text
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 Line = Annotated[str, Field(min_length=1, max_length=200)]
 EMail = Annotated[str, Field(pattern=r"^[^@\s]+@[^@\s]+$", max_length=200)]

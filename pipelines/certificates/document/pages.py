@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from pipelines.certificates.document.content import Contribution
+from pipelines.certificates.document.content import Adjustment, CertificateContent, Contribution
 from pipelines.certificates.document.numbers import probability, rounded, significant, with_uncertainty
-
-if TYPE_CHECKING:
-    from pipelines.certificates.document.content import Adjustment, CertificateContent
 
 SMALLEST_SHARE = 5e-4  # of a row of a budget: less is printed as 0.0 %
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.certificates.document.content import CertificateContent
 from pipelines.certificates.document.pages import page_content
 from pipelines.certificates.document.schema_files import EXTRA, WHERE
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from pipelines.certificates.document.content import CertificateContent
 
 
 def pdf(content: CertificateContent, xml: bytes, address: str = "") -> bytes:

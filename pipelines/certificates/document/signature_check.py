@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterator
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509 import Certificate, load_der_x509_certificate
@@ -12,9 +13,6 @@ from cryptography.x509 import Certificate, load_der_x509_certificate
 from pipelines.certificates.document.signers import EXTRA, WHERE, Signer
 from schemas.errors import DataRejected
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 ATTACHMENT = "certificate.xml"
 DSIG = "http://www.w3.org/2000/09/xmldsig#"

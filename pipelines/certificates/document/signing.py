@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import (
@@ -21,9 +22,6 @@ from pipelines.certificates.document.schema_files import WHERE
 from pipelines.certificates.document.signers import not_valid
 from schemas.errors import WrongUse
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 EXTRA = "signatures"
 FIELD = "Signature"

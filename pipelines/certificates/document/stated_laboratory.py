@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.certificates.document.content import CertificateContent
 from pipelines.certificates.document.dcc import statements_of
 from pipelines.certificates.document.laboratory import LaboratoryFile
 from pipelines.certificates.document.xml_facts import first, statements
-
-if TYPE_CHECKING:
-    from pipelines.certificates.document.content import CertificateContent
 
 CORE = "/*/dcc:administrativeData/dcc:coreData"
 ITEM = "/*/dcc:administrativeData/dcc:items/dcc:item"

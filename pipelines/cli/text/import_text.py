@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from inertial.counts import number_of
 from pipelines.cli.next_commands import archive_words, command_line, print_next
 from pipelines.cli.options import console, print_table, short, short_values
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 VERDICTS = {
     True: ("adequate", "bold green"),

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from pipelines.cli.next_commands import command_line, fresh_measurement, print_next
+from pipelines.cli.next_commands import FindData, command_line, fresh_measurement, print_next
 from pipelines.cli.options import console, print_table, short
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pipelines.cli.next_commands import FindData
 
 ERRORS = {
     "fitted_ug": "fitted to these dwells",

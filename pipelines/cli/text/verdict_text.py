@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from inertial.uncertainty.rounding import equal
+from pipelines.archive import Run
 from pipelines.cli.options import console, error_console, short
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pipelines.archive import Run
     from pipelines.jobs.adequacy import AdequacyDocument
     from pipelines.jobs.references import ReferencesDocument
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Protocol, cast
@@ -11,8 +12,6 @@ from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pipelines.export.polynomials import UnitCalibration
 
 

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.export.parameters import Offsets, bias_m_s2, heading, in_g, number, rounded, scales
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 NAME = "ardupilot"

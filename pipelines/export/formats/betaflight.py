@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.export.comments import comment
 from pipelines.export.omissions import (
@@ -17,16 +18,10 @@ from pipelines.export.omissions import (
     largest_error_ug,
     omitted,
 )
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 NAME = "betaflight"

@@ -5,22 +5,17 @@ from __future__ import annotations
 import re
 import struct
 import zlib
+from collections.abc import Sequence
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pipelines.export.comments import comment
 from pipelines.export.fixed_point import ONE, fixed_point
 from pipelines.export.omissions import largest_error_ug
-from pipelines.export.polynomials import ORDER
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
+from pipelines.export.polynomials import ORDER, UnitCalibration
+from pipelines.export.settings import ExportSettings
 
 NAME = "c"
 SUFFIX = ".h"

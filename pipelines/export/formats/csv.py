@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-from pipelines.export.polynomials import ORDER
+from pipelines.export.polynomials import ORDER, UnitCalibration
+from pipelines.export.settings import ExportSettings
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
 
 NAME = "csv"
 SUFFIX = ".csv"

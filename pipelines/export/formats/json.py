@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
 
 NAME = "json"
 SUFFIX = ".json"

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.export.comments import comment
 from pipelines.export.omissions import largest_error_ug
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
 from pipelines.export.unit_noise import required_noise
 from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
 
 NAME = "kalibr"
 SUFFIX = ".yaml"

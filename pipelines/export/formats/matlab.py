@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.export.omissions import (
     ACROSS_T,
@@ -15,18 +17,12 @@ from pipelines.export.omissions import (
     largest_error_ug,
     omitted,
 )
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 NAME = "matlab"

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from pipelines.export.parameters import Offsets, bias_m_s2, heading, in_g, number, rounded, scales
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
 
 NAME = "px4"
 SUFFIX = ".params"

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from inertial.noise.gauss_markov import flicker_terms
 from pipelines.export.comments import comment
+from pipelines.export.polynomials import UnitCalibration
+from pipelines.export.settings import ExportSettings
 from pipelines.export.unit_noise import required_noise
 from schemas.units import MICRO, STANDARD_GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.export.polynomials import UnitCalibration
-    from pipelines.export.settings import ExportSettings
-
 
 NAME = "ros"
 SUFFIX = ".yaml"

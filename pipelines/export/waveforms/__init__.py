@@ -6,16 +6,14 @@ A module states ``NAME``, ``SUFFIX`` of its files, ``ONE_CLOCK`` (all channels s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import Protocol, cast
 
 from pipelines.export.waveforms.channel import Channel
 from schemas.errors import WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 __all__ = ["WRITERS", "Channel", "write_waveforms"]
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import pandas as pd
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.export.waveforms.channel import Channel
+from pipelines.export.waveforms.channel import Channel
 
 NAME, SUFFIX, ONE_CLOCK = "csv", ".csv", True
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.export.waveforms.channel import Channel
+from pipelines.export.waveforms.channel import Channel
 
 NAME, SUFFIX, ONE_CLOCK = "mat", ".mat", True
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
+from pipelines.export.waveforms.channel import Channel
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.export.waveforms.channel import Channel
 
 NAME, SUFFIX, ONE_CLOCK = "tdms", ".tdms", False
 

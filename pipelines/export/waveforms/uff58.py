@@ -6,18 +6,13 @@ Source: SDRC Universal File Formats, dataset 58: abscissa type 17 is time, ordin
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
-from pipelines.export.waveforms.channel import ACCELERATIONS
+from pipelines.export.waveforms.channel import ACCELERATIONS, Channel
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.export.waveforms.channel import Channel
 
 NAME, SUFFIX, ONE_CLOCK = "uff58", ".uff", False
 TIME, ACCELERATION, UNKNOWN = 17, 12, 0

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from pipelines.export.waveforms.channel import Channel
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.export.waveforms.channel import Channel
 
 NAME, SUFFIX, ONE_CLOCK = "wav", ".wav", True
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import Protocol, cast
 
-if TYPE_CHECKING:
-    from pipelines.importers.content import Content
+from pipelines.importers.content import Content
 
 
 class FileReader(Protocol):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,9 +15,6 @@ from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 NAME, TITLE, EXTRA, ORDER = "hdf5", "HDF5 and MATLAB 7.3", "hdf5", 40
 MAGIC = b"\x89HDF\r\n\x1a\n"

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import io
 import struct
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,9 +19,6 @@ from pipelines.importers.matlab_form import COMPRESSED, Form
 from pipelines.importers.unpacking import inflated, refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 NAME, TITLE, EXTRA, ORDER = "matlab", "MATLAB 5 to 7", "", 20
 MAGIC = b"MATLAB 5.0"

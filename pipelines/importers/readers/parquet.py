@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pandas as pd
 import pyarrow as pa
@@ -14,9 +14,6 @@ from pipelines.importers.content import Content
 from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 NAME, TITLE, EXTRA, ORDER = "parquet", "Parquet", "", 10
 MAGIC = b"PAR1"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import logging
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,9 +17,6 @@ from pipelines.importers.unpacking import refuse_larger
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
 from schemas.library import library
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
 
 _MOST_MESSAGES = 4
 NAME, TITLE, EXTRA, ORDER = "tdms", "TDMS", "tdms", 60

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from pipelines.importers.content import Content
 from schemas.errors import DataRejected
-
-if TYPE_CHECKING:
-    from pipelines.importers.content import Content
 
 NAME, TITLE, EXTRA, ORDER = "zip", "zip archive (refused)", "", 30
 MAGIC = b"PK\x03\x04"

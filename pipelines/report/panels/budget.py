@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipelines.report.budget_plots import shares_plot
+from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.figures import FIGURES
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from pipelines.report.context import ReportContext
 
 ORDER = 45
 TITLE = "Uncertainty budget"

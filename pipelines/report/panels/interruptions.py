@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pipelines.capture.interruptions import interruptions
+from pipelines.report.context import ReportContext
 from pipelines.report.templates import fill
-
-if TYPE_CHECKING:
-    from pipelines.report.context import ReportContext
 
 ORDER = 60
 TITLE = "Interruptions at the station"

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from inertial.uncertainty.rounding import chance
 from pipelines.jobs.adequacy import adequacy_of
+from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
-
-if TYPE_CHECKING:
-    from pipelines.report.context import ReportContext
 
 ORDER = 25
 TITLE = "Adequacy of the model"

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pipelines.jobs.references import UNITS, contradiction, references_of, unseen
+from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.uncertainty.tables import LABELS
-
-if TYPE_CHECKING:
-    from pipelines.report.context import ReportContext
 
 ORDER = 26
 TITLE = "Stated references"

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from pipelines.report.context import ReportContext
 from pipelines.report.templates import fill
-
-if TYPE_CHECKING:
-    from pipelines.report.context import ReportContext
 
 ORDER = 10
 TITLE = ""

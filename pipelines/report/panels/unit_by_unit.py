@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from pipelines.report.context import ReportContext, UnitContext
 from pipelines.report.panel import rendered
 from pipelines.report.templates import fill
-
-if TYPE_CHECKING:
-    from pipelines.report.context import ReportContext, UnitContext
 
 ORDER = 50
 TITLE = "Unit by unit"

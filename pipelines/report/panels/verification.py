@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from pipelines.report.context import ReportContext
 from pipelines.report.interactive import figure_of
 from pipelines.report.run_pictures import lot_chart
 from pipelines.report.templates import fill
-
-if TYPE_CHECKING:
-    from pipelines.report.context import ReportContext
 
 ORDER = 40
 TITLE = "Verification on poses not used by the fit"

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from pipelines.report.context import UnitContext
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    from pipelines.report.context import UnitContext
 
 ORDER = 35
 TITLE = "Uncertainty of the bias by measurand"

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inertial.uncertainty.rounding import rounded
+from pipelines.report.context import UnitContext
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.uncertainty.tables import LABELS
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    from pipelines.report.context import UnitContext
 
 ORDER = 47
 TITLE = "Uncertainty"

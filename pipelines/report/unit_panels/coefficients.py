@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pipelines.report.context import UnitContext
 from pipelines.report.numbers import with_uncertainty
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    from pipelines.report.context import UnitContext
 
 ORDER = 30
 TITLE = "Coefficients"

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from pipelines.report.context import UnitContext
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    from pipelines.report.context import UnitContext
 
 ORDER = 20
 TITLE = "Figures and limits"

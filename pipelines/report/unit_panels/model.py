@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from pipelines.report.context import UnitContext
 from pipelines.report.interactive import figure_of
 from pipelines.report.run_pictures import check_chart, model_chart
 from pipelines.report.templates import fill
-
-if TYPE_CHECKING:
-    from pipelines.report.context import UnitContext
 
 ORDER = 10
 TITLE = "Model and measurement"

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from pipelines.report.context import UnitContext
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.report.context import UnitContext
 
 ORDER = 40
 TITLE = "Noise of the static record"

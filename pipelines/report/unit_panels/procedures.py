@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from pipelines.procedures import PROCEDURES
 from pipelines.procedures.base import Evaluated
+from pipelines.report.context import UnitContext
 from pipelines.report.interactive import figure_of
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.templates import fill
 from pipelines.tables.frames import rows_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.report.context import UnitContext
 
 ORDER = 45
 TITLE = "Test procedures"

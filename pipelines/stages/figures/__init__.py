@@ -6,16 +6,14 @@ Nothing else names a figure: limits files, tables, the report and the reference 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from inertial.uncertainty.deviation_law import DeviationLaw
 from pipelines.procedures import FIGURES as PROCEDURE_FIGURES
 from pipelines.stages.figures.base import FigureKind, LotCoefficients, UnitTables
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
 
 __all__ = [
     "FIGURES",

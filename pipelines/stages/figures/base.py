@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial.distributions import normal_tail
 from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
 from pipelines.stages.noise import B_BOUND
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import NDArray
-
-    from pipelines.tables.calibration import Calibration
-    from pipelines.tables.frames import UnitRows
-    from schemas.recipe import Recipe
+from pipelines.tables.calibration import Calibration
+from pipelines.tables.frames import UnitRows
+from schemas.recipe import Recipe
 
 NORMAL_95 = 1.959964
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value, rms, verification_poses
+from pipelines.tables.frames import UnitRows
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    from pipelines.tables.frames import UnitRows
 
 
 def _value(tables: UnitTables) -> Value | None:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pipelines.stages.bias_stability import HOUR_S, TERM
 from pipelines.stages.figures.base import FigureKind, UnitTables, Value, worst_axis
-
-if TYPE_CHECKING:
-    from schemas.recipe import Recipe
+from schemas.recipe import Recipe
 
 
 def _value(tables: UnitTables) -> Value | None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.fits.wander import wander_kernels
 from inertial.frames import angles_from_force
@@ -17,15 +17,11 @@ from pipelines.stages.uncertainty.contributions import DwellConditions, influenc
 from pipelines.stages.uncertainty.measurands import VarianceParts, quantities_of
 from pipelines.stages.uncertainty.tables import covariance_rows, empty, rows_of_quantities
 from pipelines.tables.calibration import Calibration
+from pipelines.tables.dwells import LotArrays
 from schemas.units import MICRO
 from schemas.validity import Stability
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.tables.dwells import LotArrays
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def budget(tables: BudgetTables, terms: BudgetTerms) -> dict[str, pd.DataFrame]:

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from pipelines.stages.reduce import FollowedSupply
 from pipelines.stages.uncertainty.contributions import merged
 from pipelines.tables.calibration import Calibration, read_calibration
-from pipelines.tables.dwells import LotTables
+from pipelines.tables.dwells import LotArrays, LotTables
+from schemas.recipe import Recipe
+from schemas.reference import Reference
+from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
-    from pipelines.tables.dwells import LotArrays
-    from schemas.recipe import Recipe
-    from schemas.reference import Reference
-    from schemas.uncertainty import Uncertainty
 
 MANY = 1e6
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import design
 from inertial.correction import predict
@@ -23,18 +24,12 @@ from inertial.uncertainty.contradiction import (
 from inertial.uncertainty.influences import Errors, MeasurementModel, difference, sensitivity
 from pipelines.stages.noisy_fit import fitted_with_noise
 from pipelines.stages.uncertainty.budget import conditions, with_device_temperature
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.contributions import influences
+from pipelines.tables.dwells import LotArrays
+from schemas.uncertainty import Uncertainty
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
-    from pipelines.tables.dwells import LotArrays
-    from schemas.uncertainty import Uncertainty
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 JUDGED = ("level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose")
 """Contributions of the table that all units of a lot share."""

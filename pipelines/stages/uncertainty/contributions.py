@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inertial.state import State
 from inertial.uncertainty.influences import Errors, InputQuantity, Scattered, harmonic, theta
-from schemas.uncertainty import Uncertainty
+from schemas.uncertainty import Entry, StandardUncertainty, Uncertainty
+from schemas.validity import Stability
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from inertial.state import State
-    from schemas.uncertainty import Entry, StandardUncertainty
-    from schemas.validity import Stability
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

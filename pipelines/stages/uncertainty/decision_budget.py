@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.stages.figures.base import BudgetRow
 from pipelines.stages.uncertainty.budget import lot_variances
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.measurands import PARTS, part_of
 from pipelines.stages.uncertainty.tables import combined, groups_of
 from pipelines.tables.calibration import symmetric
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 Key = tuple[str, str]
 """Name and axis of a quantity."""

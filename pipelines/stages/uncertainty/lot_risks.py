@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from inertial.uncertainty.risk import lot_risk, process_deviation
 from pipelines.tables.frames import empty_table
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from schemas.limits import Limits
+from schemas.limits import Limits
 
 TEXTS, NUMBERS = "figure unit_text", "mean process u limit accept pfa pfr accepted largest_pfa"
 FEWEST = 3

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from inertial.uncertainty.period import (
     DAY_S,
@@ -18,12 +19,10 @@ from inertial.uncertainty.period import (
     logarithmic,
     walk_later,
 )
+from schemas.validity import Ageing
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
-    from schemas.validity import Ageing
 
 RECTANGULAR = float(np.sqrt(3.0))
 

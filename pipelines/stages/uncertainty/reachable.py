@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inertial import design
+from inertial.state import State
 from inertial.uncertainty.influences import MeasurementModel, sensitivity
 from inertial.uncertainty.period import MONTH_S, Windows, flicker_later, flicker_within
-from inertial.uncertainty.propagation import fit_design, norm_errors, propagated, rms_over
+from inertial.uncertainty.propagation import Propagated, fit_design, norm_errors, propagated, rms_over
 from pipelines.stages.uncertainty.budget import with_device_temperature
+from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from pipelines.stages.uncertainty.contributions import DwellConditions, influences
 from pipelines.stages.uncertainty.measurands import EFFECTS
 from pipelines.stages.uncertainty.period import ageing_u
 from pipelines.stages.uncertainty.period_error import AxisErrors, largest_error
 from schemas.decisions import BOUND, GRADES, LARGEST_ERROR
+from schemas.limits import Limits
 from schemas.units import AXES, MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from inertial.state import State
-    from inertial.uncertainty.propagation import Propagated
-    from pipelines.stages.uncertainty.budget_terms import BudgetTerms
-    from schemas.limits import Limits
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 DAY_S = 86_400.0
 LEAST_SHARE = 0.01

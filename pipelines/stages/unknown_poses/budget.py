@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -12,14 +11,12 @@ from inertial.frames import angles_from_force
 from inertial.uncertainty.influences import sensitivity
 from inertial.uncertainty.norm_design import propagated_by_norm
 from pipelines.stages.uncertainty.budget import conditions, with_device_temperature
+from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.uncertainty.contributions import influences, sources
 from pipelines.stages.uncertainty.measurands import BudgetQuantity, VarianceParts, quantities_of
 from pipelines.stages.uncertainty.tables import covariance_rows, empty, rows_of_quantities
 from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
-
-if TYPE_CHECKING:
-    from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
-    from schemas.uncertainty import Uncertainty
+from schemas.uncertainty import Uncertainty
 
 OF_POSES = ("level", "orthogonality", "outer_offset", "inner_offset", "harmonics", "pose", "seat")
 """Entries that change the direction of the force only: the norm does not depend on them."""

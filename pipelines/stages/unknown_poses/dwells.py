@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.correction import correct
 from inertial.fits.linear import force_along_axes, response_matrix
@@ -17,13 +19,7 @@ from pipelines.tables.calibration import Calibration, read_calibration
 from pipelines.tables.dwells import KINDS, LotArrays, measured
 from schemas.units import MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import pandas as pd
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 FITTED = "dwell"
 

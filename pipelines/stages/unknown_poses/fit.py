@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial import effects as catalogue
 from inertial.errors import InertialError
@@ -26,12 +28,7 @@ from pipelines.tables.norms import expansion
 from schemas.errors import DataRejected
 from schemas.units import AXES, MICRO
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 FEW_DWELLS = 300
 """Dwells up to which standard errors are averaged over the plausible shares of wander."""

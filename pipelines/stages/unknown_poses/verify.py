@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from inertial.fits.wander import student
 from pipelines.stages.rms_error import rms_columns
@@ -13,10 +12,7 @@ from pipelines.stages.unknown_poses.dwells import NormDwells, norm_dwells
 from pipelines.stages.verify import nothing_verified
 from schemas.units import AXES, MICRO
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def verify_norms(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
@@ -10,13 +10,10 @@ from starlette.responses import Response
 from inertial.uncertainty.rounding import chance
 from pipelines.audit.finding import WHO
 from pipelines.stages.figures import FIGURES
-from pipelines.workbench.pages import figure, page, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import Workbench, figure, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import requests
 from pipelines.workbench.state import AuditPage
 from schemas.errors import TumblelineError, WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.workbench.pages import Workbench
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Audit", 70, "/audit"

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
 from inertial.uncertainty.rounding import chance, equal
 from pipelines.diagnosis.inputs import use_written_formulas
+from pipelines.drawing import Chart
 from pipelines.report.evolution import evolution_chart
 from pipelines.workbench.pages import (
     RequestBody,
+    Workbench,
     figure,
     page,
     page_part,
@@ -23,16 +24,12 @@ from pipelines.workbench.pages import (
     table_csv,
     workbench_of,
 )
+from pipelines.workbench.results import Diagnosed
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import MissingPage
 from pipelines.workbench.views import missing_charts, unit_charts
 from schemas.errors import TumblelineError, WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.drawing import Chart
-    from pipelines.workbench.pages import Workbench
-    from pipelines.workbench.results import Diagnosed
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Missing effects", 20, "/missing"

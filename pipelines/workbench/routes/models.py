@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
@@ -11,13 +11,10 @@ from starlette.responses import JSONResponse, Response
 from inertial import effects
 from pipelines.jobs.model_files import read_model, versions
 from pipelines.jobs.releases import released, releases
-from pipelines.workbench.pages import RequestBody, page, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import RequestBody, Workbench, page, state_of, table_csv, workbench_of
 from pipelines.workbench.services import models, requests
 from pipelines.workbench.state import ModelsPage
 from schemas.errors import TumblelineError
-
-if TYPE_CHECKING:
-    from pipelines.workbench.pages import Workbench
 
 router = APIRouter()
 HEADING, ORDER, ADDRESS = "Models", 30, "/models"

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from pipelines.workbench.pages import RequestBody, page_address, workbench_of
+from pipelines.workbench.pages import RequestBody, Workbench, page_address, workbench_of
 from pipelines.workbench.services import lots, requests
 from pipelines.workbench.services.events import stream
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.workbench.pages import Workbench
 
 router = APIRouter()
 

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.certificates.statement import stated
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import page, run_table, saved_as, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import Workbench, page, run_table, saved_as, state_of, table_csv, workbench_of
+from pipelines.workbench.results import Diagnosed
 from pipelines.workbench.services import requests
 from pipelines.workbench.state import MissingPage, RunPage
 from schemas.errors import TumblelineError, WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.workbench.pages import Workbench
-    from pipelines.workbench.results import Diagnosed
 
 router = APIRouter()
 SHOWN = (

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from pipelines.audit.calibrations import day_of
 from pipelines.certificates import Ledger
+from pipelines.drawing import Chart
 from pipelines.report.numbers import with_uncertainty
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
-from pipelines.workbench.pages import figure, page, page_part, part_of, run_table, state_of, table_csv, workbench_of
+from pipelines.workbench.pages import (
+    Workbench,
+    figure,
+    page,
+    page_part,
+    part_of,
+    run_table,
+    state_of,
+    table_csv,
+    workbench_of,
+)
 from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage
 from pipelines.workbench.views import unit_charts
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.drawing import Chart
-    from pipelines.workbench.pages import Workbench
 
 router = APIRouter()
 CERTIFICATES = 20

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import AsyncIterator, Callable
 from typing import TYPE_CHECKING, Any
 
+from pipelines.workbench.services.jobs import Jobs
+
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable
-
     from starlette.requests import Request
-
-    from pipelines.workbench.services.jobs import Jobs
 
 EVERY_S = 0.15
 HEARTBEAT = 60  # polls without news before a keep-alive message

@@ -8,15 +8,11 @@ from __future__ import annotations
 import threading
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive
+from pipelines.archive.store import Place
 from pipelines.audit.index import AuditIndex, up_to_date
-from pipelines.audit.tables_in_memory import TablesInMemory, in_memory, unit_in_memory
-
-if TYPE_CHECKING:
-    from pipelines.archive.store import Place
-    from pipelines.audit.tables_in_memory import QueryResult
+from pipelines.audit.tables_in_memory import QueryResult, TablesInMemory, in_memory, unit_in_memory
 
 SEARCHED = frozenset({"runs", "units"})
 """Tables that every search reads: kept in memory, some 20 MB for 100 000 calibrations."""

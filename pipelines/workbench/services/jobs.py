@@ -11,18 +11,16 @@ import queue
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, Literal
 
 from pipelines.archive import files
 from pipelines.archive.keys import digest
 from schemas.errors import ArchiveUnusable
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from multiprocessing.connection import Connection
-    from pathlib import Path
 
 State = Literal["waiting", "running", "done", "failed", "stopped", "interrupted"]
 ENDED = frozenset({"done", "failed", "stopped", "interrupted"})

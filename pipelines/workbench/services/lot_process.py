@@ -7,10 +7,10 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from pipelines.archive import Archive, files
-from pipelines.chain.attendance import JUDGED, Attendance
+from pipelines.chain.attendance import JUDGED, Answer, Attendance, Prompt
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Request
 from pipelines.report.reasons import plain_reason
@@ -18,9 +18,6 @@ from pipelines.tables.frames import rows_of
 from pipelines.workbench.services.lots import write_state
 from schemas.errors import OperatorNeeded, TumblelineError
 from schemas.installed import not_installed
-
-if TYPE_CHECKING:
-    from pipelines.chain.attendance import Answer, Prompt
 
 POLL_S = 0.2
 EVERY_S = 0.25

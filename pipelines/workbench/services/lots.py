@@ -12,18 +12,15 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.archive import files
 from pipelines.archive.keys import digest
+from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import TumblelineError, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pipelines.workbench.settings import WorkbenchSettings
 
 FOLDER = "lots"
 ENDED = frozenset({"done", "stopped", "failed", "interrupted"})

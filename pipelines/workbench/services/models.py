@@ -5,20 +5,16 @@ from __future__ import annotations
 import getpass
 import re
 import threading
+from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from inertial import effects
 from pipelines.diagnosis.inputs import WHY, use_written_formulas
 from pipelines.jobs.model_files import ModelStep, extended, model_text, new_model, publish_model
+from pipelines.jobs.releases import Release
+from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.jobs.releases import Release
-    from pipelines.workbench.settings import WorkbenchSettings
 
 FOLDER = "models"
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,60}")

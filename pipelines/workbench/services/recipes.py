@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
@@ -15,16 +15,12 @@ from pipelines.jobs.moved_poses import moves_of
 from pipelines.jobs.recipe_text import limits_from, recipe_text
 from pipelines.jobs.recipes import folder_of, sample_names
 from pipelines.workbench.services import requests
+from pipelines.workbench.settings import WorkbenchSettings
+from pipelines.workbench.state import PlanPage
 from pipelines.workbench.views.planned import recipe_of
 from schemas.errors import WrongUse
 from schemas.foreign import shown
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pipelines.workbench.settings import WorkbenchSettings
-    from pipelines.workbench.state import PlanPage
-    from schemas.recipe import Recipe
+from schemas.recipe import Recipe
 
 NAME = re.compile(r"[a-z0-9][a-z0-9._-]{0,60}")
 STEP_DEG = 0.5

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.importers.limited import in_reader
 from pipelines.workbench.services import models, sources, uploads
+from pipelines.workbench.settings import WorkbenchSettings
 from pipelines.workbench.state import AuditPage, MissingPage, ModelsPage, PageState, PlanPage, UploadPage
 from schemas.errors import WrongUse, did_you_mean
 from schemas.foreign import is_file
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from pipelines.workbench.settings import WorkbenchSettings
 
 Request = tuple[str, dict[str, Any]]
 

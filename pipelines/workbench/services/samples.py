@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+import pandas as pd
+
+from pipelines.archive import Archive
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import pandas as pd
-
-    from pipelines.archive import Archive
 
 
 def samples_of(

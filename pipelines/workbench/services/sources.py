@@ -5,14 +5,11 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pipelines.archive import Archive
 from pipelines.archive.keys import digest
+from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import WrongUse, did_you_mean
-
-if TYPE_CHECKING:
-    from pipelines.workbench.settings import WorkbenchSettings
 
 ENDINGS = (".parquet", ".csv", ".tsv", ".parquet.gz", ".csv.gz")
 OWN = ("lots", "models")

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import WrongUse, did_you_mean
 from schemas.station import BUILT_IN, load_station
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from pipelines.workbench.settings import WorkbenchSettings
 
 
 @dataclass(frozen=True)

@@ -8,22 +8,19 @@ import re
 import tempfile
 import threading
 from collections import OrderedDict
+from collections.abc import Mapping as Mapped
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from pipelines.importers.limited import ReadingEnded, ReadingLimits, in_reader
 from pipelines.tables.dwell_columns import is_exchange
 from pipelines.tables.frames import rows_of
+from pipelines.workbench.settings import WorkbenchSettings
+from pipelines.workbench.state import UploadPage
 from schemas.errors import DataRejected, TumblelineError, WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping as Mapped
-
-    import pandas as pd
-
-    from pipelines.workbench.settings import WorkbenchSettings
-    from pipelines.workbench.state import UploadPage
 
 FOLDER = "uploads"
 PART = ".part-"

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import traceback
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from pipelines.workbench.results import Diagnosed
 from schemas.errors import TumblelineError
 from schemas.installed import not_installed
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    ReportProgress = Callable[[int, int, str], None]
+ReportProgress = Callable[[int, int, str], None]
 
 
 def done_in_process(kind: str, request: Mapping[str, Any], report_progress: ReportProgress) -> tuple[str, Any]:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from pipelines.audit.charts import control_chart, drift_chart, due_chart, series_chart, yield_chart
+from pipelines.drawing import Chart
 from pipelines.workbench.views.evidence import address_of, evidence
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from pipelines.drawing import Chart
 
 MOST_CHARTS = 6
 NAMES = ("since", "until", "device", "station")

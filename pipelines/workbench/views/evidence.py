@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.audit import charts as audit_charts
 from pipelines.audit.drifts import OWN
+from pipelines.audit.finding import AuditFinding
 from pipelines.audit.parameters import NAMES, unit_text
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Role
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
     from pipelines.audit.audit import Audit
-    from pipelines.audit.finding import AuditFinding
-    from pipelines.drawing.chart import Role
 
 MOST = 80  # findings with a chart of their own
 COLOURS: tuple[Role, Role] = ("x", "y")

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
-from pipelines.drawing.chart import density, symmetric
+from pipelines.drawing.chart import Role, density, symmetric
 from pipelines.drawing.mollweide import project, sphere
+from pipelines.report.residual_table import ResidualTable
 from pipelines.report.residuals import band
+from pipelines.workbench.results import Diagnosed
+from pipelines.workbench.state import MissingPage
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from pipelines.drawing.chart import Role
-    from pipelines.report.residual_table import ResidualTable
-    from pipelines.workbench.results import Diagnosed
-    from pipelines.workbench.state import MissingPage
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 RESIDUAL = "residual / µg"
 TURNS: dict[int, tuple[str, Any]] = {

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from schemas.recipe import Recipe
-    from schemas.station import StationConfig
+from schemas.recipe import Recipe
+from schemas.station import StationConfig
 
 
 def recipe_of(request: Mapping[str, Any]) -> tuple[Recipe, Recipe, StationConfig]:

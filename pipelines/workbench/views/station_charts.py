@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST = 3000
 

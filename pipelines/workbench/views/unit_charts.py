@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 
 from pipelines.drawing import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Role
 from pipelines.report.residuals import band
 from pipelines.report.run_pictures import allan_plot
+from pipelines.workbench.state import UnitPage
 from schemas.units import AXES
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from pipelines.drawing.chart import Role
-    from pipelines.workbench.state import UnitPage
 
 LABELS = {
     "force": "specific force along the axis / g",

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from schemas.errors import OperatorNeeded, StationRefused
+from stations.clock import Clock
 from stations.devices.equipment import Equipment
-
-if TYPE_CHECKING:
-    from stations.clock import Clock
-    from stations.devices.values import Values
+from stations.devices.values import Values
 
 NOMINAL = 1.0  # the memory that holds the nominal setting
 SETTLE_S = 1.0

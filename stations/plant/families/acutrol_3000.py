@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stations.plant.bench import STANDARD_G, Waveforms
+from schemas.profile import Profile
+from stations.plant.bench import STANDARD_G, Bench, Waveforms
 from stations.plant.device import stream
 from stations.plant.result_files import ResultFiles
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.bench import Bench
-    from stations.plant.world import World
+from stations.plant.world import World
 
 UNKNOWN, WRONG = "NA:CMD ERR", "NA:PARA ERR"
 RADIUS_M = 0.5  # of the usual mounting

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from stations.plant.bench import FINE_HZ
+from schemas.profile import Profile
+from stations.plant.bench import FINE_HZ, Waveforms
 from stations.plant.result_files import ResultFiles
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.bench import Waveforms
-    from stations.plant.world import World
+from stations.plant.world import World
 
 UNKNOWN, WRONG, REFUSED = "NA:CMD ERR", "NA:PARA ERR", "NA:NOT ARMED"
 FALL_S = 2.0

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.world import World
+from schemas.profile import Profile
+from stations.plant.world import World
 
 SET = re.compile(r"TEMP, S(-?\d+(?:\.\d+)?)")
 MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from stations.plant.bank import number
+from schemas.profile import Profile
+from stations.codec import Value
+from stations.plant.bank import Bank, Source, number
 from stations.plant.controller import controller_bank
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.codec import Value
-    from stations.plant.bank import Bank, Source
-    from stations.plant.world import World
+from stations.plant.world import World
 
 
 def simulated(world: World, profile: Profile) -> Bank:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, Busy, number
 from stations.plant.families.arm_release_shock import Machine
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from schemas.profile import Profile
-    from stations.plant.world import World
+from stations.plant.world import World
 
 HEADS = {"peak": "PEAK", "duration": "DUR", "axis": "AXIS", "direction": "DIR"}
 """Registers of numbers, and the machine's words for them."""

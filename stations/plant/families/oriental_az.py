@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, number
 from stations.plant.drive import ABSOLUTE, start_move
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.table import Axis
-    from stations.plant.world import World
+from stations.plant.table import Axis
+from stations.plant.world import World
 
 
 def simulated(world: World, axis: Axis, profile: Profile) -> Bank:

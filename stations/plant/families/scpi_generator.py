@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from schemas.profile import Profile
+from stations.plant.bench import Waveforms
 from stations.plant.result_files import ResultFiles
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.bench import Waveforms
-    from stations.plant.world import World
+from stations.plant.world import World
 
 DONE = "1"
 OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9

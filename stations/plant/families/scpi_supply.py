@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.world import World
+from schemas.profile import Profile
+from stations.plant.world import World
 
 DONE = "1"
 OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9

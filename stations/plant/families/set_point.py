@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from schemas.profile import Profile
+from stations.plant.bank import Bank
 from stations.plant.controller import controller_bank, set_by
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.bank import Bank
-    from stations.plant.world import World
+from stations.plant.world import World
 
 
 def simulated(world: World, profile: Profile) -> Bank:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank
 from stations.plant.drive import ABSOLUTE, start_move
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.table import Axis
-    from stations.plant.world import World
+from stations.plant.table import Axis
+from stations.plant.world import World
 
 GO = 0x0100
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from schemas.profile import Profile
+from stations.plant.bench import Waveforms
 from stations.plant.result_files import ResultFiles
-
-if TYPE_CHECKING:
-    from schemas.profile import Profile
-    from stations.plant.bench import Waveforms
-    from stations.plant.world import World
+from stations.plant.world import World
 
 UNKNOWN, WRONG, BUSY = "NA:CMD ERR", "NA:PARA ERR", "NA:BUSY"
 STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from stations.plant.faults.base import AXES, DEVICES, MUTE, UNIT, Fault
 from stations.plant.faults.proxy import WireAction
 from stations.plant.faults.wire import WireFault
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 @dataclass

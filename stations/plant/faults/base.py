@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from schemas.fault import FaultOrder
-    from stations.plant.faults.proxy import WireAction
-    from stations.plant.table import Axis
-    from stations.plant.world import World
+from schemas.fault import FaultOrder
+from stations.plant.faults.proxy import WireAction
+from stations.plant.table import Axis
+from stations.plant.world import World
 
 UNIT = "unit"
 AXES = ("outer", "inner")

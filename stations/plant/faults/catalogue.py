@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import pkgutil
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, did_you_mean
+from schemas.fault import FaultOrder
 from stations.plant import faults
 from stations.plant.faults.base import UNIT, Fault
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from schemas.fault import FaultOrder
 
 
 @cache

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from stations.plant.faults.base import UNIT, Fault
-
-if TYPE_CHECKING:
-    from stations.plant.world import World
+from stations.plant.world import World
 
 
 class _BenchCondition(Fault):

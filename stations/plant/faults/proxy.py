@@ -15,10 +15,8 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Self
-
-if TYPE_CHECKING:
-    from types import TracebackType
+from types import TracebackType
+from typing import Literal, Self
 
 Way = Literal["request", "reply"]
 ActionKind = Literal["drop", "delay", "duplicate", "truncate", "garble", "half_open", "late", "retag", "swap", "reset"]

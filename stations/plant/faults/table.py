@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from stations.plant.faults.base import AXES, Fault
-
-if TYPE_CHECKING:
-    from stations.plant.world import World
+from stations.plant.world import World
 
 
 @dataclass

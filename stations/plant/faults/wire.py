@@ -6,16 +6,13 @@ from collections import Counter
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from stations.plant.faults.base import DEVICES, UNIT, Fault
-from stations.plant.faults.proxy import ChaosProxy, WireAction
-
-if TYPE_CHECKING:
-    from stations.plant.faults.proxy import Script, Way
-    from stations.plant.world import World
+from stations.plant.faults.proxy import ChaosProxy, Script, Way, WireAction
+from stations.plant.world import World
 
 
 @dataclass

@@ -1,0 +1,81 @@
+"""The code that each stored result depends on: its key takes in the source of these modules, packages with all below.
+
+``tests/contract/test_declared_code.py`` holds every list against the imports of the modules in it.
+"""
+
+from __future__ import annotations
+
+_SAMPLES = (
+    *("schemas.errors", "schemas.table", "schemas.tables", "schemas.units", "schemas.version"),
+    *("inertial.frames", "pipelines.tables"),
+)
+_TABLES = (*_SAMPLES, "inertial.errors", "inertial.quantities", "inertial.state")
+_MODEL = (
+    *("inertial.design", "inertial.effects", "inertial.expressions", "inertial.fits"),
+    *("inertial.operators", "inertial.power"),
+)
+_ENGINE = (
+    *(*_TABLES, *_MODEL, "inertial.data_errors", "inertial.decisions", "inertial.distributions"),
+    *("inertial.estimation", "inertial.noise"),
+)
+_NOISE = (
+    *(*_TABLES, *_MODEL, "inertial.distributions", "inertial.dynamics", "inertial.noise"),
+    *("pipelines.stages.bias_stability", "pipelines.stages.coarse_digits"),
+    *("pipelines.stages.noise", "pipelines.stages.static_record"),
+)
+_BUDGET = (
+    *(*_TABLES, *_MODEL, "schemas", "inertial.correction", "inertial.distributions", "inertial.noise"),
+    *("inertial.uncertainty", "pipelines.stages.rms_error", "pipelines.stages.uncertainty"),
+)
+_PROCEDURES = ("schemas", "stations", "inertial", "pipelines.drawing", "pipelines.procedures", "pipelines.tables")
+_READ = ("schemas", "inertial", "pipelines.archive", "pipelines.importers", "pipelines.procedures", "pipelines.tables")
+_DRAWN = (
+    *("schemas", "inertial", "pipelines.archive", "pipelines.certificates", "pipelines.drawing"),
+    *("pipelines.procedures", "pipelines.report", "pipelines.stages", "pipelines.tables"),
+)
+
+CODE = {
+    "validate": (
+        *(*_SAMPLES, "inertial.pointing", "pipelines.stages.frozen"),
+        *("pipelines.stages.pointing", "pipelines.stages.validate"),
+    ),
+    "reduce": (*_TABLES, "pipelines.stages.reduce"),
+    "fit": (
+        *(*_ENGINE, "pipelines.stages.fit", "pipelines.stages.noisy_fit", "pipelines.stages.nonlinear"),
+        "pipelines.stages.uncertainty.bias_measurands",
+    ),
+    "fit of norms": (
+        *(*_ENGINE, "inertial.correction", "inertial.norm_fit", "inertial.norm_noise"),
+        *("pipelines.stages.uncertainty.bias_measurands", "pipelines.stages.unknown_poses"),
+    ),
+    "fit in a plane": (
+        *(*_ENGINE, "inertial.counts", "inertial.probability", "inertial.uncertainty"),
+        *("pipelines.importers.judged", "pipelines.importers.plane"),
+    ),
+    "verify": (*_ENGINE, "inertial.correction", "pipelines.stages.rms_error", "pipelines.stages.verify"),
+    "verify of norms": (
+        *(*_ENGINE, "inertial.correction", "inertial.norm_fit", "inertial.norm_noise", "inertial.uncertainty"),
+        *("pipelines.stages.rms_error", "pipelines.stages.unknown_poses", "pipelines.stages.verify"),
+    ),
+    "noise": _NOISE,
+    "budget": _BUDGET,
+    "budget of norms": (
+        *(*_BUDGET, "inertial.data_errors", "inertial.decisions", "inertial.estimation"),
+        *("inertial.norm_fit", "inertial.norm_noise", "pipelines.stages.unknown_poses"),
+    ),
+    "procedures": (*_PROCEDURES, "pipelines.stages.procedures"),
+    "grade": (
+        *(*_NOISE, "schemas", "inertial.uncertainty", "pipelines.procedures", "pipelines.stages.figures"),
+        *("pipelines.stages.grade", "pipelines.stages.uncertainty"),
+    ),
+    "import": _READ,
+    "import of waveforms": (*_PROCEDURES, "pipelines.archive", "pipelines.importers"),
+    "import of a transfer function": _READ,
+    "report": (
+        *(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers"),
+        *("pipelines.jobs", "pipelines.schedule"),
+    ),
+    "report of an import": (*_DRAWN, "pipelines.diagnosis"),
+    "inquiry": ("schemas", "inertial", "pipelines.diagnosis", "pipelines.procedures", "pipelines.tables"),
+}
+"""Modules and packages by the name of the stage, or of what else is stored under a key."""
