@@ -70,9 +70,8 @@ def thermometer_sticks(scene: Scene) -> Change:
 @kind("fault")
 def encoder_slips(scene: Scene) -> Change:
     """A coupling slips where the load of the outer axis is largest and springs back later: some poses are off by one angle."""
-    edge = scene.lot.uniform(0.5, 0.8)
     load = np.sin(scene.day.angles[:, 0]) * scene.lot.choice([-1.0, 1.0])
-    slipped = load > np.quantile(load, edge)
+    slipped = load > load.min() + np.ptp(load) * scene.lot.uniform(0.6, 0.9)
     axis = np.stack([np.cos(scene.day.angles[:, 1]), -np.sin(scene.day.angles[:, 1]), np.zeros(scene.dwells)], axis=1)
     dwells = tuple(np.flatnonzero(slipped).tolist())
     return Change(turn=axis[:, None, :] * scene.during(dwells), dwells=dwells)

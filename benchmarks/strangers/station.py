@@ -22,6 +22,7 @@ class Plan:
     shuffled: bool  # whether every soak has an order of poses of its own
     duration_s: float
     settle_s: float
+    patience: float  # how much longer the wait after a move may be, drawn anew for each
     speed: float  # rad/s
     soak_taus: float  # wait after a ramp, in multiples of the slowest unit's time constant
     ramp: float  # K/s
@@ -63,6 +64,7 @@ def draw_plan(rng: np.random.Generator, units: int, needs: frozenset[str]) -> Pl
         shuffled=bool(rng.random() < 0.5),
         duration_s=STEP_S * int(rng.integers(7, 25)),
         settle_s=float(rng.uniform(8.0, 40.0)),
+        patience=float(rng.choice([0.0, 0.3, 3.0])),
         speed=float(np.deg2rad(rng.uniform(8.0, 30.0))),
         soak_taus=float(rng.uniform(1.2, 2.2) if "short" in needs else rng.uniform(5.0, 7.0)),
         ramp=float(rng.uniform(1.0, 4.0)) / 60.0,
@@ -141,10 +143,10 @@ def draw_day(rng: np.random.Generator, plan: Plan) -> Day:
         for pose in order:
             seconds = float(np.abs(plan.angles[pose] - place).max()) / plan.speed
             arrival = clock + seconds
-            start = arrival + plan.settle_s
+            start = arrival + plan.settle_s * (1.0 + plan.patience * rng.random())
             rows.append((soak, pose, clock, arrival, start))
             clock, place = start + plan.duration_s + STEP_S + 1.0, plan.angles[pose]
-    t = np.arange(0.0, clock + STEP_S, STEP_S)
+    t = np.arange(0.0, clock + 2.0 * STEP_S, STEP_S)
     soaks, poses, leave, arrival, start = (np.array(column) for column in zip(*rows, strict=True))
     angles = plan.angles[poses.astype(int)]
     before = np.concatenate([angles[:1], angles[:-1]])
@@ -158,9 +160,9 @@ def draw_day(rng: np.random.Generator, plan: Plan) -> Day:
     day_s, phase = 86400.0, rng.uniform(0.0, 2.0 * np.pi)
     room = 22.0 + rng.uniform(0.6, 2.0) * np.sin(2.0 * np.pi * t / day_s + phase) + 0.25 * _wander(rng, t.size, 2400.0)
     return Day(
-        plan, t, np.minimum(windows, t.size - 1), soaks.astype(int), angles,
+        plan, t, windows, soaks.astype(int), angles,
         before[:, None, :] + part * (angles - before)[:, None, :], path,
-        start + plan.duration_s / 2.0 - arrival, chamber, case, compressor,
+        t[windows].mean(axis=1) - arrival, chamber, case, compressor,
         3.3 + plan.supply_wander * (_wander(rng, t.size, 5000.0) + 0.5 * _wander(rng, t.size, 500.0)),
         room, rng.uniform(985.0, 1025.0) + rng.uniform(2.0, 5.0) * _wander(rng, t.size, 30000.0),
     )  # fmt: skip
