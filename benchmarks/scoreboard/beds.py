@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.strangers import KINDS
+
 HERE = Path(__file__).resolve().parents[1]
 Case = tuple[str, str, int]
 
@@ -51,17 +53,18 @@ DYNAMIC = {
 
 
 def beds() -> list[Bed]:
-    """Every bed; those of another generator are found by what it lists."""
+    """Every bed."""
     found = [
         *(Bed("worlds", bed, names, runs) for bed, (names, runs) in _worlds().items()),
         *(Bed("blind", name, (name,), runs) for name, runs in BLIND.items()),
         *(Bed("recordings", name, (name,), runs) for name, runs in {"nulls": 60, "bad": 40, "hidden": 40}.items()),
         *(Bed("dynamic", test, names, 6) for test, names in DYNAMIC.items()),
     ]
-    if (HERE / "strangers").is_dir():
-        from benchmarks.strangers import KINDS
-
-        found += [Bed("strangers", bed, tuple(names), 6) for bed, names in KINDS.items()]
+    strange: dict[str, list[str]] = {}
+    for kind in KINDS.values():
+        outside = kind.world == "effect" and not kind.catalogue
+        strange.setdefault("outside" if outside else f"{kind.world}s", []).append(kind.name)
+    found += [Bed("strangers", bed, tuple(names), 24 if bed == "nulls" else 4) for bed, names in strange.items()]
     return found
 
 

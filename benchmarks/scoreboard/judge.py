@@ -156,19 +156,23 @@ def strangers(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
     sys.path[:0] = [str(product)]
     sys.path.append(str(ROOT))
     from benchmarks.strangers import make  # type: ignore[import-not-found]
-
     from pipelines.diagnosis.diagnose import diagnose
 
     def judged(bed: str, name: str, seed: int) -> Outcome:
         lot = kept(lots, f"{name} {seed}", lambda: make(name, seed))
         document = diagnose(lot.dwells, lot.history)
         physics = [set(g["effects"]) for g in document["classes"] if g.get("scope") != "data"]
+        named, inadequate = bool(physics), document["adequate"] is False
         if bed in {"nulls", "noises"}:
-            return {"physics named": bool(physics), "not adequate": document["adequate"] is False}
+            return {"physics named": named, "not adequate": inadequate}
         if bed == "faults":
-            return {"physics named": bool(physics), "not adequate or a fault told": document["adequate"] is False}
-        names = set(lot.truth.get("names") or [lot.truth["name"]])
-        held = any(names & each for each in physics)
+            return {
+                "physics named": named,
+                "a fault told": len(physics) < len(document["classes"]) or bool(document["blocked_by"]),
+            }
+        if bed == "outside":
+            return {"not adequate said": inadequate or document["unexplained"] is not None}
+        held = any(set(lot.truth["catalogue"]) & each for each in physics)
         return {"in class": held, "exact": held and len(document["classes"]) == 1}
 
     return judged
