@@ -59,7 +59,7 @@ SHARED = (
         "sweep_plan",
         "sweep_points",
     ),
-    *("transfer_figures", "transfer_chart", "wording", "worst"),
+    *("transfer_figures", "transfer_chart", "wording", "figures"),
 )
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field
 
+from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
+from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.poses import Pose
 from schemas.recipe import Recipe, Strict
@@ -83,56 +85,6 @@ class ProcedureStep:
 
 
 @dataclass(frozen=True)
-class FigureSpec:
-    """A figure that limits may name: its key, unit, and meaning in one line.
-
-    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is kept
-    """
-
-    name: str
-    unit: str
-    meaning: str
-    one_axis: bool = False
-
-
-@dataclass(frozen=True)
-class FigureValue:
-    """A figure of one unit and axis.
-
-    ``low`` and ``high`` are the ends of a 95 % interval. Where ``identified`` is False the value passes no limit, and ``note``
-    states why, and a measurement that determines it. A standard deviation has ``dof`` degrees of freedom, nan for other figures,
-    and ``removed`` is the known part that was taken out of it; see :class:`inertial.uncertainty.deviation_law.DeviationLaw`.
-    """
-
-    figure: str
-    axis: str
-    value: float
-    uncertainty: float
-    low: float = float("nan")
-    high: float = float("nan")
-    identified: bool = True
-    note: str = ""
-    dof: float = float("nan")
-    removed: float = 0.0
-
-    @classmethod
-    def not_determined(
-        cls, figure: str, axis: str, note: str, low: float = float("nan"), high: float = float("nan")
-    ) -> FigureValue:
-        """A figure without a value, with the reason."""
-        return cls(figure, axis, float("nan"), float("nan"), low, high, identified=False, note=note)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A statement on one unit, or the lot (empty unit): its subject and the text."""
-
-    unit: str
-    subject: str
-    text: str
-
-
-@dataclass(frozen=True)
 class UnitRecord:
     """The samples of one unit, or of the reference, in one record.
 
@@ -157,12 +109,27 @@ class ProcedureRecord:
     readings: pd.DataFrame
     samples: Mapping[str, UnitRecord]
 
-    def by_unit(self) -> Iterator[tuple[str, dict[str, Any], UnitRecord]]:
-        """Unit, its readings and its samples, of all that were recorded."""
-        for reading in self.readings.to_dict("records"):
+
+Records = Sequence[ProcedureRecord]
+
+
+class Taken(NamedTuple):
+    """What one record holds of one unit; ``number`` is that of the record within the procedure, from 0."""
+
+    number: int
+    record: ProcedureRecord
+    unit: str
+    reading: Mapping[str, Any]
+    own: UnitRecord
+
+
+def taken(records: Records) -> Iterator[Taken]:
+    """Every unit that was recorded, in every record."""
+    for number, record in enumerate(records):
+        for reading in record.readings.to_dict("records"):
             unit = str(reading["unit"])
-            if unit in self.samples:
-                yield unit, {str(name): value for name, value in reading.items()}, self.samples[unit]
+            if unit in record.samples:
+                yield Taken(number, record, unit, {str(k): v for k, v in reading.items()}, record.samples[unit])
 
 
 @dataclass(frozen=True)
@@ -179,14 +146,6 @@ class Device:
     full_scale: float
     out_unit: str
     noise: Mapping[tuple[str, str], IdentifiedNoise] = field(default_factory=dict[tuple[str, str], "IdentifiedNoise"])
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The results of a procedure for the units of a lot."""
-
-    figures: Mapping[str, list[FigureValue]]
-    findings: Sequence[Finding] = ()
 
 
 class Procedure(ABC):
@@ -219,20 +178,44 @@ class Procedure(ABC):
 class Evaluated(Procedure):
     """A procedure with figures of its own; those of others come from the stages ``fit``, ``noise`` and ``grade``.
 
-    rows : of plots in its picture
+    axis : of figures that are not determined, where the part names none
     """
 
+    axis: ClassVar[str] = "*"
+
     @abstractmethod
-    def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
         """Points of the procedure: see the table ``procedure_points``."""
 
     @abstractmethod
-    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
-        """Figures and findings of every unit, from the points alone."""
+    def of_unit(self, part: Any, unit: str, rows: pd.DataFrame, device: Device) -> tuple[list[FigureValue], Texts]:
+        """Figures of one unit and statements on it, from its points; :class:`NotIdentified` where they give no figure."""
+
+    def of_lot(self, part: Any, points: pd.DataFrame) -> Texts:
+        """Statements on the lot."""
+        return []
 
     @abstractmethod
     def chart(self, part: Any, points: pd.DataFrame) -> Chart | None:
         """The points of one unit with what was fitted to them; None where they are too few."""
+
+    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
+        """Figures and findings of every unit, from the points alone."""
+        figures: dict[str, list[FigureValue]] = {}
+        findings: list[Finding] = []
+        for name, rows in points.groupby("unit", sort=False):
+            unit = str(name)
+            try:
+                figures[unit], texts = self.of_unit(part, unit, rows, device)
+            except NotIdentified as problem:
+                figures[unit], texts = self.nothing(part, str(problem)), []
+            findings += [Finding(unit, *text) for text in texts]
+        return Outcome(figures, [*findings, *(Finding("", *text) for text in self.of_lot(part, points))])
+
+    def nothing(self, part: Any, note: str, axis: str = "") -> list[FigureValue]:
+        """Every figure without a value, with the reason; for no axis in particular the part's, or the procedure's."""
+        axis = axis or getattr(part, "axis", self.axis)
+        return [FigureValue.not_determined(spec.name, axis, note) for spec in self.figures]
 
 
 class InG(Procedure):
@@ -284,3 +267,8 @@ def scale_of(part: NominalScale, device: Device, unit: str) -> Array:
     if unit in device.scale:
         return device.scale[unit]
     return np.full(3, np.nan if part.scale is None else part.scale)
+
+
+def at_rest(name: str) -> Pose:
+    """The pose of records that turn nothing: both axes of the table at 0°."""
+    return Pose(name=name, outer_deg=0.0, inner_deg=0.0)

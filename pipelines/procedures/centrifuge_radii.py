@@ -11,7 +11,8 @@ import pandas as pd
 from inertial.dynamics.centrifuge import STANDARD_GRAVITY, columns, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.drawing.chart import SEVERAL, Trace
-from pipelines.procedures.base import FigureValue
+from pipelines.procedures.columns import numbers
+from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import verdict_of, with_uncertainty
 from schemas.units import MICRO
 
@@ -23,9 +24,7 @@ ONE_MOUNTING = "one mounting: errors of the radii are not parted from the offset
 
 def fitted_radii(rows: pd.DataFrame, radius_error_m: float) -> RadiiFit:
     """The fit over all radii of the points of one unit; :class:`inertial.errors.NotIdentified` as there."""
-    force, value, error, radius = (
-        rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty", "radius_m")
-    )
+    force, value, error, radius = numbers(rows, "setting", "value", "uncertainty", "radius_m")
     return fit_radii(force, radius, value, error, radius_error_m)
 
 
@@ -82,9 +81,9 @@ def of_radii(points: pd.DataFrame, radius_error_m: float) -> list[Trace]:
     fit = fitted_radii(points, radius_error_m)
     traces: list[Trace] = []
     for role, (radius, rows) in zip(SEVERAL, points.groupby("radius_m", sort=False), strict=False):
-        force, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
+        force, value, error = numbers(rows)
         line, r = np.polyfit(force, value, 1), float(str(radius))
-        apart, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * rows["uncertainty"].to_numpy(dtype=float)
+        apart, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * error
         traces.append(Trace(f"{r:g} m, U (k = 2)", force, apart, role=role, error=expanded))
         x = np.linspace(force.min(), force.max(), 301)
         traces.append(Trace(f"{r:g} m, fitted", x, 1e3 * _apart(fit, x, r, force), "line", role, legend=False))

@@ -9,8 +9,8 @@ import numpy as np
 from inertial.dynamics.centrifuge import Polynomial, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_effects import EFFECTS
 from inertial.dynamics.goodness import p_value
-from pipelines.procedures.base import FigureValue
 from pipelines.procedures.centrifuge_radii import OF_RADII, ONE_RADIUS
+from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import improvement, not_separated, probability, verdict_of, with_uncertainty
 from schemas.units import MICRO
 

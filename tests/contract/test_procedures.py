@@ -103,7 +103,7 @@ class One({bases}):
 {methods}
 PROCEDURE = One()
 """
-METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "evaluate", "chart", "measure"))
+METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "of_unit", "chart", "measure"))
 
 
 @pytest.mark.parametrize(
