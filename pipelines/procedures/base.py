@@ -14,7 +14,7 @@ from pydantic import Field
 
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
-from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts
+from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts, UnitOutcome
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.poses import Pose
 from schemas.recipe import Recipe, Strict
@@ -188,7 +188,7 @@ class Evaluated(Procedure):
         """Points of the procedure: see the table ``procedure_points``."""
 
     @abstractmethod
-    def of_unit(self, part: Any, unit: str, rows: pd.DataFrame, device: Device) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: Any, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of one unit and statements on it, from its points; :class:`NotIdentified` where they give no figure."""
 
     def of_lot(self, part: Any, points: pd.DataFrame) -> Texts:

@@ -12,7 +12,7 @@ from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 from pipelines.procedures.base import Device, Evaluated, InG, NominalScale, ProcedureStep, Records, scale_of, taken
 from pipelines.procedures.columns import numbers, point_rows, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, worst
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import Positive
 from schemas.poses import Pose
@@ -71,9 +71,7 @@ class BiasStability(InG, Evaluated):
                 )
         return point_table(rows)
 
-    def of_unit(
-        self, part: BiasStabilityPart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: BiasStabilityPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of the worst axis; every definition as a finding, so that numbers of others can be compared."""
         rate = 1.0 / (round(part.rate_hz) / part.rate_hz)
         by_axis = {

@@ -33,7 +33,7 @@ from pipelines.procedures.base import (
 from pipelines.procedures.centrifuge_radii import figures_of_radii, fitted_radii, of_radii, texts_of_radii
 from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_radius, texts_of_radius
 from pipelines.procedures.columns import numbers, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
@@ -179,9 +179,7 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
             )  # fmt: skip
         return point_table(rows)
 
-    def of_unit(
-        self, part: CentrifugePart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: CentrifugePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Coefficients; the whole polynomial where the input is reversed."""
         lost = int(rows["value"].isna().sum())
         if lost:

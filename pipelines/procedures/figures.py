@@ -59,6 +59,10 @@ Texts = Sequence[tuple[str, str]]
 """Statements: subject and text."""
 
 
+UnitOutcome = tuple[list[FigureValue], Texts]
+"""The figures of one unit, and the statements on it."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """A statement on one unit, or the lot (empty unit): its subject and the text."""

@@ -28,7 +28,7 @@ from pipelines.procedures.base import (
     taken,
 )
 from pipelines.procedures.columns import numbers, point_rows, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts
+from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome
 from pipelines.procedures.wording import signed
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
@@ -130,9 +130,7 @@ class RandomVibration(InG, OnEquipment, Evaluated):
                 rows += _density(one.unit, part.axis, driven, rate)
         return point_table(rows)
 
-    def of_unit(
-        self, part: RandomVibrationPart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: RandomVibrationPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Slope over g rms², its straightness tested; none where samples are clipped, which imitates it."""
         rows = rows[rows["series"] == "shift"]
         clipped = int(rows["clipped"].sum())

@@ -14,7 +14,7 @@ from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Device, Evaluated, Part, ProcedureStep, Records, SetsEquipment, taken
 from pipelines.procedures.columns import point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, worst
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import NotNegative, Positive, Wait
@@ -139,9 +139,7 @@ class Ratiometry(SetsEquipment, Evaluated):
             )  # fmt: skip
         return point_table(rows)
 
-    def of_unit(
-        self, part: RatiometryPart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: RatiometryPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The figures of the worst axis."""
         if bool((rows["constant"] > 0.0).any()):
             raise NotIdentified("the output is constant; check cable and supply")

@@ -33,7 +33,7 @@ from pipelines.procedures.base import (
     taken,
 )
 from pipelines.procedures.columns import numbers, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
 from pipelines.procedures.shock_bias import STUCK, bias_points, bias_shift
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.recipe import Recipe
@@ -159,9 +159,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
             rows += [row | {"unit": one.unit, "axis": part.axis} for row in of_shock]
         return point_table(rows)
 
-    def of_unit(
-        self, part: ShockPart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: ShockPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of a unit, and whether it has survived."""
         texts: list[tuple[str, str]] = []
         ratio, bias, reference = (rows[rows["series"] == name] for name in ("ratio", "bias", "reference"))

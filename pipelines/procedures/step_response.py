@@ -24,7 +24,7 @@ from pipelines.procedures.base import (
     at_rest,
 )
 from pipelines.procedures.columns import numbers, point_rows, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, worst
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES
@@ -109,7 +109,7 @@ class StepResponse(OnEquipment, FromWaveforms):
                 rows += [one | {"unit": unit, "axis": axis} for one in _averaged(part, own, i, device)]
         return point_table(rows)
 
-    def of_unit(self, part: StepPart, unit: str, rows: pd.DataFrame, device: Device) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: StepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The figures of the worst axis."""
         values: list[list[FigureValue]] = []
         texts: list[tuple[str, str]] = []

@@ -24,7 +24,7 @@ from pipelines.procedures.base import (
     taken,
 )
 from pipelines.procedures.columns import point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts
+from pipelines.procedures.figures import FigureSpec, UnitOutcome
 from pipelines.procedures.sweep_plan import FEWEST_POINTS, SweepPart
 from pipelines.procedures.sweep_points import clocks_of, condition_texts, response_point, transfer_points
 from pipelines.procedures.transfer_chart import bode_chart
@@ -119,9 +119,7 @@ class Sweep(OnEquipment, FromWaveforms):
             )
         return point_table(rows)
 
-    def of_unit(
-        self, part: SweepPart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: SweepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The model, judged; figures of the adequate model, or as not determined with the reason."""
         kept = rows[np.isfinite(rows["value"])]
         texts: list[tuple[str, str]] = []

@@ -13,7 +13,7 @@ from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Device, Evaluated, Part, ProcedureStep, Records, taken
 from pipelines.procedures.columns import numbers, point_rows, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, worst
+from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
@@ -99,7 +99,7 @@ class Tilt(Evaluated):
             )
         return point_table(rows)
 
-    def of_unit(self, part: TiltPart, unit: str, rows: pd.DataFrame, device: Device) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: TiltPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of the axes in the plane, and their largest residuals."""
         fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
         linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}

@@ -29,7 +29,7 @@ from pipelines.procedures.base import (
     scale_of,
 )
 from pipelines.procedures.columns import numbers, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
 from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Recipe
@@ -121,9 +121,7 @@ class TransverseTest(InG, OnEquipment, Evaluated):
                 rows.append(_point(part, k, record, (drive, answer, noise), turn, whole=whole) | {"unit": unit})
         return point_table(rows)
 
-    def of_unit(
-        self, part: TransversePart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: TransversePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The maximum and its direction."""
         fit = fitted(rows)
         value = 100.0 * fit.value

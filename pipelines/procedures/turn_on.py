@@ -22,7 +22,7 @@ from pipelines.procedures.base import (
     taken,
 )
 from pipelines.procedures.columns import numbers, point_rows, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, worst
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from schemas.bounds import Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
@@ -87,9 +87,7 @@ class TurnOn(InG, Evaluated):
             )
         return point_table(rows)
 
-    def of_unit(
-        self, part: TurnOnPart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: TurnOnPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Scatter of the worst axis, and its upper limit: few cycles cannot pass a limit close to the estimate."""
         value, upper = list[FigureValue](), list[FigureValue]()
         for axis, own in rows.groupby("axis", sort=False):

@@ -25,7 +25,7 @@ from pipelines.procedures.base import (
     taken,
 )
 from pipelines.procedures.columns import numbers, point_rows, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, worst
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
@@ -87,9 +87,7 @@ class WarmUp(InG, Evaluated):
                 )
         return point_table(rows)
 
-    def of_unit(
-        self, part: WarmUpPart, unit: str, rows: pd.DataFrame, device: Device
-    ) -> tuple[list[FigureValue], Texts]:
+    def of_unit(self, part: WarmUpPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The time of the slowest axis; not determined where the record ends too soon, or noise alone exceeds the band."""
         return [worst([_figure(part, str(axis), own) for axis, own in rows.groupby("axis", sort=False)])], []
 
