@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.data_errors.exchanged import PlainFit
-from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.faults.fault import Fault, look, places_of
 from inertial.data_errors.readings import Array, Readings, exchanged, find_split
 
 _COMMON = 5.0
@@ -16,6 +16,7 @@ _AWAY = 0.005
 """Distance, g, from its own calibration above which the output of a unit may be that of another."""
 
 
+@look(50)
 def changed_units(readings: Readings) -> Iterator[Fault]:
     """A calibration that changes during the run: to that of another unit (cables exchanged), or to another range."""
     splits = {
@@ -42,6 +43,7 @@ def _length(readings: Readings, unit: int) -> int:
     return int(np.flatnonzero(readings.there[unit])[-1]) + 1
 
 
+@look(90)
 def swapped_units(readings: Readings) -> Iterator[Fault]:
     """Dwells that two units' fingerprints say were exchanged between them."""
     units, n = readings.there.shape
@@ -75,6 +77,7 @@ def _exchanges(readings: Readings, place: int) -> Iterator[tuple[int, int]]:
             yield int(there[i]), int(there[j])
 
 
+@look(100)
 def wrong_poses(readings: Readings) -> Iterator[Fault]:
     """Dwells whose output belongs to another direction of gravity than the one commanded."""
     size = np.linalg.norm(readings.misfit, axis=-1)

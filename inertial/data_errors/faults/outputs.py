@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import decisions
-from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.faults.fault import Fault, look, places_of
 from inertial.data_errors.readings import Array, Readings
 
 
+@look(40)
 def stuck(readings: Readings) -> Iterator[Fault]:
     """The same output, to the last digit, in dwells of different poses; or samples of a dwell that are all the same."""
     for unit, out in enumerate(readings.output):
@@ -36,6 +37,7 @@ def _still(readings: Readings, unit: int) -> NDArray[np.intp]:
     return np.flatnonzero(np.any((spread < 1e-6 * usual) & (usual > 0.0), axis=-1))
 
 
+@look(110, in_one_pose=True)
 def noisy(readings: Readings) -> Iterator[Fault]:
     """Dwells whose scatter is far above the unit's own and the lot's: spikes on an axis, torn words on all."""
     if readings.spread is None:
@@ -61,6 +63,7 @@ def noisy(readings: Readings) -> Iterator[Fault]:
         )
 
 
+@look(120)
 def outliers(readings: Readings) -> Iterator[Fault]:
     """Single dwells far off on one axis alone, where no scatter was recorded to show spikes."""
     if readings.spread is not None:
@@ -74,6 +77,7 @@ def outliers(readings: Readings) -> Iterator[Fault]:
             yield Fault("spikes", unit, places_of(places), f"{places.size} dwells far from the others")
 
 
+@look(140, in_one_pose=True)
 def quantised(readings: Readings) -> Iterator[Fault]:
     """Outputs on a lattice whose step, over √12, exceeds the noise of a mean; or samples that jump between its steps."""
     for unit, out in enumerate(readings.output):

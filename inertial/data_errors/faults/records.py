@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.faults.fault import Fault, look, places_of
 from inertial.data_errors.readings import Readings
 
 ENDS_EARLY = 3
@@ -21,6 +21,7 @@ has less than half of its dwells weighs less in the lot than what is unknown abo
 """
 
 
+@look(10, in_one_pose=True)
 def truncated(readings: Readings) -> Iterator[Fault]:
     """A record that ends before the lot's, or that lacks most dwells; a unit with fewer gaps is judged by the dwells it has."""
     there = readings.there
@@ -78,6 +79,7 @@ def _cut_off(readings: Readings) -> bool:
     return bool(counts.max() == counts.min() + 1 and counts.min() >= 2)
 
 
+@look(20, in_one_pose=True)
 def clock(readings: Readings) -> Iterator[Fault]:
     """Time that runs backwards from one dwell to the next."""
     for unit, time in enumerate(readings.time):
@@ -91,6 +93,7 @@ def clock(readings: Readings) -> Iterator[Fault]:
             )
 
 
+@look(150, in_one_pose=True)
 def dropped(readings: Readings) -> Iterator[Fault]:
     """Dwells with fewer samples than the lot has there, or than their duration holds."""
     if readings.count is None:

@@ -5,13 +5,14 @@ from itertools import permutations
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault
+from inertial.data_errors.faults.fault import Fault, look
 from inertial.data_errors.readings import Readings
 
 _ORDERS = np.array(list(permutations(range(3))))
 """All orders of three axes."""
 
 
+@look(60)
 def dead(readings: Readings) -> Iterator[Fault]:
     """An axis that does not respond to gravity."""
     for unit, fit in enumerate(readings.fits):
@@ -23,6 +24,7 @@ def dead(readings: Readings) -> Iterator[Fault]:
             yield Fault("dead_channel", unit, (), evidence)
 
 
+@look(70)
 def scale_units(readings: Readings) -> Iterator[Fault]:
     """A unit whose scale is far from its lot's."""
     scale = readings.scale
@@ -39,6 +41,7 @@ def _kind(ratio: float) -> str:
     return "wrong_range" if abs(octaves - round(octaves)) < 0.06 and abs(round(octaves)) <= 4 else "wrong_units"
 
 
+@look(80)
 def flipped(readings: Readings) -> Iterator[Fault]:
     """Axes in another order or with another sign: the best signed permutation of the response is not the identity."""
     for unit, fit in enumerate(readings.fits):

@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.faults.fault import Fault, look, places_of
 from inertial.data_errors.readings import Array, Readings
 
 
+@look(30, in_one_pose=True)
 def temperature_units(readings: Readings) -> Iterator[Fault]:
     """Temperatures that cannot be °C."""
     for unit, row in enumerate(readings.temperature if readings.temperature is not None else ()):
@@ -16,6 +17,7 @@ def temperature_units(readings: Readings) -> Iterator[Fault]:
             yield Fault("wrong_units", unit, (), f"temperature about {typical:.0f}, not °C")
 
 
+@look(130, in_one_pose=True)
 def stale(readings: Readings) -> Iterator[Fault]:
     """A thermometer that repeats itself to the last digit while the temperature moves, or while it had noise before."""
     if readings.temperature is None:
