@@ -21,9 +21,9 @@ from pipelines.procedures.base import (
     OnEquipment,
     Part,
     Procedure,
-    ProcedureStep,
     SetsEquipment,
 )
+from pipelines.procedures.recorded import ProcedureStep
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.recipe import Recipe
 from schemas.station import StationConfig

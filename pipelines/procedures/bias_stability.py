@@ -10,9 +10,10 @@ from pydantic import Field
 
 from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import Device, Evaluated, InG, NominalScale, ProcedureStep, Records, scale_of, taken
+from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
 from pipelines.procedures.wording import with_uncertainty
 from schemas.bounds import Positive
 from schemas.poses import Pose

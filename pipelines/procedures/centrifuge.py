@@ -16,24 +16,12 @@ from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagn
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    Evaluated,
-    InG,
-    NominalScale,
-    OnEquipment,
-    ProcedureStep,
-    Records,
-    at_rest,
-    refuse_unknown_effects,
-    scale_of,
-    taken,
-)
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
 from pipelines.procedures.centrifuge_radii import figures_of_radii, fitted_radii, of_radii, texts_of_radii
 from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_radius, texts_of_radius
 from pipelines.procedures.columns import numbers, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, at_rest, taken
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe

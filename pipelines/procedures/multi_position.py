@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pipelines.procedures.base import Part, Procedure, ProcedureStep
+from pipelines.procedures.base import Part, Procedure
+from pipelines.procedures.recorded import ProcedureStep
 from schemas.recipe import Recipe
 
 

@@ -14,21 +14,10 @@ from inertial.dynamics.random_vibration import interpolated, overall_level, rect
 from inertial.dynamics.spectra import HANN_HALF, density_confidence, hann_mean
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    Evaluated,
-    InG,
-    NominalScale,
-    OnEquipment,
-    ProcedureStep,
-    Records,
-    at_rest,
-    scale_of,
-    taken,
-)
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, at_rest, taken
 from pipelines.procedures.wording import signed
 from schemas.bounds import Positive
 from schemas.recipe import Recipe

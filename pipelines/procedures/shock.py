@@ -17,23 +17,10 @@ from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 from pipelines.procedures import shock_waves
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    FromWaveforms,
-    InG,
-    NominalScale,
-    OnEquipment,
-    ProcedureStep,
-    Records,
-    UnitRecord,
-    at_rest,
-    refuse_unknown_effects,
-    scale_of,
-    taken,
-)
+from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
 from pipelines.procedures.columns import numbers, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest, taken
 from pipelines.procedures.shock_bias import STUCK, bias_points, bias_shift
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.recipe import Recipe

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
-from pipelines.procedures.base import Taken
 from pipelines.procedures.columns import point_rows
 from pipelines.procedures.figures import FigureValue, worst
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
+from pipelines.procedures.recorded import Taken
 from schemas.units import AXES, MICRO
 
 STUCK = 1e-9

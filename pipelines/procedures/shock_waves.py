@@ -16,8 +16,8 @@ from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
-from pipelines.procedures.base import UnitRecord
 from pipelines.procedures.columns import numbers, point_rows
+from pipelines.procedures.recorded import UnitRecord
 from pipelines.procedures.wording import improvement, not_separated, probability, with_uncertainty
 
 CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D

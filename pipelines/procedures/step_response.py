@@ -12,19 +12,10 @@ from pydantic import Field
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    FromWaveforms,
-    OnEquipment,
-    Part,
-    ProcedureStep,
-    Records,
-    UnitRecord,
-    at_rest,
-)
+from pipelines.procedures.base import FromWaveforms, OnEquipment, Part
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES

@@ -12,19 +12,10 @@ from inertial.dynamics.sine_fit import fit_tone_and_frequency
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    FromWaveforms,
-    OnEquipment,
-    ProcedureStep,
-    Records,
-    UnitRecord,
-    at_rest,
-    taken,
-)
+from pipelines.procedures.base import FromWaveforms, OnEquipment
 from pipelines.procedures.columns import point_table
 from pipelines.procedures.figures import FigureSpec, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest, taken
 from pipelines.procedures.sweep_plan import FEWEST_POINTS, SweepPart
 from pipelines.procedures.sweep_points import clocks_of, condition_texts, response_point, transfer_points
 from pipelines.procedures.transfer_chart import bode_chart

@@ -11,7 +11,7 @@ import pandas as pd
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency, harmonic_distortion
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points
-from pipelines.procedures.base import REFERENCE, Array, Device, ProcedureRecord, UnitRecord
+from pipelines.procedures.recorded import REFERENCE, Array, Device, ProcedureRecord, UnitRecord
 from pipelines.procedures.sweep_plan import SweepPart
 
 SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise

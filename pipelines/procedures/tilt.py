@@ -11,9 +11,10 @@ from scipy.stats import norm
 
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import Device, Evaluated, Part, ProcedureStep, Records, taken
+from pipelines.procedures.base import Evaluated, Part
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe

@@ -14,22 +14,18 @@ from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequen
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import (
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
+from pipelines.procedures.columns import numbers, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
+from pipelines.procedures.recorded import (
     REFERENCE,
     Device,
-    Evaluated,
-    InG,
-    NominalScale,
-    OnEquipment,
     ProcedureRecord,
     ProcedureStep,
     Records,
     UnitRecord,
     at_rest,
-    scale_of,
 )
-from pipelines.procedures.columns import numbers, point_table
-from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
 from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
 from schemas.recipe import Recipe

@@ -10,19 +10,10 @@ from pydantic import Field
 
 from inertial.dynamics.stability import error_of_mean, repeatability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import (
-    Device,
-    Evaluated,
-    InG,
-    NominalScale,
-    ProcedureStep,
-    Records,
-    at_rest,
-    scale_of,
-    taken,
-)
+from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, at_rest, taken
 from schemas.bounds import Positive, Wait
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO

@@ -13,19 +13,10 @@ from inertial.dynamics.stability import block_means, settled_error, short_noise
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
-from pipelines.procedures.base import (
-    Device,
-    Evaluated,
-    InG,
-    NominalScale,
-    ProcedureStep,
-    Records,
-    at_rest,
-    scale_of,
-    taken,
-)
+from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
 from pipelines.procedures.columns import numbers, point_rows, point_table
 from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, at_rest, taken
 from schemas.bounds import Positive
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
