@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from inertial.dynamics.centrifuge import STANDARD_GRAVITY, columns, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge import STANDARD_GRAVITY, Polynomial, columns, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.drawing.chart import SEVERAL, Trace
 from pipelines.procedures.columns import numbers
@@ -28,24 +28,31 @@ def fitted_radii(rows: pd.DataFrame, radius_error_m: float) -> RadiiFit:
     return fit_radii(force, radius, value, error, radius_error_m)
 
 
-def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
-    """The figures: linearity, K2, K3 and sensitivity are the unit's own, without arm and mounting."""
-    unit = fit.unit
-    k1, k2, k3 = (unit.of(name) for name in ("scale", "second_order", "third_order"))
-    offset, spread = fit.mass_offset_m
-    linearity, error = linearity_percent(unit, full_scale_g), linearity_error(unit, full_scale_g)
-    figures = [
+def figures_of_polynomial(fit: Polynomial, full_scale_g: float, radius_percent: float = 0.0) -> list[FigureValue]:
+    """Linearity, K2, K3 and sensitivity; ``radius_percent`` is the uncertainty of a single radius."""
+    k1, k2, k3 = (fit.of(name) for name in ("scale", "second_order", "third_order"))
+    linearity, error = linearity_percent(fit, full_scale_g), linearity_error(fit, full_scale_g)
+    spread = float(np.hypot(100.0 * k1[1], radius_percent))
+    return [
         FigureValue("centrifuge_linearity_percent", "z", linearity, error),
         FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
         FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
-        FigureValue("centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), 100.0 * k1[1]),
-        FigureValue("centrifuge_mass_offset_um", "z", MICRO * offset, MICRO * spread),
+        FigureValue("centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), spread),
     ]
-    name = "centrifuge_radius_consistency_ppm"
+
+
+def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
+    """The figures: linearity, K2, K3 and sensitivity are the unit's own, without arm and mounting."""
+    mass, consistency = OF_RADII
+    offset, spread = fit.mass_offset_m
+    figures = [
+        *figures_of_polynomial(fit.unit, full_scale_g),
+        FigureValue(mass, "z", MICRO * offset, MICRO * spread),
+    ]
     if fit.consistency is None:
-        return [*figures, FigureValue.not_determined(name, "z", ONE_MOUNTING)]
+        return [*figures, FigureValue.not_determined(consistency, "z", ONE_MOUNTING)]
     value, error = fit.consistency
-    return [*figures, FigureValue(name, "z", MICRO * value, MICRO * error)]
+    return [*figures, FigureValue(consistency, "z", MICRO * value, MICRO * error)]
 
 
 def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str]]:
