@@ -26,6 +26,8 @@ from schemas.units import MICRO
 
 Array = NDArray[np.float64]
 
+LEAST_LOG10_P = -1e6 / np.log(10.0)
+
 
 @dataclass(frozen=True)
 class ResidualTable:
@@ -46,6 +48,12 @@ class ResidualTable:
     def pick(self, unit: int, dwell: int) -> str:
         """The selection by a click on a point."""
         return f"{self.units[unit]}:{int(self.dwells[dwell])}"
+
+    def place_of(self, unit: str) -> int:
+        """Place of a unit; that of the one with the largest residuals for a name that is not in the table."""
+        if unit in self.units:
+            return self.units.index(unit)
+        return int(np.nanargmax(np.nanmean(self.residual**2, axis=(1, 2))))
 
 
 def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str, ...]) -> ResidualTable:
@@ -124,7 +132,7 @@ def ladder_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "coefficients": int(rival.rank),
             "chi2": float(rival.drop / variance),
             "behind": float(rival.cost - best),
-            "log10_p": float(max(rival.log_p, -1e6) / np.log(10.0)),
+            "log10_p": float(max(rival.log_p / np.log(10.0), LEAST_LOG10_P)),
         }
         for rival in diagnosis.ladder
     ]

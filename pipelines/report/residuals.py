@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.diagnosis import Diagnosis
-from inertial.criticism.drivers import curve, drivers_of
+from inertial.criticism.drivers import drivers_of
 from inertial.estimation.comparison import estimate, residuals_of
 from inertial.quantities import axis_labels, shown_factor
+from pipelines.report.smooth_curve import band
 from schemas.units import MICRO
 
 Array = NDArray[np.float64]
@@ -22,7 +23,6 @@ STILL = {"unit_C": 1.0, "temperature_rate": 0.1, "since_move_s": 0.5}
 _MOST = 7
 _ALIKE = 0.995
 _SOAK_APART = 1.0
-_KNOTS = 5
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,12 @@ class LotResiduals:
     def unit(self) -> str:
         """The unit that is shown."""
         return self.units[self.shown]
+
+    @property
+    def models(self) -> list[tuple[str, Array]]:
+        """Residuals by model: before, and after where effects were added."""
+        both = [("before", self.before), ("after", self.after)]
+        return both[:1] if self.after is self.before else both
 
 
 @dataclass(frozen=True)
@@ -114,41 +120,6 @@ def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[
         if axes:
             labels.append(f"{series.label} ({', '.join(axes)})")
     return labels
-
-
-def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few."""
-    there = np.isfinite(x) & np.isfinite(y)
-    x, y = x[there], y[there]
-    if x.size < 3 * _KNOTS or np.unique(np.round(x, 9)).size < 3:
-        return np.zeros(0), np.zeros(0), np.zeros(0)
-    groups = _groups(x)
-    places = np.linspace(x.min(), x.max(), 80) if groups > 3 else np.unique(x)
-    both = _basis(np.concatenate([x, places]), x.size, groups)
-    design, at = both[: x.size], both[x.size :]
-    coefficients, _, rank, _ = np.linalg.lstsq(design, y, rcond=1e-9)
-    left = y - design @ coefficients
-    variance = float(left @ left) / max(x.size - int(rank), 1)
-    spread = 1.96 * np.sqrt(variance * np.einsum("ij,jk,ik->i", at, np.linalg.pinv(design.T @ design, rcond=1e-10), at))
-    return places, at @ coefficients - spread, at @ coefficients + spread
-
-
-def _groups(values: Array) -> int:
-    """Number of groups that values fall into, separated by gaps of a twentieth of their range: usually soaks."""
-    gaps = np.diff(np.sort(values))
-    return 1 + int(np.count_nonzero(gaps > 0.05 * np.ptp(values)))
-
-
-def _basis(values: Array, count: int, groups: int) -> Array:
-    """Constant and smooth curve, knots from the first ``count`` values; a polynomial where values come in few groups.
-
-    Between groups a spline is not determined.
-    """
-    if groups > 2 * _KNOTS or groups == 1:
-        return np.concatenate([np.ones((values.size, 1)), curve(values, _KNOTS)], axis=-1)
-    low, high = float(values[:count].min()), float(values[:count].max())
-    z = 2.0 * (values - low) / max(high - low, 1e-12) - 1.0
-    return np.stack([z**k for k in range(min(4, max(groups, 2)))], axis=-1)
 
 
 def direction(temperature: Array) -> NDArray[np.int64]:
