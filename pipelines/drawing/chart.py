@@ -162,6 +162,11 @@ def measured_curve(
     return traces
 
 
+def shortened(name: str, most: int = 28) -> str:
+    """A long name without its middle: a long serial number would take half of a figure."""
+    return name if len(name) <= most else f"{name[: most - 9]}…{name[-8:]}"
+
+
 def symmetric(values: Array, label: str) -> ColourScale:
     """A diverging scale about zero that holds all finite values."""
     finite = values[np.isfinite(values)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from inertial.state import State
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, density, level, symmetric
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, density, level, shortened, symmetric
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.report.residual_table import ResidualTable
 from pipelines.report.residuals import DriverValues, LotResiduals, direction
@@ -196,7 +196,7 @@ def quantity_chart(
     along = np.stack([values] * len(table.axes), axis=-1) if values.ndim < 3 else values
     plots = tuple(
         Plot(
-            f"{title}, unit {_short(table.units[unit])}",
+            f"{title}, unit {shortened(table.units[unit], 24)}",
             PlotAxis(label),
             across,
             (*_lot(table, residual, along), *_standing_out(table, residual[unit], along[unit], unit, colour)),
@@ -246,7 +246,3 @@ def slot_chart(table: ResidualTable) -> Chart | None:
         traces.append(Trace(f"axis {name}", slot + shift[axis], mean, role=cast("Role", name), size=8.0, texts=texts))
     plot = Plot("", PlotAxis("slot"), PlotAxis("mean absolute residual / µg"), tuple(traces))
     return Chart("Mean absolute residual by slot", (plot,), height=280)
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= 24 else f"{name[:14]}…{name[-8:]}"

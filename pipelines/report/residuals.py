@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.criticism.drivers import drivers_of
 from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
 from inertial.quantities import axis_labels, shown_factor
 from pipelines.report.smooth_curve import band
 from schemas.units import MICRO
@@ -62,14 +64,22 @@ class DriverValues:
 
 def lot_residuals(diagnosis: Diagnosis, units: tuple[str, ...]) -> LotResiduals:
     """Residuals before and after, by generalised least squares with each model's own noise."""
-    problem = diagnosis.problem
-    axes = ("norm",) if problem.lot.radial else ("x", "y", "z")
-    shape = (len(units), len(axes), problem.n)
-    before = MICRO * residuals_of(problem, estimate(diagnosis.base)).reshape(shape)
-    after = before if not added(diagnosis) else MICRO * residuals_of(problem, estimate(diagnosis.final)).reshape(shape)
+    before = residuals_of_model(diagnosis.base, len(units))
+    after = before if not added(diagnosis) else residuals_of_model(diagnosis.final, len(units))
     sizes = np.nanmean(before**2, axis=(1, 2))
     fallen = sizes - np.nanmean(after**2, axis=(1, 2)) if added(diagnosis) else sizes
-    return LotResiduals(units, axes, before, after, int(np.argmax(fallen)))
+    return LotResiduals(units, axes_of(diagnosis.problem), before, after, int(np.argmax(fallen)))
+
+
+def axes_of(problem: Problem) -> tuple[str, ...]:
+    """The axes of a lot's residuals."""
+    return ("norm",) if problem.lot.radial else ("x", "y", "z")
+
+
+def residuals_of_model(model: Model, units: int) -> Array:
+    """The residuals of a model, µg, (units, axes, n)."""
+    shape = (units, len(axes_of(model.problem)), model.problem.n)
+    return MICRO * residuals_of(model.problem, estimate(model)).reshape(shape)
 
 
 def added(diagnosis: Diagnosis) -> list[str]:
@@ -81,21 +91,31 @@ def added(diagnosis: Diagnosis) -> list[str]:
 LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
+def recorded_quantities(problem: Problem) -> list[DriverValues]:
+    """What was recorded with the dwells of a lot, in the units that people read."""
+    state = problem.lot.state
+    quantities: list[DriverValues] = []
+    for driver in drivers_of(problem):
+        recorded = driver.values
+        if recorded is not None:
+            values = state.force_step if driver.name == "approach" else recorded
+            label = LABELS.get(driver.name, driver.name)
+            quantities.append(DriverValues(driver.name, label, values * shown_factor(driver.name)))
+    return quantities
+
+
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
     """Drivers with a picture: those that the residual follows, then temperature, time, rate and wait if they vary."""
-    state = diagnosis.problem.lot.state
-    known = {d.name: d.values for d in drivers_of(diagnosis.problem)}
-    if "approach" in known:
-        known["approach"] = state.force_step
+    known = {one.name: one for one in recorded_quantities(diagnosis.problem)}
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
     names = [*first, *(p.driver for p in diagnosis.where[:5])]
-    candidates = dict.fromkeys([*names, *ALWAYS])
     drivers: list[DriverValues] = []
-    for name in candidates:
-        values = known.get(name)
-        still = name not in names and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
-        if values is not None and not still and not any(_alike(values, other.values) for other in drivers):
-            drivers.append(DriverValues(name, LABELS.get(name, name), values * shown_factor(name)))
+    for name in dict.fromkeys([*names, *ALWAYS]):
+        series = known.get(name)
+        if series is None or any(_alike(series.values, other.values) for other in drivers):
+            continue
+        if name in names or float(np.ptp(series.values)) >= STILL.get(name, 0.0) * shown_factor(name):
+            drivers.append(series)
     return drivers[:_MOST]
 
 
