@@ -89,18 +89,18 @@ endef
 CRATE_NEEDS := roc-validator>=0.13
 USERS := build dask pdf recordings signatures sql
 # UNUSED of schemas/locks.py: what a library asks for and nothing of it here uses; tests use some of them themselves
-UNUSED := numpydoc apprise
+UNUSED := numpydoc apprise matplotlib
 define lock_without
 	@printf '%s ; python_version < "3"\n' $(4) > build/unused.in
 	$(call lock,$(1),$(2),$(3),pyproject.toml)
 endef
 
 locks: uv  ## resolve the locks anew (needs uv); UPGRADE=--upgrade moves versions
-	$(call lock_without,run,build,,$(UNUSED) docker matplotlib pytest)
-	$(call lock_without,all,$(USERS),run,$(UNUSED) docker matplotlib pytest)
+	$(call lock_without,run,build,,$(UNUSED) docker pytest)
+	$(call lock_without,all,$(USERS),run,$(UNUSED) docker pytest)
 	$(call lock_without,dev,$(USERS) dev,all,$(UNUSED))
 	$(call lock_without,bench,$(USERS) dev bench,dev,$(UNUSED))
-	$(call lock_without,docs,build docs,dev,$(UNUSED) docker matplotlib pytest)
+	$(call lock_without,docs,build docs,dev,$(UNUSED) docker pytest)
 	@: > build/unused.in
 	@echo '$(CRATE_NEEDS)' > build/crate.in
 	$(call lock,crate,,,build/crate.in)

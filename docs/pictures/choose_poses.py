@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
+from numpy.typing import NDArray
 
-mpl.use("svg")
-mpl.rcParams.update(
-    {"svg.hashsalt": "tumbleline", "font.size": 10, "axes.spines.top": False, "axes.spines.right": False}
-)
-
-import matplotlib.pyplot as plt  # noqa: E402 - the backend comes first
-
-from inertial import frames, poses  # noqa: E402
+from inertial import frames, poses
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import level
+from pipelines.drawing.mollweide import project, sphere
+from pipelines.drawing.picture import picture
 
 HERE = Path(__file__).parent
 PLANS = {
@@ -25,114 +22,94 @@ PLANS = {
     "fibonacci24": "24 even",
 }
 TERMS = ("fx²", "fx·fy", "fx³", "fx·|fx|")
-BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#888888"
+LEAST = 0.01  # smaller remaining fractions are not visible
 
 
-def forces(plan: str) -> np.ndarray:
+def forces(plan: str) -> NDArray[np.float64]:
     """Directions of a plan, (n, 3)."""
     angles = np.radians(poses.plan(plan))
     return frames.force_from_angles(angles[:, 0], angles[:, 1])
 
 
-def terms(force: np.ndarray) -> np.ndarray:
+def terms(force: NDArray[np.float64]) -> NDArray[np.float64]:
     """Columns of the terms on x, (n, 4)."""
     x, y, _ = force.T
     return np.stack([x**2, x * y, x**3, x * np.abs(x)], axis=1)
 
 
-def residual(columns: np.ndarray, base: np.ndarray) -> np.ndarray:
+def residual(columns: NDArray[np.float64], base: NDArray[np.float64]) -> NDArray[np.float64]:
     """Residual of columns after a fit of the base model."""
     return columns - base @ np.linalg.lstsq(base, columns, rcond=None)[0]
 
 
-def base_of(force: np.ndarray) -> np.ndarray:
+def base_of(force: NDArray[np.float64]) -> NDArray[np.float64]:
     """Bias, scale and misalignment of one axis."""
     return np.column_stack([np.ones(len(force)), force])
 
 
-def draw_plans() -> None:
+def draw_plans() -> Chart:
     """Plans on the sphere, with the remaining fraction of each term after bias, scale and misalignment."""
-    figure, rows = plt.subplots(2, len(PLANS), figsize=(12, 4.6), height_ratios=(1.25, 1.0))
-    for column, (plan, title) in enumerate(PLANS.items()):
+    maps: list[Plot] = []
+    bars: list[Plot] = []
+    place = np.arange(len(TERMS), dtype=float)[::-1]
+    for plan, title in PLANS.items():
         force = forces(plan)
-        sky, bars = rows[0, column], rows[1, column]
-        near = force[:, 1] <= 1e-9
-        sky.add_patch(plt.Circle((0, 0), 1.0, fill=False, color=GREY, linewidth=0.8))
-        sky.scatter(force[~near, 0], force[~near, 2], s=26, facecolors="none", edgecolors=GREY, linewidths=1.0)
-        sky.scatter(force[near, 0], force[near, 2], s=30, color=BLUE)
-        sky.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.15), aspect="equal", title=title)
-        sky.axis("off")
+        maps.append(sphere(title, (Trace("pose", *project(force), size=8.0, legend=False),)))
         columns = terms(force)
         size = np.linalg.norm(columns, axis=0)
-        v = np.where(
-            size > 1e-9, np.linalg.norm(residual(columns, base_of(force)), axis=0) / np.maximum(size, 1e-9), 0.0
+        left = np.linalg.norm(residual(columns, base_of(force)), axis=0)
+        v = np.where(size > 1e-9, left / np.maximum(size, 1e-9), 0.0)
+        lines = np.stack([np.zeros(v.size), v, np.full(v.size, np.nan)], axis=1).ravel()
+        seen = v >= LEAST
+        texts = tuple(f"{value:.2f}" for value in v[seen])
+        unseen = ("not visible",) * int(np.count_nonzero(~seen))
+        traces = (
+            Trace("remaining fraction", lines, np.repeat(place, 3), "line", width=14.0, legend=False),
+            Trace("v", v[seen] + 0.14, place[seen] - 0.02, "labels", "ink", texts=texts, legend=False),
+            Trace("", np.full(len(unseen), 0.45), place[~seen], "labels", "before", texts=unseen, legend=False),
         )
-        bars.barh(range(len(TERMS)), np.maximum(v, 0.004), color=[ORANGE if k < 0.01 else BLUE for k in v], height=0.6)
-        for place, value in enumerate(v):
-            bars.text(
-                min(value, 0.8) + 0.04,
-                place,
-                "not visible" if value < 0.01 else f"{value:.2f}",
-                va="center",
-                fontsize=9,
-            )
-        bars.set(
-            xlim=(0, 1.15),
-            yticks=range(len(TERMS)),
-            yticklabels=TERMS if column == 0 else [""] * len(TERMS),
-            xticks=(0, 0.5, 1),
-        )
-        bars.invert_yaxis()
-        bars.tick_params(length=0)
-    rows[1, 0].set_xlabel("remaining fraction v")
-    figure.tight_layout()
-    save(figure, "poses-plans")
+        across = PlotAxis("remaining fraction v", low=0.0, high=1.35, step=0.5)
+        bars.append(Plot("", across, PlotAxis("", names=TERMS[::-1], low=-0.6, high=len(TERMS) - 0.4), traces))
+    return Chart("Plans of poses and what they leave of four terms", (*maps, *bars), len(PLANS), height=185)
 
 
-def draw_rivals() -> None:
+def draw_rivals() -> Chart:
     """Difference of a cubic and an odd quadratic after a fit of bias, scale and the wrong effect to 26 poses."""
     force = forces("twenty_six")
     f = np.linspace(-1.0, 1.0, 401)
     wrong = np.column_stack([force[:, 0], force[:, 0] * np.abs(force[:, 0])])
     coefficients = np.linalg.lstsq(wrong, force[:, 0] ** 3, rcond=None)[0]
     curve = 30.0 * (f**3 - np.column_stack([f, f * np.abs(f)]) @ coefficients)
-    figure, axes = plt.subplots(figsize=(7.2, 3.2))
-    axes.axhline(0.0, color=GREY, linewidth=0.6)
-    axes.plot(f, curve, color=BLUE)
     levels = np.unique(np.round(force[:, 0], 6))
-    axes.plot(levels, np.interp(levels, f, curve), "o", color=GREY, label="the 26 poses")
     best = np.array([-0.24, 0.24])
-    axes.plot(best, np.interp(best, f, curve), "o", color=ORANGE, markersize=9, label="|fx| = 0.24 g")
-    axes.set(xlabel="fx / g", ylabel="difference / µg", title="K3 = 30 µg/g³ minus the best fx·|fx|")
-    axes.legend(frameon=False)
-    figure.tight_layout()
-    save(figure, "poses-rivals")
+    traces = (
+        level(f, 0.0, dashed=False),
+        Trace("difference", f, curve, "line"),
+        Trace("the 26 poses", levels, np.interp(levels, f, curve), role="muted", size=9.0),
+        Trace("|fx| = 0.24 g", best, np.interp(best, f, curve), role="before", size=11.0),
+    )
+    title = "K3 = 30 µg/g³ minus the best fx·|fx|"
+    return Chart(title, (Plot(title, PlotAxis("fx / g"), PlotAxis("difference / µg"), traces),), height=340)
 
 
-def draw_soaks() -> None:
+def draw_soaks() -> Chart:
     """Soaks in one and in both directions: remaining fraction of time after temperature."""
-    ways = {"one direction": (0, 20, 40, 60), "both directions": (0, 30, 60, 30, 0)}
-    figure, rows = plt.subplots(1, 2, figsize=(8.4, 2.9), sharey=True)
-    for axes, (title, stops) in zip(rows, ways.items(), strict=True):
-        time = np.arange(len(stops)) * 0.5
-        theta = np.array(stops) - 25.0
-        rest = residual(time[:, None], np.column_stack([np.ones(len(stops)), theta]))
+    plots: list[Plot] = []
+    for title, stops in {"one direction": (0, 20, 40, 60), "both directions": (0, 30, 60, 30, 0)}.items():
+        time, chamber = np.arange(len(stops)) * 0.5, np.array(stops, dtype=float)
+        rest = residual(time[:, None], np.column_stack([np.ones(len(stops)), chamber - 25.0]))
         v = float(np.linalg.norm(rest) / np.linalg.norm(time))
-        axes.step(np.append(time, time[-1] + 0.5), np.append(stops, stops[-1]), where="post", color=BLUE)
-        axes.plot(time + 0.42, stops, "o", color=ORANGE)
-        axes.set(title=f"{title}: v of ageing {v:.2f}", xlabel="time / h")
-    rows[0].set_ylabel("chamber / °C")
-    figure.tight_layout()
-    save(figure, "poses-soaks")
-
-
-def save(figure: plt.Figure, name: str) -> None:
-    """Writes a picture with the same bytes at every call."""
-    figure.savefig(HERE / f"{name}.svg", metadata={"Date": None})
-    plt.close(figure)
+        edges = np.append(np.repeat(time, 2)[1:], time[-1] + 0.5)
+        traces = (
+            Trace("chamber", edges, np.repeat(chamber, 2), "line"),
+            Trace("measurement", time + 0.42, chamber, role="before", size=9.0),
+        )
+        plots.append(
+            Plot(f"{title}: v of ageing {v:.2f}", PlotAxis("time / h"), PlotAxis("chamber / °C", step=20.0), traces)
+        )
+    return Chart("Soaks in one direction and in both directions", tuple(plots), 2, height=280)
 
 
 if __name__ == "__main__":
-    draw_plans()
-    draw_rivals()
-    draw_soaks()
+    for name, draw in {"plans": draw_plans, "rivals": draw_rivals, "soaks": draw_soaks}.items():
+        (HERE / f"poses-{name}.svg").write_bytes(picture(draw(), ".svg"))

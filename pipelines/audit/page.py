@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inertial.uncertainty.rounding import chance
-from pipelines.audit import charts as drawn
+from pipelines.audit import pictures as drawn
 from pipelines.audit.calibrations import date_of
 from pipelines.audit.document import counts, furthest
 from pipelines.audit.finding import WHO, AuditFinding

@@ -132,16 +132,39 @@ class Chart:
         return -(-len(self.plots) // self.columns)
 
 
-def level(x: Array, value: float, role: Role = "muted", name: str = "") -> Trace:
-    """A dashed horizontal line over the range of values."""
-    ends = np.array([np.min(x), np.max(x)], dtype=np.float64)
-    return Trace(name, ends, np.full(2, value), "line", role, dashed=True, legend=bool(name))
+def level(x: Array, value: float, role: Role = "muted", name: str = "", *, dashed: bool = True) -> Trace:
+    """A horizontal line over the range of values."""
+    return Trace(name, _ends(x), np.full(2, value), "line", role, dashed=dashed, legend=bool(name))
 
 
-def between(x: Array, low: float, high: float, name: str, role: Role = "muted") -> Trace:
+def between(x: Array, low: float, high: float, name: str, role: Role = "muted", *, legend: bool = True) -> Trace:
     """A horizontal band over the range of values."""
-    ends = np.array([np.min(x), np.max(x)], dtype=np.float64)
-    return Trace(name, ends, np.full(2, low), "band", role, high=np.full(2, high))
+    return Trace(name, _ends(x), np.full(2, low), "band", role, high=np.full(2, high), legend=legend)
+
+
+def _ends(x: Array) -> Array:
+    finite = x[np.isfinite(x)]
+    return np.array([finite.min(), finite.max()], dtype=np.float64) if finite.size else np.zeros(2)
+
+
+def measured_curve(
+    names: tuple[str, str, str], role: Role, x: Array, y: Array, interval: tuple[Array, Array], fitted: Array | None
+) -> list[Trace]:
+    """Points with their interval and with a fitted line, where these are known; ``names`` are those of the three."""
+    low, high = interval
+    bounded = np.isfinite(low) & np.isfinite(high)
+    traces = [Trace(names[1], x, y, role=role, size=5.0)]
+    if bounded.any():
+        band = Trace(names[0], x[bounded], low[bounded], "band", role, high=high[bounded], legend=False)
+        traces.insert(0, band)
+    if fitted is not None and np.isfinite(fitted).any():
+        traces.append(Trace(names[2], x, fitted, "line", role, legend=False))
+    return traces
+
+
+def shortened(name: str, most: int = 28) -> str:
+    """A long name without its middle: a long serial number would take half of a figure."""
+    return name if len(name) <= most else f"{name[: most - 9]}…{name[-8:]}"
 
 
 def symmetric(values: Array, label: str) -> ColourScale:

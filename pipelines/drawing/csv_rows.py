@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from pipelines.drawing.chart import Chart, Plot, Trace
+from pipelines.drawing.chart import Chart, Plot, Trace
 
 COLUMNS = ("plot", "series", "x_label", "x", "y_label", "y", "high", "error", "colour", "text", "pick")
 _LEADS = ("=", "+", "-", "@", "\t", "\r")
@@ -29,7 +28,7 @@ def csv_text(chart: Chart) -> str:
 
 
 def _rows(plot: Plot, trace: Trace) -> Iterator[list[str]]:
-    head = [_cell(plot.title), _cell(trace.name)]
+    head = [safe_cell(plot.title), safe_cell(trace.name)]
     if trace.counts is not None:
         for row, y in enumerate(trace.y):
             for column, x in enumerate(trace.x):
@@ -39,7 +38,7 @@ def _rows(plot: Plot, trace: Trace) -> Iterator[list[str]]:
         return
     for k in range(trace.x.size):
         values = [_number(array, k) for array in (trace.high, trace.error, trace.colour)]
-        texts = [_cell(texts[k]) if texts else "" for texts in (trace.texts, trace.picks)]
+        texts = [safe_cell(texts[k]) if texts else "" for texts in (trace.texts, trace.picks)]
         x, y = repr(float(trace.x[k])), _number(trace.y, k)
         yield [*head, plot.x.label, x, plot.y.label, y, *values, *texts]
 
@@ -48,6 +47,6 @@ def _number(values: np.ndarray | None, k: int) -> str:
     return "" if values is None or not np.isfinite(values[k]) else repr(float(values[k]))
 
 
-def _cell(text: str) -> str:
-    """A name as a cell that spreadsheets do not evaluate as a formula."""
-    return f"'{text}" if text.startswith(_LEADS) else text
+def safe_cell(value: Any) -> Any:
+    """A value that spreadsheets do not evaluate as a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(_LEADS) else value

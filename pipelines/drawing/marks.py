@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL
+from pipelines.drawing.chart import DIVERGING, ROLES, SEQUENTIAL, Anchor, ColourScale, Trace
 
 Array = NDArray[np.float64]
 
-if TYPE_CHECKING:
-    from pipelines.drawing.chart import Anchor, ColourScale, Trace
 
 OUTLINE = "#555555"
 INSIDE = 1e-6

@@ -6,16 +6,13 @@ Colours are names of roles (``role:before``) that the page replaces by those of 
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.chart import DIVERGING, SEQUENTIAL
+from pipelines.drawing.chart import DIVERGING, SEQUENTIAL, Chart, Plot, PlotAxis, Trace, shortened
 from pipelines.drawing.ticks import log_ticks
-
-if TYPE_CHECKING:
-    from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
 
 MANY = 4000
 """Points from which WebGL draws faster than SVG."""
@@ -25,7 +22,6 @@ SPHERE_GAP_X, SPHERE_GAP_PX = 0.012, 26.0
 DECADES = 100.0  # a logarithmic axis that spans more has a label at each decade
 MOST_NAMES = 40  # names along the width of a figure
 NARROW_D = 20.0  # closer dates get a margin
-LONGEST = 28
 CONFIG = {
     "displaylogo": False,
     "responsive": True,
@@ -132,7 +128,7 @@ def _axis(axis: PlotAxis, plot: Plot, side: str, columns: int) -> dict[str, Any]
     if axis.names:
         every = -(-len(axis.names) * columns // MOST_NAMES) if side == "x" else 1
         places = list(range(0, len(axis.names), every))
-        out |= {"tickvals": places, "ticktext": [_cut(axis.names[k]) for k in places]}
+        out |= {"tickvals": places, "ticktext": [_safe(shortened(axis.names[k])) for k in places]}
     if axis.step is not None:
         out["dtick"] = axis.step
     if axis.low is not None and axis.high is not None:
@@ -145,7 +141,7 @@ def _trace(trace: Trace, names: tuple[str, str], chart: Chart, shown: set[str]) 
     out: dict[str, Any] = {
         "xaxis": names[0],
         "yaxis": names[1],
-        "name": _cut(trace.name),
+        "name": _safe(shortened(trace.name)),
         "legendgroup": _safe(trace.name),
         "showlegend": bool(trace.legend and trace.name and trace.name not in shown and trace.style != "density"),
     }
@@ -230,8 +226,3 @@ def packed(values: NDArray[np.float64], *, dates: bool = False) -> dict[str, str
 def _safe(text: str) -> str:
     """A text without markup for Plotly."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-
-
-def _cut(text: str) -> str:
-    """A name for a legend: a long serial number would take half of the figure."""
-    return _safe(text if len(text) <= LONGEST else f"{text[: LONGEST - 9]}…{text[-8:]}")

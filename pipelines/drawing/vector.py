@@ -7,19 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.drawing.chart import ROLES
+from pipelines.drawing.chart import ROLES, Chart, ColourScale, Plot, PlotAxis, Trace
 from pipelines.drawing.marks import DRAW, Place, marks, shade
 from pipelines.drawing.ticks import Ticks, date_ticks, linear_ticks, log_ticks
 
 Array = NDArray[np.float64]
 
-if TYPE_CHECKING:
-    from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Trace
 
 WIDTH = 1150.0
 """Of the picture, in its own pixels; a page shows it as wide as it is itself."""

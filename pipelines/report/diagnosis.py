@@ -14,6 +14,7 @@ from inertial.uncertainty.rounding import chance, equal
 from pipelines.report.diagnosis_pictures import driver_chart, model_chart, pose_chart
 from pipelines.report.interactive import figure_of, interactive
 from pipelines.report.numbers import significant
+from pipelines.report.residual_table import LEAST_LOG10_P, ladder_of
 from pipelines.report.residuals import bands_without_zero, drivers_shown, lot_residuals
 from pipelines.report.templates import template
 from pipelines.tables.dwells import Measured
@@ -92,6 +93,7 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
     left = lot_residuals(diagnosis, units)
     drivers = drivers_shown(diagnosis)
     excluding = bands_without_zero(left, drivers)
+    force, models = lot.state.force[left.shown], [(label, residual[left.shown]) for label, residual in left.models]
     return {
         "turned": lot.state.temperature is not None and any(series.name == "unit_C" for series in drivers),
         "excluding": excluding,
@@ -100,31 +102,29 @@ def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:
         "several": len(units) > 1,
         "added": left.before is not left.after,
         "model": figure_of(model_chart(left, lot.state, lot.output, MICRO * diagnosis.floor)),
-        "maps": figure_of(pose_chart(left, lot.state)) if _poses(lot.state.force) >= FEWEST_POSES else "",
+        "maps": figure_of(pose_chart(left.unit, left.axes, force, models)) if _poses(force) >= FEWEST_POSES else "",
         "drivers": figure_of(driver_chart(left, drivers, lot.state.temperature)) if drivers else "",
     }
 
 
 def _poses(force: NDArray[np.float64]) -> int:
     """Number of different poses."""
-    return len(np.unique(np.round(force[0], 2), axis=0))
+    return len(np.unique(np.round(force, 2), axis=0))
 
 
 def _ladder(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The candidates of the first step, best first, with the distance of each to the best; χ² over the final variance."""
-    rivals, variance = diagnosis.ladder, diagnosis.final.space.variance
-    if not rivals:
-        return []
-    best, most = rivals[0].cost, max(1e-12, *(r.drop for r in rivals))
+    """The candidates of the first step as texts, best first; χ² over the final variance."""
+    rows = ladder_of(diagnosis)
+    most = max([1e-12, *(row["chi2"] for row in rows)])
     return [
         {
-            "id": r.term.effect.id,
-            "symbol": r.term.effect.symbol,
-            "coefficients": r.rank,
-            "drop": significant(r.drop / variance),
-            "width": f"{100.0 * max(r.drop, 0.0) / most:.1f}",
-            "behind": significant(r.cost - best),
-            "exponent": significant(-r.log_p / 2.302585) if r.log_p > -1e6 else "> 300",
+            "id": row["effect"],
+            "symbol": row["symbol"],
+            "coefficients": row["coefficients"],
+            "drop": significant(row["chi2"]),
+            "width": f"{100.0 * max(row['chi2'], 0.0) / most:.1f}",
+            "behind": significant(row["behind"]),
+            "exponent": significant(-row["log10_p"]) if row["log10_p"] > LEAST_LOG10_P else "> 300",
         }
-        for r in rivals
+        for row in rows
     ]

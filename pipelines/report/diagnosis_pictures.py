@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import cast
+from collections.abc import Callable, Iterator, Sequence
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from inertial.state import State
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, symmetric
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, density, level, shortened, symmetric
 from pipelines.drawing.mollweide import project, sphere
-from pipelines.report.residuals import DriverValues, LotResiduals, band, direction
+from pipelines.report.residual_table import ResidualTable
+from pipelines.report.residuals import DriverValues, LotResiduals, direction
+from pipelines.report.smooth_curve import smooth
 
 Array = NDArray[np.float64]
 
@@ -21,20 +23,20 @@ TURNS: tuple[tuple[int, Symbol, str], ...] = (
     (-1, "triangle-down", "cooling"),
     (0, "circle", "first soak"),
 )
+TURN_ROLES: dict[int, Role] = {1: "before", -1: "after", 0: "ink"}
 MOST_POINTS = 600
 SYMBOLS: dict[str, Symbol] = {"before": "diamond", "after": "square"}
 RESIDUAL = "residual / µg"
 CLOSE = 60  # poses from which dots are smaller
+FEW = 12  # units up to which all points are shown
 
 
 def model_chart(left: LotResiduals, state: State, output: Array, floor_ug: float) -> Chart:
     """Output against force, measured against explained deviation, and residuals against a normal distribution."""
-    explained = left.before - left.after
-    something = bool(np.nanmax(np.abs(explained)) > 0.0)
     plots = [_response(left, state, output)]
-    if something:
-        plots.append(_departure(left, explained))
-    plots.append(_quantiles(left, floor_ug, something=something))
+    if len(left.models) > 1:
+        plots.append(_departure(left, left.before - left.after))
+    plots.append(_quantiles(left, floor_ug))
     return Chart("Model and measurement", tuple(plots), len(plots), height=350)
 
 
@@ -82,76 +84,76 @@ def _departure(left: LotResiduals, explained: Array) -> Plot:
     )
 
 
-def _quantiles(left: LotResiduals, floor_ug: float, *, something: bool) -> Plot:
+def _quantiles(left: LotResiduals, floor_ug: float) -> Plot:
     """Ordered residuals over the noise floor against the normal distribution; the line is pure noise."""
-    shown = ((left.before, "before"), (left.after, "after"))[: 2 if something else 1]
+    several = len(left.models) > 1
     traces = [_guide(3.5)]
-    for values, label in shown:
+    for label, values in left.models:
         ordered = np.sort(values[np.isfinite(values)]) / floor_ug
         step = max(1, ordered.size // MOST_POINTS)
         normal = stats.norm.ppf((np.arange(ordered.size) + 0.5) / ordered.size)
-        name = label if something else "residuals"
+        name = label if several else "residuals"
         role, symbol = cast("Role", label), SYMBOLS[label]  # the colours are also those of two axes
-        traces.append(
-            Trace(name, normal[::step], ordered[::step], role=role, symbol=symbol, size=3.0, legend=something)
-        )
+        traces.append(Trace(name, normal[::step], ordered[::step], role=role, symbol=symbol, size=3.0, legend=several))
     across, along = PlotAxis("quantile of pure noise"), PlotAxis("residual over the floor")
     return Plot("all units: residuals and noise", across, along, tuple(traces))
 
 
-def pose_chart(left: LotResiduals, state: State) -> Chart:
-    """Mean residual of the shown unit at every pose on the whole sphere, before and after, on one scale."""
-    rows = [(left.before, ", before"), (left.after, ", after")]
-    rows = [(left.before, "")] if left.before is left.after else rows
-    poses, place = np.unique(np.round(state.force[left.shown], 2) + 0.0, axis=0, return_inverse=True)
-    place = place.reshape(-1)
+def pose_chart(
+    unit: str,
+    axes: Sequence[str],
+    force: Array,
+    models: Sequence[tuple[str, Array]],
+    pick: Callable[[int], str] | None = None,
+) -> Chart:
+    """Mean residual of a unit at every pose on the whole sphere, one row for each model, on one scale.
+
+    Parameters
+    ----------
+    force : (n, 3), g
+    models : name, and residuals (axes, n), µg; NaN where a dwell is missing
+    pick : selection by a click on the point of a dwell
+    """
+    poses, first, place = np.unique(np.round(force, 2) + 0.0, axis=0, return_index=True, return_inverse=True)
     x, y = project(poses)
     plots: list[Plot] = []
-    first: list[Array] = []
-    for values, title in rows:
-        for axis, name in enumerate(left.axes):
-            own = values[left.shown, axis]
-            there = [own[(place == k) & np.isfinite(own)] for k in range(len(poses))]
-            means = np.array([float(np.mean(one)) if one.size else 0.0 for one in there])
-            first += [means] if values is left.before else []
+    everything: list[Array] = []
+    for label, residual in models:
+        for axis, values in zip(axes, residual, strict=True):
+            finite = np.isfinite(values)
+            there = np.unique(place.reshape(-1)[finite])
+            means = np.array([values[finite & (place.reshape(-1) == k)].mean() for k in there])
             texts = tuple(
                 f"f = ({p[0]:+.2f}, {p[1]:+.2f}, {p[2]:+.2f}) g: {mean:.3g} µg"
-                for p, mean in zip(poses, means, strict=True)
+                for p, mean in zip(poses[there], means, strict=True)
             )
+            picks = () if pick is None else tuple(pick(int(first[k])) for k in there)
             size = 11.0 if len(poses) < CLOSE else 7.0
-            points = Trace("mean residual", x, y, size=size, colour=means, texts=texts, legend=False)
-            plots.append(sphere(f"{_named(name)}{title}", (points,)))
-    scale = symmetric(np.concatenate(first), "mean residual / µg")
-    return Chart(f"Mean residual at every pose, unit {left.unit}", tuple(plots), len(left.axes), scale, height=200)
+            points = Trace(
+                "mean residual", x[there], y[there], size=size, colour=means, texts=texts, picks=picks, legend=False
+            )
+            plots.append(sphere(_named(axis) + (f", {label}" if len(models) > 1 else ""), (points,)))
+            everything.append(means)
+    scale = symmetric(np.concatenate(everything), "mean residual / µg")
+    return Chart(f"Mean residual at every pose, unit {unit}", tuple(plots), len(axes), scale, height=200)
 
 
 def driver_chart(left: LotResiduals, drivers: list[DriverValues], temperature: Array | None) -> Chart:
     """Residuals of the shown unit against each driver, axis by axis, before and after, with smooth bands."""
-    shown = [(left.before, "before"), (left.after, "after")][: 1 if left.before is left.after else 2]
+    shown = [(label, values[left.shown]) for label, values in left.models]
+    largest = 1.08 * (max(float(np.nanmax(np.abs(values))) for _, values in shown) or 1.0)
+    across = PlotAxis(RESIDUAL, low=-largest, high=largest)
     plots: list[Plot] = []
     for row, series in enumerate(drivers):
         values = series.values[left.shown]
         turned = None if temperature is None or series.name != "unit_C" else direction(temperature[left.shown])
-        low, high = _limits([rows[left.shown] for rows, _ in shown])
         for column, axis in enumerate(left.axes):
             x = values[:, column] if values.ndim > 1 else values
-            traces = [_zero(x)]
-            for rows, label in shown:
-                traces += _against(x, rows[left.shown, column], label, turned, several=len(shown) > 1)
-            title = _named(axis) if row == 0 else ""
-            plots.append(Plot(title, PlotAxis(series.label), PlotAxis(RESIDUAL, low=low, high=high), tuple(traces)))
+            traces = [level(x, 0.0, dashed=False)]
+            for label, residual in shown:
+                traces += _against(x, residual[column], label, turned, several=len(shown) > 1)
+            plots.append(Plot(_named(axis) if row == 0 else "", PlotAxis(series.label), across, tuple(traces)))
     return Chart("Residuals against recorded quantities", tuple(plots), len(left.axes), height=235)
-
-
-def _limits(values: list[Array]) -> tuple[float, float]:
-    largest = max(float(np.nanmax(np.abs(one))) for one in values) or 1.0
-    return -1.08 * largest, 1.08 * largest
-
-
-def _zero(x: Array) -> Trace:
-    finite = x[np.isfinite(x)]
-    ends = np.array([finite.min(), finite.max()]) if finite.size else np.zeros(2)
-    return Trace("", ends, np.zeros(2), "line", "muted", legend=False)
 
 
 def _against(x: Array, y: Array, label: str, turned: NDArray[np.int64] | None, *, several: bool) -> Iterator[Trace]:
@@ -167,7 +169,80 @@ def _against(x: Array, y: Array, label: str, turned: NDArray[np.int64] | None, *
             yield Trace(
                 ", ".join(words) or "residual", x[rows], y[rows], role=role, symbol=symbol, size=4.5, legend=bool(words)
             )
-    places, low, high = band(x, y)
-    if places.size:
-        yield Trace(f"{label}: smooth curve, 95 %", places, low, "band", role, high=high, legend=False)
-        yield Trace(f"{label}: smooth curve", places, 0.5 * (low + high), "line", role, legend=False)
+    yield from smooth(label, x, y, role)
+
+
+def quantity_chart(
+    table: ResidualTable,
+    before: Array | None,
+    quantity: str,
+    unit: int,
+    colour: Literal["axis", "direction", "slot"] = "axis",
+) -> Chart:
+    """Residuals of a lot against a recorded quantity; the previous model on the left if there is one, on one scale.
+
+    Parameters
+    ----------
+    before : residuals of the previous model, as in the table
+    unit : place of the unit that stands out
+    colour : what colours tell of the points of that unit: the axis, or the way the temperature was reached
+    """
+    label, values = table.drivers[quantity]
+    sides = (
+        [(table.residual, "the model judged")] if before is None else [(before, "before"), (table.residual, "after")]
+    )
+    largest = 1.06 * float(np.nanmax(np.abs(sides[0][0] if len(table.units) <= FEW else sides[0][0][unit])))
+    across = PlotAxis(RESIDUAL, low=-largest, high=largest)
+    along = np.stack([values] * len(table.axes), axis=-1) if values.ndim < 3 else values
+    plots = tuple(
+        Plot(
+            f"{title}, unit {shortened(table.units[unit], 24)}",
+            PlotAxis(label),
+            across,
+            (*_lot(table, residual, along), *_standing_out(table, residual[unit], along[unit], unit, colour)),
+        )
+        for residual, title in sides
+    )
+    return Chart(f"Residuals against {label}", plots, len(plots), height=360)
+
+
+def _lot(table: ResidualTable, residual: Array, along: Array) -> list[Trace]:
+    """All units in the background: their points, or the number of points where there are many."""
+    if len(table.units) < 2:
+        return []
+    x, y = np.moveaxis(along, -1, 0)[: len(table.axes)].ravel(), np.moveaxis(residual, 1, 0).ravel()
+    return [density(x, y) if len(table.units) > FEW else Trace("other units", x, y, role="muted", size=3.5)]
+
+
+def _standing_out(table: ResidualTable, residual: Array, along: Array, unit: int, colour: str) -> Iterator[Trace]:
+    """The points of one unit, and a smooth curve through them."""
+    turning = table.turning[unit]
+    for axis, name in enumerate(table.axes):
+        x, y, role = along[:, axis], residual[axis], cast("Role", name)
+        groups: list[tuple[str, Role, Symbol, NDArray[np.bool_]]]
+        if colour == "direction":
+            groups = [(turn, TURN_ROLES[sign], symbol, turning == sign) for sign, symbol, turn in TURNS]
+        else:
+            groups = [(_named(name), role, "circle", np.ones(x.shape, dtype=bool))]
+        for title, own_role, symbol, chosen in groups:
+            there = np.flatnonzero(chosen & np.isfinite(x) & np.isfinite(y))
+            if there.size:
+                picks = tuple(table.pick(unit, int(k)) for k in there)
+                texts = tuple(f"{name}, dwell {int(table.dwells[k])}: {y[k]:.4g} µg at {x[k]:.5g}" for k in there)
+                yield Trace(title, x[there], y[there], "points", own_role, symbol, 7.0, texts=texts, picks=picks)
+        yield from smooth(name, x, y, role if colour == "axis" else "ink")
+
+
+def slot_chart(table: ResidualTable) -> Chart | None:
+    """Mean residual of every unit by slot, axis by axis: the influence of the place on the fixture; None without slots."""
+    if "slot" not in table.drivers:
+        return None
+    slot = table.drivers["slot"][1][:, 0]
+    shift = np.linspace(-0.18, 0.18, len(table.axes)) if len(table.axes) > 1 else np.zeros(1)
+    traces: list[Trace] = []
+    for axis, name in enumerate(table.axes):
+        mean = np.nanmean(np.abs(table.residual[:, axis]), axis=1)
+        texts = tuple(f"{unit}, {name}" for unit in table.units)
+        traces.append(Trace(f"axis {name}", slot + shift[axis], mean, role=cast("Role", name), size=8.0, texts=texts))
+    plot = Plot("", PlotAxis("slot"), PlotAxis("mean absolute residual / µg"), tuple(traces))
+    return Chart("Mean absolute residual by slot", (plot,), height=280)

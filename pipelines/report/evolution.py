@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, level
+from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Symbol, Trace, between, level
 
 LADDER: tuple[tuple[str, str, Role, Symbol], ...] = (
     ("fitted_ug", "fitted to this run", "before", "circle"),
@@ -42,11 +42,7 @@ def evolution_chart(rows: list[dict[str, Any]], name: str = "") -> Chart:
     for k, row in enumerate(rows):
         if row.get("confirmed") is False:
             about = np.array([k - 0.4, k + 0.4])
-            first = not any(trace.name == "refuted by the fresh run" for trace in traces)
-            high = np.full(2, top)
-            traces.append(
-                Trace("refuted by the fresh run", about, np.zeros(2), "band", "limit", high=high, legend=first)
-            )
+            traces.append(between(about, 0.0, top, "refuted by the fresh run", "limit"))
     across = PlotAxis("version of the model", names=labels, low=float(ends[0]), high=float(ends[1]))
     title = f"Error of {name}, version by version" if name else ""
     plot = Plot(title, across, PlotAxis("error, rms / µg", low=0.0, high=top), tuple(traces))

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Role, Trace
+from pipelines.drawing.chart import SEVERAL, Chart, Plot, PlotAxis, Role, Trace, measured_curve
 from pipelines.drawing.vector import svg_text
 from pipelines.report.numbers import significant
 from pipelines.report.templates import fill
@@ -90,25 +90,10 @@ def _curves(document: dict[str, Any]) -> Chart:
     traces: list[Trace] = []
     for k, curve in enumerate(document["curves"]):
         tau, deviation, low, high = (np.array(curve[key], dtype=float) for key in ("tau_s", "deviation", "low", "high"))
-        role = _role(curve["channel"], k)
-        bounded = np.isfinite(low) & np.isfinite(high)
-        if bounded.any():
-            traces.append(
-                Trace(
-                    f"{curve['channel']}: interval",
-                    tau[bounded],
-                    low[bounded],
-                    "band",
-                    role,
-                    high=high[bounded],
-                    legend=False,
-                )
-            )
-        traces.append(Trace(curve["channel"], tau, deviation, role=role, size=5.0))
-        if curve["fitted"] is not None:
-            traces.append(
-                Trace(f"{curve['channel']}: terms", tau, np.array(curve["fitted"]), "line", role, legend=False)
-            )
+        channel, fitted = curve["channel"], curve["fitted"]
+        names = f"{channel}: interval", channel, f"{channel}: terms"
+        terms = None if fitted is None else np.array(fitted)
+        traces += measured_curve(names, _role(channel, k), tau, deviation, (low, high), terms)
     name = document["statistic_name"]
     label = f"{name} / {document['deviation_unit'] or 'unit of the record'}"
     axes = PlotAxis("averaging time τ / s", log=True), PlotAxis(label, log=True)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
 from inertial.planning.visibility import confounding
-from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace
+from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Symbol, Trace
 from pipelines.drawing.mollweide import project, sphere
 from pipelines.schedule.timing import temperatures
 from schemas.units import AXES
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 if TYPE_CHECKING:
     from pipelines.planning.plan import PlanContext
 
-KINDS = (
+KINDS: tuple[tuple[str, str, Role, Symbol], ...] = (
     ("dwell", "fit", "accent", "circle"),
     ("verification", "verification", "before", "square"),
     ("allan", "static record", "z", "diamond"),
@@ -39,9 +39,8 @@ def sphere_chart(context: PlanContext) -> Chart:
             outer, inner = np.radians(np.array(list(named))).T
             x, y = project(force_from_angles(outer, inner))
             texts = tuple(f"{name}: outer {o:g}°, inner {i:g}°" for (o, i), name in named.items())
-            style = cast("Role", role), cast("Any", symbol)
             picks = tuple(named.values())
-            traces.append(Trace(label, x, y, role=style[0], symbol=style[1], size=11, texts=texts, picks=picks))
+            traces.append(Trace(label, x, y, role=role, symbol=symbol, size=11.0, texts=texts, picks=picks))
     if len(first) > 1:
         outer, inner = np.radians(np.array([(a.step.pose.outer_deg, a.step.pose.inner_deg) for a in first])).T
         x, y = project(force_from_angles(outer, inner))
@@ -65,9 +64,9 @@ def temperature_chart(context: PlanContext) -> Chart:
             x = np.array([a.start + 0.5 * a.seconds for a in own]) / 3600.0
             y = np.full(x.shape, low - (0.08 + 0.06 * row) * span)
             lasting = np.array([(a.start, a.start + a.seconds, np.nan) for a in own]).ravel() / 3600.0
-            traces.append(Trace("", lasting, np.repeat(y, 3), "line", cast("Role", role), width=5.0, legend=False))
+            traces.append(Trace("", lasting, np.repeat(y, 3), "line", role, width=5.0, legend=False))
             texts = tuple(f"{label}: {a.step.pose.name}" for a in own)
-            traces.append(Trace(label, x, y, role=cast("Role", role), symbol=cast("Any", symbol), size=5, texts=texts))
+            traces.append(Trace(label, x, y, role=role, symbol=symbol, size=5.0, texts=texts))
     plot = Plot("", PlotAxis("station time / h"), PlotAxis("temperature / °C"), tuple(traces))
     return Chart("Temperatures and records over the station's time", (plot,), height=340)
 

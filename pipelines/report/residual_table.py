@@ -12,19 +12,18 @@ from numpy.typing import NDArray
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import Diagnosis
-from inertial.criticism.drivers import drivers_of
 from inertial.errors import InertialError
-from inertial.estimation.comparison import estimate, residuals_of
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
 from inertial.quantities import shown_factor
-from pipelines.report.residuals import LABELS, direction
+from pipelines.report.residuals import LABELS, axes_of, direction, recorded_quantities, residuals_of_model
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
-from schemas.units import MICRO
 
 Array = NDArray[np.float64]
+
+LEAST_LOG10_P = -1e6 / np.log(10.0)
 
 
 @dataclass(frozen=True)
@@ -47,6 +46,12 @@ class ResidualTable:
         """The selection by a click on a point."""
         return f"{self.units[unit]}:{int(self.dwells[dwell])}"
 
+    def place_of(self, unit: str) -> int:
+        """Place of a unit; that of the one with the largest residuals for a name that is not in the table."""
+        if unit in self.units:
+            return self.units.index(unit)
+        return int(np.nanargmax(np.nanmean(self.residual**2, axis=(1, 2))))
+
 
 def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str, ...]) -> ResidualTable:
     """The residuals of the model that a diagnosis judged.
@@ -55,10 +60,26 @@ def residual_table(measurement: Measured, diagnosis: Diagnosis, units: tuple[str
     ----------
     units : those without a data fault, in the order of the diagnosis
     """
-    return _tabled(measurement, diagnosis.base, units)
+    problem = diagnosis.base.problem
+    state = problem.lot.state
+    drivers = {one.name: (one.label, one.values) for one in recorded_quantities(problem)}  # noqa: PD011 - no table of pandas
+    shape = (len(units), problem.n)
+    drivers["force"] = ("specific force along the axis / g", np.asarray(state.force, dtype=float))
+    drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))
+    drivers["dwell"] = ("number of the dwell", np.broadcast_to(measurement.dwells.astype(float), shape).copy())
+    if state.slot is not None:
+        slot = np.asarray(state.slot, dtype=float)
+        drivers["slot"] = ("slot", np.broadcast_to(slot.reshape(len(units), -1)[:, :1], shape).copy())
+    turning = np.zeros(shape, dtype=np.int64)
+    if state.temperature is not None:
+        turning = np.stack([direction(row) for row in state.temperature])
+    return ResidualTable(
+        units, measurement.dwells, axes_of(problem), residuals_of_model(diagnosis.base, len(units)),
+        np.asarray(state.force, dtype=float), turning, drivers,
+    )  # fmt: skip
 
 
-def residuals_of_model(
+def residuals_with(
     dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str], units: Sequence[str]
 ) -> Array:
     """The residuals of another model on the same dwells, µg, (units, axes, n).
@@ -73,39 +94,9 @@ def residuals_of_model(
         measurement = measurement.pick([measurement.units.index(unit) for unit in units])
         problem = Problem(lot_of(measurement, square="misalignment" not in effects))
         model = Model(problem, terms_of(catalogue.get_all(list(effects)), problem))
-        return _residuals(model, len(measurement.units))
+        return residuals_of_model(model, len(measurement.units))
     except InertialError as problem_:
         raise DataRejected(str(problem_)) from None
-
-
-def _residuals(model: Model, units: int) -> Array:
-    axes = 1 if model.problem.lot.radial else 3
-    return MICRO * residuals_of(model.problem, estimate(model)).reshape(units, axes, model.problem.n)
-
-
-def _tabled(measurement: Measured, model: Model, units: tuple[str, ...]) -> ResidualTable:
-    problem = model.problem
-    state = problem.lot.state
-    drivers: dict[str, tuple[str, Array]] = {}
-    for driver in drivers_of(problem):
-        recorded = driver.values  # noqa: PD011 - no table of pandas
-        if recorded is not None:
-            values = state.force_step if driver.name == "approach" else recorded
-            drivers[driver.name] = (LABELS.get(driver.name, driver.name), values * shown_factor(driver.name))
-    shape = (len(units), problem.n)
-    drivers["force"] = ("specific force along the axis / g", np.asarray(state.force, dtype=float))
-    drivers.setdefault("time_s", (LABELS["time_s"], state.time * shown_factor("time_s")))
-    drivers["dwell"] = ("number of the dwell", np.broadcast_to(measurement.dwells.astype(float), shape).copy())
-    if state.slot is not None:
-        slot = np.asarray(state.slot, dtype=float)
-        drivers["slot"] = ("slot", np.broadcast_to(slot.reshape(len(units), -1)[:, :1], shape).copy())
-    turning = np.zeros(shape, dtype=np.int64)
-    if state.temperature is not None:
-        turning = np.stack([direction(row) for row in state.temperature])
-    return ResidualTable(
-        units, measurement.dwells, ("norm",) if problem.lot.radial else ("x", "y", "z"), _residuals(model, len(units)),
-        np.asarray(state.force, dtype=float), turning, drivers,
-    )  # fmt: skip
 
 
 def ladder_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
@@ -124,7 +115,7 @@ def ladder_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "coefficients": int(rival.rank),
             "chi2": float(rival.drop / variance),
             "behind": float(rival.cost - best),
-            "log10_p": float(max(rival.log_p, -1e6) / np.log(10.0)),
+            "log10_p": float(max(rival.log_p / np.log(10.0), LEAST_LOG10_P)),
         }
         for rival in diagnosis.ladder
     ]

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial.criticism.diagnosis import Diagnosis
-from inertial.criticism.drivers import curve, drivers_of
+from inertial.criticism.drivers import drivers_of
 from inertial.estimation.comparison import estimate, residuals_of
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Problem
 from inertial.quantities import axis_labels, shown_factor
+from pipelines.report.smooth_curve import band
 from schemas.units import MICRO
 
 Array = NDArray[np.float64]
@@ -22,7 +25,6 @@ STILL = {"unit_C": 1.0, "temperature_rate": 0.1, "since_move_s": 0.5}
 _MOST = 7
 _ALIKE = 0.995
 _SOAK_APART = 1.0
-_KNOTS = 5
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,12 @@ class LotResiduals:
         """The unit that is shown."""
         return self.units[self.shown]
 
+    @property
+    def models(self) -> list[tuple[str, Array]]:
+        """Residuals by model: before, and after where effects were added."""
+        both = [("before", self.before), ("after", self.after)]
+        return both[:1] if self.after is self.before else both
+
 
 @dataclass(frozen=True)
 class DriverValues:
@@ -56,14 +64,22 @@ class DriverValues:
 
 def lot_residuals(diagnosis: Diagnosis, units: tuple[str, ...]) -> LotResiduals:
     """Residuals before and after, by generalised least squares with each model's own noise."""
-    problem = diagnosis.problem
-    axes = ("norm",) if problem.lot.radial else ("x", "y", "z")
-    shape = (len(units), len(axes), problem.n)
-    before = MICRO * residuals_of(problem, estimate(diagnosis.base)).reshape(shape)
-    after = before if not added(diagnosis) else MICRO * residuals_of(problem, estimate(diagnosis.final)).reshape(shape)
+    before = residuals_of_model(diagnosis.base, len(units))
+    after = before if not added(diagnosis) else residuals_of_model(diagnosis.final, len(units))
     sizes = np.nanmean(before**2, axis=(1, 2))
     fallen = sizes - np.nanmean(after**2, axis=(1, 2)) if added(diagnosis) else sizes
-    return LotResiduals(units, axes, before, after, int(np.argmax(fallen)))
+    return LotResiduals(units, axes_of(diagnosis.problem), before, after, int(np.argmax(fallen)))
+
+
+def axes_of(problem: Problem) -> tuple[str, ...]:
+    """The axes of a lot's residuals."""
+    return ("norm",) if problem.lot.radial else ("x", "y", "z")
+
+
+def residuals_of_model(model: Model, units: int) -> Array:
+    """The residuals of a model, µg, (units, axes, n)."""
+    shape = (units, len(axes_of(model.problem)), model.problem.n)
+    return MICRO * residuals_of(model.problem, estimate(model)).reshape(shape)
 
 
 def added(diagnosis: Diagnosis) -> list[str]:
@@ -75,21 +91,31 @@ def added(diagnosis: Diagnosis) -> list[str]:
 LABELS = axis_labels() | {"approach": "change of force at the move before / g"}
 
 
+def recorded_quantities(problem: Problem) -> list[DriverValues]:
+    """What was recorded with the dwells of a lot, in the units that people read."""
+    state = problem.lot.state
+    quantities: list[DriverValues] = []
+    for driver in drivers_of(problem):
+        recorded = driver.values
+        if recorded is not None:
+            values = state.force_step if driver.name == "approach" else recorded
+            label = LABELS.get(driver.name, driver.name)
+            quantities.append(DriverValues(driver.name, label, values * shown_factor(driver.name)))
+    return quantities
+
+
 def drivers_shown(diagnosis: Diagnosis) -> list[DriverValues]:
     """Drivers with a picture: those that the residual follows, then temperature, time, rate and wait if they vary."""
-    state = diagnosis.problem.lot.state
-    known = {d.name: d.values for d in drivers_of(diagnosis.problem)}
-    if "approach" in known:
-        known["approach"] = state.force_step
+    known = {one.name: one for one in recorded_quantities(diagnosis.problem)}
     first = [] if diagnosis.unexplained is None else [diagnosis.unexplained.driver]
     names = [*first, *(p.driver for p in diagnosis.where[:5])]
-    candidates = dict.fromkeys([*names, *ALWAYS])
     drivers: list[DriverValues] = []
-    for name in candidates:
-        values = known.get(name)
-        still = name not in names and values is not None and float(np.ptp(values)) < STILL.get(name, 0.0)
-        if values is not None and not still and not any(_alike(values, other.values) for other in drivers):
-            drivers.append(DriverValues(name, LABELS.get(name, name), values * shown_factor(name)))
+    for name in dict.fromkeys([*names, *ALWAYS]):
+        series = known.get(name)
+        if series is None or any(_alike(series.values, other.values) for other in drivers):
+            continue
+        if name in names or float(np.ptp(series.values)) >= STILL.get(name, 0.0) * shown_factor(name):
+            drivers.append(series)
     return drivers[:_MOST]
 
 
@@ -114,41 +140,6 @@ def bands_without_zero(left: LotResiduals, drivers: list[DriverValues]) -> list[
         if axes:
             labels.append(f"{series.label} ({', '.join(axes)})")
     return labels
-
-
-def band(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Smooth curve through points with its 95 % band: (places, low, high); empty where there are too few."""
-    there = np.isfinite(x) & np.isfinite(y)
-    x, y = x[there], y[there]
-    if x.size < 3 * _KNOTS or np.unique(np.round(x, 9)).size < 3:
-        return np.zeros(0), np.zeros(0), np.zeros(0)
-    groups = _groups(x)
-    places = np.linspace(x.min(), x.max(), 80) if groups > 3 else np.unique(x)
-    both = _basis(np.concatenate([x, places]), x.size, groups)
-    design, at = both[: x.size], both[x.size :]
-    coefficients, _, rank, _ = np.linalg.lstsq(design, y, rcond=1e-9)
-    left = y - design @ coefficients
-    variance = float(left @ left) / max(x.size - int(rank), 1)
-    spread = 1.96 * np.sqrt(variance * np.einsum("ij,jk,ik->i", at, np.linalg.pinv(design.T @ design, rcond=1e-10), at))
-    return places, at @ coefficients - spread, at @ coefficients + spread
-
-
-def _groups(values: Array) -> int:
-    """Number of groups that values fall into, separated by gaps of a twentieth of their range: usually soaks."""
-    gaps = np.diff(np.sort(values))
-    return 1 + int(np.count_nonzero(gaps > 0.05 * np.ptp(values)))
-
-
-def _basis(values: Array, count: int, groups: int) -> Array:
-    """Constant and smooth curve, knots from the first ``count`` values; a polynomial where values come in few groups.
-
-    Between groups a spline is not determined.
-    """
-    if groups > 2 * _KNOTS or groups == 1:
-        return np.concatenate([np.ones((values.size, 1)), curve(values, _KNOTS)], axis=-1)
-    low, high = float(values[:count].min()), float(values[:count].max())
-    z = 2.0 * (values - low) / max(high - low, 1e-12) - 1.0
-    return np.stack([z**k for k in range(min(4, max(groups, 2)))], axis=-1)
 
 
 def direction(temperature: Array) -> NDArray[np.int64]:

@@ -1,56 +1,114 @@
-"""Charts of a run: model and measurement of a unit, its checks, and the verification of the lot."""
+"""Charts of a run: model and measurement of a unit, its checks and samples, the verification of the lot, the station."""
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any, Literal, cast
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace
+from pipelines.drawing.chart import Chart, ColourScale, Plot, PlotAxis, Role, Trace, level, measured_curve
+from pipelines.report.smooth_curve import smooth
 from schemas.units import AXES
 
 Array = NDArray[np.float64]
 
+Against = Literal["force", "unit_C", "time", "pose"]
+
 RESIDUAL = "residual / µg"
 POINT = 5.0
 SAME_SOAK_C = 0.5  # soaks whose temperatures differ by less need no colours
+MOST_SAMPLES = 20_000  # of a dwell, and
+MOST_TIMES = 3000  # of a station, that are drawn
+AGAINST: dict[Against, str] = {
+    "force": "specific force along the axis / g",
+    "unit_C": "temperature of the unit / °C",
+    "time": "station time / h",
+    "pose": "pose",
+}
+COLUMNS = {"force": "force_g", "unit_C": "unit_C", "time": "time_s"}
+POSE_SHIFT = {"x": -0.2, "y": 0.0, "z": 0.2}
 
 
 def model_chart(dwells: pd.DataFrame, residuals: pd.DataFrame) -> Chart:
     """Measurement and model against force, and the residuals against force and temperature, axis by axis."""
     scale = _soak_scale(dwells)
     largest = 1.08 * float(residuals["residual_ug"].abs().max()) or 1.0
+    across = PlotAxis(RESIDUAL, low=-largest, high=largest)
     rows: list[list[Plot]] = [[], [], []]
-    unit = str(dwells["out_unit"].iloc[0])
     for axis in AXES:
         own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", "soak", f"out_{axis}"]], on="dwell")
         force, left = own["force_g"].to_numpy(float), own["residual_ug"].to_numpy(float)
         colour = None if scale is None else own["soak"].map(_soak_means(dwells)).to_numpy(float)
-        texts = tuple(
-            f"{axis}, pose {pose}, dwell {int(dwell)}: {value:.4g} µg"
-            for pose, dwell, value in zip(own["pose"], own["dwell"], left, strict=True)
-        )
-        along, across = PlotAxis(f"specific force on {axis} / g"), PlotAxis(RESIDUAL, low=-largest, high=largest)
-        rows[0].append(_response(own, axis, along, PlotAxis(f"output / {unit}"), colour))
-        for row, x, label in (
-            (1, force, along),
-            (2, own["unit_C"].to_numpy(float), PlotAxis("temperature of the unit / °C")),
-        ):
-            points = Trace("residual", x, left, size=POINT, colour=colour, texts=texts, legend=False)
-            rows[row].append(Plot("", label, across, (_zero(x), points)))
+        output = own[f"out_{axis}"].to_numpy(float)
+        measured = Trace("measured", force, output, size=POINT, colour=colour, legend=False)
+        rows[0].append(_response(axis, measured, str(dwells["out_unit"].iloc[0])))
+        along = rows[0][-1].x, PlotAxis(AGAINST["unit_C"])
+        for row, x, label in zip(rows[1:], (force, own["unit_C"].to_numpy(float)), along, strict=True):
+            points = Trace("residual", x, left, size=POINT, colour=colour, texts=_told(own), legend=False)
+            row.append(Plot("", label, across, (level(x, 0.0, dashed=False), points)))
     return Chart("Model and measurement", (*rows[0], *rows[1], *rows[2]), 3, scale, height=250)
 
 
-def _response(own: pd.DataFrame, axis: str, along: PlotAxis, across: PlotAxis, colour: Array | None) -> Plot:
-    force, output = own["force_g"].to_numpy(float), own[f"out_{axis}"].to_numpy(float)
-    traces = [Trace("measured", force, output, size=POINT, colour=colour, legend=False)]
-    if force.size > 1 and np.ptp(force) > 0.0:
-        ends = np.array([force.min(), force.max()])
-        line = np.polynomial.Polynomial.fit(force, output, 1)(ends)
-        traces.insert(0, Trace("", ends, line, "line", "muted", legend=False))
-    return Plot(f"axis {axis}", along, across, tuple(traces))
+def response_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame) -> Chart:
+    """Measured output of a unit against specific force, axis by axis; a click on a point shows its dwell."""
+    plots: list[Plot] = []
+    for axis in AXES:
+        own = residuals[residuals["axis"] == axis].merge(dwells[["dwell", f"out_{axis}", "out_unit"]], on="dwell")
+        force, output = own["force_g"].to_numpy(float), own[f"out_{axis}"].to_numpy(float)
+        points = Trace("measured", force, output, role=cast("Role", axis), size=6.0, picks=_picks(unit, own))
+        plots.append(_response(axis, points, str(own["out_unit"].iloc[0]) if len(own) else ""))
+    return Chart("Output against specific force", tuple(plots), 3, height=280)
+
+
+def _response(axis: str, points: Trace, unit: str) -> Plot:
+    """Measured output of an axis against specific force, with the straight line through it."""
+    traces = [points]
+    if points.x.size > 1 and np.ptp(points.x) > 0.0:
+        ends = np.array([points.x.min(), points.x.max()])
+        line = np.polynomial.Polynomial.fit(points.x, points.y, 1)(ends)
+        traces.insert(0, Trace("straight line", ends, line, "line", "muted"))
+    return Plot(f"axis {axis}", PlotAxis(f"specific force on {axis} / g"), PlotAxis(f"output / {unit}"), tuple(traces))
+
+
+def residual_chart(unit: str, residuals: pd.DataFrame, dwells: pd.DataFrame, against: Against) -> Chart:
+    """Residuals of a unit against force, temperature, time or pose; a click on one shows its dwell."""
+    timed = residuals.merge(dwells[["dwell", "time_s"]], on="dwell", how="left")
+    plot = _residuals("", timed, against, 7.0, unit)
+    return Chart(f"Residuals against {AGAINST[against]}", (plot,), height=380)
+
+
+def _residuals(title: str, residuals: pd.DataFrame, against: Against, size: float, unit: str = "") -> Plot:
+    """Residuals of all axes; points of a named unit can be selected."""
+    poses = list(dict.fromkeys(residuals.sort_values("dwell")["pose"].astype(str)))
+    traces: list[Trace] = []
+    for axis in AXES:
+        own = residuals[residuals["axis"] == axis]
+        y, role = own["residual_ug"].to_numpy(float), cast("Role", axis)
+        if against == "pose":
+            x = np.array([poses.index(str(pose)) + POSE_SHIFT[axis] for pose in own["pose"]])
+        else:
+            x = own[COLUMNS[against]].to_numpy(float) / (3600.0 if against == "time" else 1.0)
+        picks = _picks(unit, own) if unit else ()
+        traces.append(Trace(f"axis {axis}", x, y, role=role, size=size, texts=_told(own), picks=picks))
+        traces += [] if against == "pose" else smooth(axis, x, y, role)
+    zero = level(np.concatenate([trace.x for trace in traces]), 0.0, dashed=False)
+    names = tuple(poses) if against == "pose" else ()
+    return Plot(title, PlotAxis(AGAINST[against], names=names), PlotAxis(RESIDUAL), (zero, *traces))
+
+
+def _told(rows: pd.DataFrame) -> tuple[str, ...]:
+    """Residuals as texts."""
+    columns = (rows[name] for name in ("axis", "pose", "dwell", "residual_ug"))
+    return tuple(
+        f"{axis}, pose {pose}, dwell {int(dwell)}: {left:.4g} µg"
+        for axis, pose, dwell, left in zip(*columns, strict=True)
+    )
+
+
+def _picks(unit: str, rows: pd.DataFrame) -> tuple[str, ...]:
+    return tuple(f"{unit}:{int(dwell)}" for dwell in rows["dwell"])
 
 
 def _soak_means(dwells: pd.DataFrame) -> pd.Series:
@@ -64,35 +122,14 @@ def _soak_scale(dwells: pd.DataFrame) -> ColourScale | None:
     return ColourScale("temperature of the soak / °C", low, high, diverging=False) if high - low > SAME_SOAK_C else None
 
 
-def _zero(x: Array) -> Trace:
-    finite = x[np.isfinite(x)]
-    ends = np.array([finite.min(), finite.max()]) if finite.size else np.zeros(2)
-    return Trace("", ends, np.zeros(2), "line", "muted", legend=False)
-
-
 def check_chart(residuals: pd.DataFrame, verification: pd.DataFrame, allan: pd.DataFrame) -> Chart:
     """Residuals by pose, the error on poses not used, and the Allan deviation; those that the run has."""
-    plots = [_by_pose(residuals)]
+    plots = [_residuals("residuals by pose", residuals, "pose", 4.0)]
     if len(verification):
         plots.append(_verification(verification))
     if len(allan):
         plots.append(allan_plot(allan, "Allan deviation"))
     return Chart("Checks", tuple(plots), len(plots), height=330)
-
-
-def _by_pose(residuals: pd.DataFrame) -> Plot:
-    poses = list(dict.fromkeys(residuals.sort_values("dwell")["pose"].astype(str)))
-    place = {pose: float(number) for number, pose in enumerate(poses)}
-    traces = [_zero(np.array([0.0, len(poses) - 1.0]))]
-    for shift, axis in zip((-0.2, 0.0, 0.2), AXES, strict=True):
-        own = residuals[residuals["axis"] == axis]
-        x = np.array([place[str(pose)] + shift for pose in own["pose"]])
-        texts = tuple(
-            f"{axis}, pose {pose}: {value:.4g} µg" for pose, value in zip(own["pose"], own["residual_ug"], strict=True)
-        )
-        y = own["residual_ug"].to_numpy(float)
-        traces.append(Trace(f"axis {axis}", x, y, role=cast("Role", axis), size=4.0, texts=texts))
-    return Plot("residuals by pose", PlotAxis("pose", names=tuple(poses)), PlotAxis(RESIDUAL), tuple(traces))
 
 
 def _verification(rows: pd.DataFrame) -> Plot:
@@ -112,13 +149,11 @@ def allan_plot(allan: pd.DataFrame, title: str = "") -> Plot:
     traces: list[Trace] = []
     for axis in AXES:
         own = allan[allan["axis"] == axis].sort_values("tau_s")
-        role, tau = cast("Role", axis), own["tau_s"].to_numpy(float)
-        low, high = own["low_ug"].to_numpy(float), own["high_ug"].to_numpy(float)
-        traces.append(Trace(f"{axis}: 68 % interval", tau, low, "band", role, high=high, legend=False))
-        traces.append(Trace(f"axis {axis}", tau, own["deviation_ug"].to_numpy(float), role=role, size=POINT))
-        fitted = own["fitted_ug"].to_numpy(float)
-        if np.isfinite(fitted).any():
-            traces.append(Trace(f"{axis}: fitted terms", tau, fitted, "line", role, legend=False))
+        tau, deviation, low, high, fitted = (
+            own[name].to_numpy(float) for name in ("tau_s", "deviation_ug", "low_ug", "high_ug", "fitted_ug")
+        )
+        names = f"{axis}: 68 % interval", f"axis {axis}", f"{axis}: fitted terms"
+        traces += measured_curve(names, cast("Role", axis), tau, deviation, (low, high), fitted)
     return Plot(
         title,
         PlotAxis("averaging time / s", log=True),
@@ -144,21 +179,20 @@ def _slopes(allan: pd.DataFrame) -> list[Trace]:
 
 def lot_chart(verification: pd.DataFrame, poses: pd.DataFrame, units: list[str], limit_ug: float) -> Chart:
     """Error on the poses not used, unit by unit: single dwells in grey, the means of the poses against the limit."""
-    single: list[tuple[Array, Array]] = []
-    means: list[tuple[Array, Array]] = []
+    single, means = [np.zeros((2, 0))], [np.zeros((2, 0))]
     texts: list[str] = []
     for position, unit in enumerate(units):
         own, dwells = poses[poses["unit"] == unit], verification[verification["unit"] == unit]
         names = own["pose"].tolist()
         places = np.linspace(-0.25, 0.25, len(names)).tolist() if len(names) > 1 else [0.0]
         spread = dict(zip(names, places, strict=True))
-        among = np.array([position + spread[pose] for pose in dwells["pose"]])
-        single.append((among, dwells["error_ug"].to_numpy(float)))
-        means.append((np.array([position + place for place in places]), own["error_ug"].to_numpy(float)))
+        among = [position + spread[pose] for pose in dwells["pose"]]
+        single.append(np.array([among, dwells["error_ug"]], dtype=float))
+        means.append(np.array([[position + place for place in places], own["error_ug"]], dtype=float))
         texts += [f"{unit}, pose {pose}: {value:.4g} µg" for pose, value in zip(names, own["error_ug"], strict=True)]
-    x, y = _joined(means)
+    x, y = np.concatenate(means, axis=1)
     beyond = np.abs(y) > limit_ug
-    traces = [Trace("single dwell", *_joined(single), role="muted", size=3.5)]
+    traces = [Trace("single dwell", *np.concatenate(single, axis=1), role="muted", size=3.5)]
     for name, role, rows in (
         ("mean of a pose", "accent", ~beyond),
         ("mean of a pose, beyond the limit", "limit", beyond),
@@ -168,16 +202,67 @@ def lot_chart(verification: pd.DataFrame, poses: pd.DataFrame, units: list[str],
             traces.append(Trace(name, x[rows], y[rows], role=cast("Role", role), size=7.0, texts=own_texts))
     if np.isfinite(limit_ug):
         ends = np.array([-0.5, len(units) - 0.5])
-        traces += [
-            Trace("limit", ends, np.full(2, sign * limit_ug), "line", "limit", dashed=True) for sign in (-1.0, 1.0)
-        ]
+        traces += [level(ends, sign * limit_ug, "limit", "limit") for sign in (-1.0, 1.0)]
     axis = PlotAxis("", names=tuple(units), low=-0.5, high=len(units) - 0.5)
     return Chart(
         "Error on poses not used by the fit", (Plot("", axis, PlotAxis("|a| − g / µg"), tuple(traces)),), height=280
     )
 
 
-def _joined(parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-    if not parts:
-        return np.zeros(0), np.zeros(0)
-    return np.concatenate([x for x, _ in parts]), np.concatenate([y for _, y in parts])
+def samples_chart(samples: pd.DataFrame, title: str, unit_text: str) -> Chart:
+    """The samples of one dwell, axis by axis, about their mean."""
+    time = samples["time_s"].to_numpy(float)
+    step = 1 + len(samples) // MOST_SAMPLES
+    plots: list[Plot] = []
+    for axis in AXES:
+        values = samples[axis].to_numpy(float)
+        mean = float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
+        shown = values[::step] - mean
+        # one line is drawn ten times as fast as a thousand points; beside a lost sample it would hide single ones
+        style = "line" if np.isfinite(shown).all() else "points"
+        role = cast("Role", axis)
+        points = Trace(f"axis {axis}", (time - time[:1])[::step], shown, style, role, size=3.0, width=0.8, legend=False)
+        across = PlotAxis("time in the dwell / s"), PlotAxis(f"output − mean / {unit_text}")
+        plots.append(Plot(f"axis {axis}, mean {mean:.6g} {unit_text}", *across, (points,)))
+    return Chart(title, tuple(plots), 3, height=240)
+
+
+def history_chart(rows: list[dict[str, Any]], parameter: str, unit_text: str) -> Chart:
+    """One coefficient of a unit over its calibrations, with k = 2."""
+    day, value, error = (np.array([float(row[key]) for row in rows]) for key in ("day", "value", "standard_error"))
+    texts = tuple(f"{row['run']}: {row['value']:.6g} ± {2.0 * row['standard_error']:.2g} (k = 2)" for row in rows)
+    points = Trace(parameter, day, value, error=2.0 * error, size=8.0, texts=texts)
+    plot = Plot("", PlotAxis("date of measurement", dates=True), PlotAxis(f"{parameter} / {unit_text}"), (points,))
+    return Chart(f"{parameter} over the calibrations of the unit", (plot,), height=280)
+
+
+def station_chart(history: pd.DataFrame, readings: pd.DataFrame, events: pd.DataFrame) -> Chart:
+    """Chamber, coldest and warmest unit; angles of the table; pauses and ends as marks."""
+    by_time = history.groupby("time_s")
+    time = np.unique(history["time_s"].to_numpy(float))
+    chamber = by_time["chamber_C"].first().to_numpy(float)
+    cold, warm = by_time["unit_C"].min().to_numpy(float), by_time["unit_C"].max().to_numpy(float)
+    step = 1 + time.size // MOST_TIMES
+    hours = time[::step] / 3600.0
+    traces = [
+        Trace("units, coldest to warmest", hours, cold[::step], "band", "accent", high=warm[::step]),
+        Trace("chamber", hours, chamber[::step], "line", "before"),
+    ]
+    marked = events[~events["kind"].isin(["reference", "soak"])]
+    if len(marked):
+        when = marked["time_s"].to_numpy(float) / 3600.0
+        texts = tuple(f"{row.kind}: {row.reason}" for row in marked.itertuples())
+        lowest = np.full(len(marked), float(np.nanmin(chamber)))
+        traces.append(Trace("events", when, lowest, role="limit", symbol="diamond", size=10.0, texts=texts))
+    own = readings.drop_duplicates("record").sort_values("start_s")
+    start = own["start_s"].to_numpy(float) / 3600.0
+    angles = (
+        Trace("outer", start, own["outer_deg"].to_numpy(float), role="x", size=4.0),
+        Trace("inner", start, own["inner_deg"].to_numpy(float), role="y", symbol="square", size=4.0),
+    )
+    span = PlotAxis("station time / h", low=0.0, high=float(max(hours[-1], start[-1])))
+    plots = (
+        Plot("temperature", span, PlotAxis("temperature / °C"), tuple(traces)),
+        Plot("table", span, PlotAxis("angle / °"), angles),
+    )
+    return Chart("Temperatures and angles over the station's time", plots, 1, height=280)

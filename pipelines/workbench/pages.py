@@ -21,6 +21,8 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from pipelines.archive import Archive
 from pipelines.drawing import Chart, csv_text, plotly_figure
+from pipelines.drawing.chart import shortened
+from pipelines.drawing.csv_rows import safe_cell
 from pipelines.drawing.picture import picture
 from pipelines.report.numbers import significant
 from pipelines.report.reasons import plain_reason
@@ -157,13 +159,8 @@ def table_csv(rows: Sequence[Mapping[str, Any]], name: str) -> Response:
     if rows:
         writer = csv.DictWriter(sink, list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({key: _cell(value) for key, value in row.items()} for row in rows)
+        writer.writerows({key: safe_cell(value) for key, value in row.items()} for row in rows)
     return Response(sink.getvalue(), media_type=PARAMETER["csv"], headers=saved_as(f"{name}.csv"))
-
-
-def _cell(value: Any) -> Any:
-    """A value that spreadsheets do not evaluate as a formula."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def run_table(bench: Workbench, run: str, name: str) -> pd.DataFrame:
@@ -211,5 +208,4 @@ def _tuple_of(values: Any) -> tuple[Any, ...]:
 
 def short(text: object, most: int = 28) -> str:
     """A long name shortened in the middle; the full name is in the title attribute."""
-    whole = str(text)
-    return whole if len(whole) <= most else f"{whole[: most - 9]}…{whole[-8:]}"
+    return shortened(str(text), most)

@@ -116,7 +116,7 @@ def test_mollweide_solves_its_equation_at_every_latitude(latitude: float) -> Non
 def test_samples_are_a_line_unless_one_beside_a_gap_would_be_hidden(
     rng: np.random.Generator, *, lost: bool, style: str
 ) -> None:
-    from pipelines.workbench.views.unit_charts import samples_chart
+    from pipelines.report.run_pictures import samples_chart
 
     values = rng.normal(size=(100, 3))
     if lost:

@@ -10,7 +10,9 @@ from starlette.responses import JSONResponse, Response
 from inertial.uncertainty.rounding import chance, equal
 from pipelines.diagnosis.inputs import use_written_formulas
 from pipelines.drawing import Chart
+from pipelines.report.diagnosis_pictures import pose_chart, quantity_chart, slot_chart
 from pipelines.report.evolution import evolution_chart
+from pipelines.report.run_pictures import samples_chart
 from pipelines.workbench.pages import (
     RequestBody,
     Workbench,
@@ -28,7 +30,6 @@ from pipelines.workbench.results import Diagnosed
 from pipelines.workbench.services import models, requests, sources
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import MissingPage
-from pipelines.workbench.views import missing_charts, unit_charts
 from schemas.errors import TumblelineError, WrongUse
 
 router = APIRouter()
@@ -59,7 +60,7 @@ def missing(request: Request) -> Response:
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),
         ladder_command=state.ladder_command(bench.settings.archive),
-        unit=_unit(diagnosed, state), against="" if diagnosed is None else missing_charts.chosen_driver(diagnosed, state),
+        unit=_unit(diagnosed, state), against="" if diagnosed is None else _quantity(diagnosed, state),
         candidates=CANDIDATES, influence=INFLUENCE, drivers=_drivers(diagnosed),
         is_file=any(one.is_file and one.name == state.source for one in chosen),
     )  # fmt: skip
@@ -122,26 +123,41 @@ def _chart(bench: Workbench, state: MissingPage, name: str) -> Chart | None:
         samples, out_unit, title = samples_of(
             bench.archive, state.source, state.dwell, partial(run_table, bench, state.source)
         )
-        return unit_charts.samples_chart(samples, title, out_unit)
+        return samples_chart(samples, title, out_unit)
     if name == "ladder":
         _, content = requests.ladder(bench.settings, state)
         rows = bench.jobs.result("ladder", content)
         return None if rows is None else evolution_chart(rows)
-    draw = {
-        "sphere": missing_charts.sphere_chart,
-        "drivers": missing_charts.driver_chart,
-        "slots": missing_charts.slot_chart,
-    }
-    if name not in draw:
+    if name not in {"sphere", "drivers", "slots"}:
         raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
     diagnosed = _diagnosed(bench, state)
-    return None if diagnosed is None else draw[name](diagnosed, state)
+    if diagnosed is None or diagnosed.table is None:
+        return None
+    table, before = diagnosed.table, diagnosed.before
+    unit = table.place_of(state.unit)
+    if name == "slots":
+        return slot_chart(table)
+    if name == "drivers":
+        return quantity_chart(table, before, _quantity(diagnosed, state), unit, state.colour)
+    models = (
+        [("after", table.residual[unit])]
+        if before is None
+        else [("before", before[unit]), ("after", table.residual[unit])]
+    )
+    return pose_chart(table.units[unit], table.axes, table.force[unit], models, partial(table.pick, unit))
+
+
+def _quantity(diagnosed: Diagnosed, state: MissingPage) -> str:
+    """The quantity of the address, else the one that the residual follows most, else force."""
+    known = {} if diagnosed.table is None else diagnosed.table.drivers
+    followed = [str(one["driver"]) for one in diagnosed.document["where"]]
+    return next((name for name in (state.against, *followed) if name in known), "force")
 
 
 def _unit(diagnosed: Diagnosed | None, state: MissingPage) -> str:
     if diagnosed is None or diagnosed.table is None:
         return state.unit
-    return diagnosed.table.units[missing_charts.chosen_unit(diagnosed.table, state)]
+    return diagnosed.table.units[diagnosed.table.place_of(state.unit)]
 
 
 def _drivers(diagnosed: Diagnosed | None) -> list[tuple[str, str]]:

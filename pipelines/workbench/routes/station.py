@@ -5,10 +5,10 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
+from pipelines.report.run_pictures import station_chart
 from pipelines.tables.frames import rows_of
 from pipelines.workbench.pages import figure, page, run_table, state_of, workbench_of
 from pipelines.workbench.state import StationPage
-from pipelines.workbench.views.station_charts import station_chart
 from schemas.errors import WrongUse
 
 router = APIRouter()

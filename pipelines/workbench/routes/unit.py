@@ -12,6 +12,7 @@ from starlette.responses import Response
 from pipelines.audit.calibrations import day_of
 from pipelines.certificates import Ledger
 from pipelines.drawing import Chart
+from pipelines.report import run_pictures
 from pipelines.report.numbers import with_uncertainty
 from pipelines.stages.figures import FIGURES
 from pipelines.tables.frames import rows_of
@@ -29,7 +30,6 @@ from pipelines.workbench.pages import (
 from pipelines.workbench.questions import history_question
 from pipelines.workbench.services.samples import samples_of
 from pipelines.workbench.state import UnitPage
-from pipelines.workbench.views import unit_charts
 from schemas.errors import WrongUse
 
 router = APIRouter()
@@ -58,7 +58,7 @@ def unit(request: Request) -> Response:
     }
     grade = next(iter(own.get("grades", [])), None)
     history = _history(bench, state.unit)
-    parameters = unit_charts.parameters_of(history)
+    parameters = list(dict.fromkeys(_parameter(row) for row in history))
     if parameters and state.parameter not in parameters:
         state = state.model_copy(update={"parameter": parameters[0]})
     place = units.index(state.unit)
@@ -92,21 +92,22 @@ def _chart(bench: Workbench, state: UnitPage, name: str) -> Chart:
         samples, out_unit, title = samples_of(
             bench.archive, state.run, state.dwell, partial(run_table, bench, state.run)
         )
-        return unit_charts.samples_chart(samples, title, out_unit)
+        return run_pictures.samples_chart(samples, title, out_unit)
     if name == "history":
-        rows = [row for row in _history(bench, state.unit) if unit_charts.parameter_of(row) == state.parameter]
+        rows = [row for row in _history(bench, state.unit) if _parameter(row) == state.parameter]
         if not rows:
             raise WrongUse(
                 f"figure: unit '{state.unit[:80]}' has no calibrations with '{state.parameter[:80]}', one at least is needed; "
                 "choose a coefficient on its page"
             )
-        return unit_charts.history_chart(rows, state.parameter, str(rows[0]["unit_text"]))
+        return run_pictures.history_chart(rows, state.parameter, str(rows[0]["unit_text"]))
     if name == "allan":
-        return unit_charts.allan_chart(_drawn(bench, state, "allan"))
+        return Chart("Allan deviation", (run_pictures.allan_plot(_drawn(bench, state, "allan")),), height=340)
     if name in {"residuals", "response"}:
         residuals, dwells = _drawn(bench, state, "residuals"), _drawn(bench, state, "dwells")
-        draw = unit_charts.residual_chart if name == "residuals" else unit_charts.response_chart
-        return draw(state, residuals, dwells)
+        if name == "response":
+            return run_pictures.response_chart(state.unit, residuals, dwells)
+        return run_pictures.residual_chart(state.unit, residuals, dwells, state.against)
     raise WrongUse(f"figure: none of this page is called '{name[:40]}'")
 
 
@@ -134,6 +135,11 @@ def _history(bench: Workbench, serial: str) -> list[dict[str, Any]]:
     answer = bench.index.of_unit(serial, history_question(serial))
     rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
     return [{**row, "day": day_of(str(row["measured"]))} for row in rows if row["measured"]]
+
+
+def _parameter(row: dict[str, Any]) -> str:
+    """The name of a coefficient: effect, name and axis."""
+    return f"{row['effect']} {row['name']} {row['axis']}"
 
 
 def _by_axis(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

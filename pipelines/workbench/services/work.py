@@ -50,7 +50,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
     from inertial.quantities import formula_names
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.examination import examination
-    from pipelines.report.residual_table import ladder_of, residual_table, residuals_of_model
+    from pipelines.report.residual_table import ladder_of, residual_table, residuals_with
     from pipelines.tables.condense import condense
     from pipelines.tables.dwell_table import covariates
 
@@ -67,7 +67,7 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
         table, ladder = residual_table(made.measured, made.diagnosis, units), ladder_of(made.diagnosis)
         if added:
             report_progress(3, steps, "fitting the model before the last step")
-            before = residuals_of_model(condense(dwells), history, model[:-1], units)
+            before = residuals_with(condense(dwells), history, model[:-1], units)
     state = made.measured.state
     known = {name: one for name, one in formula_names().items() if getattr(state, one[0]) is not None}
     names = {name: meaning for name, (_, _, meaning) in known.items() if not meaning.startswith("the same")}

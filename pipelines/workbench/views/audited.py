@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pipelines.audit.charts import control_chart, drift_chart, due_chart, series_chart, yield_chart
+from pipelines.audit.finding import AuditFinding
+from pipelines.audit.pictures import (
+    control_chart,
+    drift_chart,
+    due_chart,
+    evidence_chart,
+    series_chart,
+    yield_chart,
+)
 from pipelines.drawing import Chart
-from pipelines.workbench.views.evidence import address_of, evidence
 from schemas.errors import WrongUse
 
 MOST_CHARTS = 6
+MOST_EVIDENCE = 80  # findings with a chart of their own
 NAMES = ("since", "until", "device", "station")
 
 
@@ -45,9 +53,16 @@ def audited(request: Mapping[str, Any], tell: Callable[[int, int, str], None]) -
     for number, one in enumerate(furthest(archive_audit, MOST_CHARTS)):
         charts[f"drift-{number}"] = drift_chart(archive_audit, one)
     listed = findings(archive_audit)
+    evidence = {address_of(one): evidence_chart(archive_audit, one) for one in listed[:MOST_EVIDENCE]}
     return {
         "document": document(archive_audit, listed, request["archive"]),
         "charts": charts,
-        "evidence": evidence(archive_audit, listed),
+        "evidence": {name: chart for name, chart in evidence.items() if chart is not None},
         "addresses": [address_of(one) for one in listed],
     }
+
+
+def address_of(finding: AuditFinding) -> str:
+    """A name of a finding that stays the same as long as the finding does."""
+    words = (finding.kind, finding.subject, str(finding.evidence.get("parameter", finding.evidence.get("figure", ""))))
+    return ".".join(word for word in words if word)[:180]

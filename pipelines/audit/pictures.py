@@ -1,0 +1,176 @@
+"""Charts of the audit: yield, calibrations due, control charts, quantities of stations and units over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from inertial.counts import number_of
+from pipelines.audit.audit import Audit
+from pipelines.audit.drifts import OWN
+from pipelines.audit.finding import AuditFinding
+from pipelines.audit.pairs import YEAR_D
+from pipelines.audit.parameters import NAMES, unit_text
+from pipelines.audit.stations_over_time import ControlChart, StationSeries
+from pipelines.audit.unit_drifts import UnitDrift
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace
+from pipelines.drawing.chart import Role, Symbol, between, level
+
+MONTHS = 24
+MOST_POINTS = 1500
+MOST_FORECAST_Y = 6.0
+UNIT_ROLES: tuple[Role, Role] = ("x", "y")
+SIGNALS: tuple[tuple[str, Role, Symbol, float], ...] = (
+    ("check standard", "ink", "circle", 6.0),
+    ("signal", "limit", "diamond", 9.0),
+)
+
+
+def yield_chart(months: list[Any]) -> Chart:
+    """Yield month by month with its exact 95 % interval."""
+    day = np.array([np.datetime64(f"{month.name}-15", "D").astype(float) for month in months])
+    low, value, high = (
+        100.0 * np.array([getattr(m.interval, side) for m in months]) for side in ("low", "value", "high")
+    )
+    texts = tuple(f"{m.name}: {v:.1f} % of {m.total}" for m, v in zip(months, value, strict=True))
+    traces = (
+        Trace("95 % interval", day, low, "band", "accent", high=high),
+        Trace("yield", day, value, size=7.0, texts=texts),
+    )
+    least = max(0.0, float(np.floor(np.percentile(low, 10))) - 1.0)
+    plot = Plot("", PlotAxis("month", dates=True), PlotAxis("yield / %", low=least, high=100.4), traces)
+    return Chart("Yield by month", (plot,), height=260)
+
+
+def due_chart(audit: Audit) -> Chart:
+    """Units due, by month over the next two years."""
+    months = (audit.due.day - audit.scope.until) / (YEAR_D / 12.0)
+    ahead = np.bincount(np.floor(months[(months >= 0.0) & (months < MONTHS)]).astype(int), minlength=MONTHS)
+    late = int(np.count_nonzero(months < 0.0))
+    bars = Trace("units due", np.arange(MONTHS, dtype=np.float64) + 0.5, ahead.astype(float), "bars")
+    more = f" ({number_of(late, 'overdue unit')} not shown)" if late else ""
+    most = max(1.05 * float(ahead.max()), 1.0)
+    axes = (
+        PlotAxis(f"months ahead{more}", step=3.0),
+        PlotAxis("units due", low=0.0, high=most, step=1.0 if most < 8.0 else None),
+    )
+    return Chart("Re-calibrations due", (Plot("", *axes, (bars,)),), height=260)
+
+
+def control_chart(one: ControlChart) -> Chart:
+    """A control chart: values within 1, 2 and 3 σ, the moving average, and the signals."""
+    hit = one.rules.any(axis=0) | one.outside
+    centre, sigma = one.chart.centre, one.chart.sigma
+    traces = [
+        between(one.day, centre - width * sigma, centre + width * sigma, f"± {width} σ", legend=False)
+        for width in (3, 2, 1)
+    ]
+    traces.append(Trace("moving average", one.day, one.average, "line", "before"))
+    texts = np.array([f"{run}: {value:.5g}" for run, value in zip(one.run, one.value, strict=True)], dtype=object)
+    for rows, (name, role, symbol, size) in zip((~hit, hit), SIGNALS, strict=True):
+        told = tuple(texts[rows])
+        traces.append(Trace(name, one.day[rows], one.value[rows], "points", role, symbol, size, texts=told))
+    alarms = f"{number_of(one.alarms, 'alarm')}, {one.expected:.1f} expected by chance"
+    title = f"{one.station}: {one.standard}, {one.parameter}: {alarms}"
+    plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(f"{one.parameter} / {one.unit_text}"), tuple(traces))
+    return Chart(f"Control chart of {one.standard} on {one.station}", (plot,), height=280)
+
+
+def series_chart(one: StationSeries) -> Chart:
+    """A quantity of a station over time, its level between changes, and the days of these with their intervals."""
+    low, high = np.percentile(one.value, (0.5, 99.5))  # a single outlier leaves room for the rest
+    room = 0.25 * (high - low) + 1e-9
+    low, high = float(low - room), float(high + room)
+    edges = [0, *(change.first for change in one.changes), one.day.size]
+    thin = slice(None, None, 1 + one.day.size // MOST_POINTS)
+    runs = tuple(str(run) for run in one.run[thin])
+    traces = [Trace("runs", one.day[thin], one.value[thin], role="muted", size=4.0, texts=runs)]
+    for start, stop in pairwise(edges):
+        between_changes = one.day[[start, stop - 1]]
+        traces.append(level(between_changes, one.value[start:stop].mean(), "accent", "level", dashed=False))
+    for change in one.changes:
+        when = one.day[[max(change.low - 1, 0), min(change.high, one.day.size - 1)]]
+        traces.append(between(when, low, high, "interval of the change", "limit"))
+        day = np.full(2, one.day[change.first])
+        traces.append(Trace("change", day, np.array([low, high]), "line", "limit", dashed=True))
+    title = f"{one.station}: {one.where}, {one.parameter}"
+    label = f"{one.parameter} / {one.unit_text}" if one.unit_text else one.parameter
+    plot = Plot(title, PlotAxis("date", dates=True), PlotAxis(label, low=low, high=high), tuple(traces))
+    return Chart(title, (plot,), height=260)
+
+
+def drift_chart(audit: Audit, one: UnitDrift) -> Chart:
+    """The history of a unit's parameter, the tolerance about the last calibration, and the drift until it leaves that."""
+    rows = np.flatnonzero(audit.good & (audit.all.unit == one.unit) & (audit.all.device == one.device))
+    day, value, error = audit.all.day[rows], audit.all.column(one.parameter)[rows], audit.all.error(one.parameter)[rows]
+    end = day[-1] + YEAR_D * min(MOST_FORECAST_Y, 1.1 * _years_to(one))
+    ahead = np.array([day[-1], end])
+    texts = tuple(str(run) for run in audit.all.run[rows])
+    traces = [Trace("calibrations, k = 2", day, value, error=2.0 * error, texts=texts)]
+    last = float(value[-1])
+    if np.isfinite(one.slope):
+        traces.append(Trace("drift", ahead, last + one.slope * (ahead - day[-1]) / YEAR_D, "line", "before"))
+    if np.isfinite(one.tolerance):
+        low, high = last - one.tolerance, last + one.tolerance
+        traces += [level(ahead, edge, "limit", "tolerance") for edge in (low, high)]
+        if np.isfinite(one.leaves):
+            window = np.array([max(one.soonest, day[-1]), min(one.latest, end)])
+            traces.append(between(window, low, high, "leaves its tolerance", "before"))
+    label = f"{one.parameter} / {unit_text(one.parameter)}"
+    plot = Plot(f"{one.unit}: {one.parameter}", PlotAxis("date", dates=True), PlotAxis(label), tuple(traces))
+    return Chart(f"Drift of {one.unit}: {one.parameter}, E_n {one.e_n:.2f}", (plot,), height=260)
+
+
+def _years_to(drift: UnitDrift) -> float:
+    end = drift.latest if np.isfinite(drift.latest) else drift.leaves
+    return max(1.0, (end - drift.day) / YEAR_D) if np.isfinite(end) else MOST_FORECAST_Y
+
+
+def evidence_chart(audit: Audit, finding: AuditFinding) -> Chart | None:
+    """The values that a finding is drawn from; None where it has no series of values."""
+    numbers = finding.evidence
+    parameter = str(numbers.get("parameter", ""))
+    if finding.who == "station" and "where" in numbers:
+        same = (str(numbers["station"]), str(numbers["where"]), parameter)
+        series = (one for one in (*audit.stations, *audit.slots) if (one.station, one.where, one.parameter) == same)
+        return next((series_chart(one) for one in series), None)
+    if "standard" in numbers:
+        same = (str(numbers["station"]), str(numbers["standard"]), parameter)
+        charts = (one for one in audit.charts if (one.station, one.standard, one.parameter) == same)
+        return next((control_chart(one) for one in charts), None)
+    if not finding.units or len(finding.units) > len(UNIT_ROLES) or "run" not in numbers:
+        return None
+    drifts = [d for own in audit.units.values() for d in own if d.unit == finding.units[0] and d.parameter == parameter]
+    if drifts:
+        return drift_chart(audit, drifts[0])
+    return _histories(audit, finding.units, parameter or _furthest(audit, finding.units), str(numbers["run"]))
+
+
+def _furthest(audit: Audit, units: Sequence[str]) -> str:
+    """The parameter in which a unit's calibrations are most scattered relative to their errors."""
+    rows = audit.all.unit == units[0]
+    own = [NAMES.index(name) for name in OWN]
+    values, errors = audit.all.values[rows][:, own], audit.all.errors[rows][:, own]
+    spread = np.nan_to_num(np.ptp(values, axis=0) / np.nanmax(errors, axis=0))
+    return OWN[int(np.argmax(spread))]
+
+
+def _histories(audit: Audit, units: Sequence[str], parameter: str, run: str) -> Chart:
+    """Calibrations of one or two units before all others of their kind, with those of the run of the finding marked."""
+    own = audit.all
+    value, error, text = own.column(parameter), 2.0 * own.error(parameter), unit_text(parameter)
+    kind = own.device == own.device[own.unit == units[0]][0]
+    others, marked = kind & ~np.isin(own.unit, units), np.isin(own.unit, units) & (own.run == run)
+    traces = [Trace("other units of the kind", own.day[others], value[others], role="muted", size=3.5)]
+    for name, role in zip(units, UNIT_ROLES, strict=False):
+        rows = np.flatnonzero((own.unit == name) & kind)
+        day, shown = own.day[rows], value[rows]
+        texts = tuple(f"{name}, run {own.run[row]}: {value[row]:.5g} {text}" for row in rows)
+        traces.append(Trace(f"{name} line", day, shown, "line", role, legend=False))
+        traces.append(Trace(name, day, shown, role=role, size=7.0, error=error[rows], texts=texts))
+    traces.append(Trace(f"run {run}", own.day[marked], value[marked], role="limit", symbol="diamond", size=11.0))
+    plot = Plot("", PlotAxis("date of measurement", dates=True), PlotAxis(f"{parameter} / {text}"), tuple(traces))
+    return Chart(f"{parameter} of {' and '.join(units)}, k = 2", (plot,), height=280)
