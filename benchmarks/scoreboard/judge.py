@@ -159,7 +159,8 @@ def strangers(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
     from pipelines.diagnosis.diagnose import diagnose
 
     def judged(bed: str, name: str, seed: int) -> Outcome:
-        lot = kept(lots, f"{name} {seed}", lambda: make(name, seed))
+        size = 20.0 if bed == "faults" else 2.0  # handling shifts by microradians at twice the noise of a dwell
+        lot = kept(lots, f"{name} {seed} {size}", lambda: make(name, seed, size=size))
         document = diagnose(lot.dwells, lot.history)
         physics = [set(g["effects"]) for g in document["classes"] if g.get("scope") != "data"]
         named, inadequate = bool(physics), document["adequate"] is False
