@@ -187,29 +187,3 @@ def _minimax(x: Array, y: Array) -> Array:
             low = one
     left = y - 0.5 * (low + high) * x
     return np.asarray(left - 0.5 * (left.max() + left.min()))
-
-
-def scale_from_two_radii(
-    slopes: tuple[float, float], slope_errors: tuple[float, float], distance_m: float, distance_error_m: float
-) -> tuple[float, float]:
-    """Sensitivity in output per g and its standard uncertainty, from the slopes against ω² at two mounts a known distance apart.
-
-    S = Δ(slope)·g_n/Δr: at one radius, radius and sensitivity are one parameter.
-
-    Parameters
-    ----------
-    slopes, slope_errors : output per (rad/s)², the larger radius second
-    """
-    value = (slopes[1] - slopes[0]) * STANDARD_GRAVITY / distance_m
-    relative = np.hypot(np.hypot(*slope_errors) / (slopes[1] - slopes[0]), distance_error_m / distance_m)
-    return value, float(abs(value) * relative)
-
-
-def lever_arm(rate_deg_s: float, radius_m: float) -> float:
-    """Specific force in g of a point that turns at a radius: ω²r/g_n."""
-    return float(np.radians(rate_deg_s) ** 2 * radius_m / STANDARD_GRAVITY)
-
-
-def earth_rate_share(rate_rad_s: float, latitude_deg: float) -> float:
-    """Relative error of the acceleration where the rate is measured against the Earth: 2Ω sin φ/ω."""
-    return float(2.0 * EARTH_RATE * np.sin(np.radians(latitude_deg)) / rate_rad_s)

@@ -11,8 +11,6 @@ from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-HALF_POWER_DAMPING = float(np.sin(np.pi / 8.0))
-"""0.3827: above it the lower half-power frequency does not exist."""
 
 
 def transfer(frequency: ArrayLike, natural_hz: float, damping: float) -> Complex:
@@ -39,28 +37,11 @@ def bandwidth(natural_hz: float, damping: float, level: float = 0.5) -> float:
     return natural_hz * float(np.sqrt(q + np.sqrt(q**2 - 1.0 + 1.0 / level)))
 
 
-def flat_band(natural_hz: float, damping: float, share: float = 0.05) -> float:
-    """Frequency in Hz up to which |H| stays within ± ``share`` of its static value."""
-    q = 1.0 - 2.0 * damping**2
-    ends = [bandwidth(natural_hz, damping, (1.0 - share) ** 2)]
-    square = q**2 - 1.0 + (1.0 + share) ** -2  # of the ends of the part above 1 + share, where the peak reaches it
-    if q > 0.0 and square >= 0.0:
-        ends.append(natural_hz * float(np.sqrt(q - np.sqrt(square))))
-    return min(ends)
-
-
 def peak(damping: float) -> tuple[float, float]:
     """Height of the resonance over the static gain and its place f/f_n; 1 and 0 where there is none (ζ ≥ 0.7071)."""
     if damping >= np.sqrt(0.5):
         return 1.0, 0.0
     return float(0.5 / (damping * np.sqrt(1.0 - damping**2))), float(np.sqrt(1.0 - 2.0 * damping**2))
-
-
-def group_delay(frequency: ArrayLike, natural_hz: float, damping: float) -> Array:
-    """Group delay in s: (2ζ/ω_n)(1 + r²)/((1 − r²)² + 4ζ²r²)."""
-    r2 = (np.asarray(frequency, dtype=np.float64) / natural_hz) ** 2
-    at_rest = 2.0 * damping / (2.0 * np.pi * natural_hz)
-    return np.asarray(at_rest * (1.0 + r2) / ((1.0 - r2) ** 2 + 4.0 * damping**2 * r2))
 
 
 def damping_from_half_power(lower_hz: float, upper_hz: float) -> float:

@@ -180,8 +180,3 @@ def bias_model(
     b = np.asarray(instability, dtype=np.float64)
     n, k, start = (np.broadcast_to(np.asarray(v, dtype=np.float64), b.shape) for v in (white, walk, turn_on))
     return BiasModel(n, b[:, None] * flicker.sd, flicker.correlation_s, k, start)
-
-
-def from_maximum(tau_s: float, deviation: float) -> tuple[float, float]:
-    """T (s) and standard deviation of one process from the maximum of its Allan deviation: T = τ/1.893, s = σ/0.617."""
-    return tau_s / AT_MAXIMUM, deviation / PEAK

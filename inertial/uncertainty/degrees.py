@@ -39,8 +39,3 @@ def coverage_factor(dof: float, probability: float = PROBABILITY) -> float:
     if not dof < _LARGEST:
         return float(ndtri(0.5 * (1.0 + probability)))
     return float(stdtrit(max(int(dof), 1), 0.5 * (1.0 + probability)))
-
-
-def from_reliability(relative: float) -> float:
-    """Degrees of freedom of a standard uncertainty that is known within so large a share: ½·(Δu/u)⁻² (JCGM 100, G.3)."""
-    return 0.5 / relative**2

@@ -131,28 +131,6 @@ def guard_factor(allowed: float) -> float:
     return float(-ndtri(allowed))
 
 
-def acceptance_for(allowed: float, process: float, u: float, tolerance: float) -> float:
-    """Largest acceptance limit over tolerance, at most 1, with a global PFA of a centred production of at most ``allowed``."""
-
-    def pfa(share: float) -> float:
-        a = share * tolerance
-        return global_risk(0.0, process, u, (-tolerance, tolerance), (-a, a)).pfa
-
-    if pfa(1.0) <= allowed:
-        return 1.0
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if pfa(middle) <= allowed else (low, middle)
-    return low
-
-
-def of_several(pfa: list[float], accepted: list[float]) -> tuple[float, float]:
-    """PFA and probability of acceptance of a unit with several independent figures: Π a_i − Π (a_i − PFA_i)."""
-    whole = float(np.prod(accepted))
-    return whole - float(np.prod(np.array(accepted) - np.array(pfa))), whole
-
-
 def process_deviation(values: list[float], independent: float) -> float:
     """σ_p of a production by the scatter of its values: σ_p² = s² − u², of uncertainties that are not common to the lot."""
     if len(values) < 2:

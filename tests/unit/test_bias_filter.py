@@ -15,7 +15,6 @@ from inertial.noise.gauss_markov import (
     allan_variance,
     bias_model,
     flicker_terms,
-    from_maximum,
 )
 
 
@@ -48,7 +47,6 @@ def test_the_allan_deviation_of_a_process_has_its_maximum_where_the_literature_h
     assert allan_variance(short, 1.0) == pytest.approx(2.0 * short / 3.0, rel=1e-3)  # a walk with K² = 2/T
     assert allan_variance(long, 1.0) == pytest.approx(2.0 / long, rel=1e-3)  # white with N² = 2T
     assert allan_variance(np.array([9.99e-4, 1.001e-3]), 1.0) == pytest.approx(2.0 / 3e3, rel=3e-3)
-    assert from_maximum(189.27, 6.1741) == pytest.approx((100.0, 10.0), rel=1e-4)
 
 
 def test_the_allan_deviation_of_a_process_is_that_of_a_simulated_one(rng: np.random.Generator) -> None:

@@ -203,11 +203,6 @@ def _within(interval: Sequence[float] | None) -> str:
     return f" ({short(interval[0])} to {short(interval[1])})" if interval else ""
 
 
-def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:
-    """The member of a class that is recommended."""
-    return next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
-
-
 def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
     """The command that judges the model with the suggested formula, without a model file."""
     offer = document["offer"]
