@@ -11,8 +11,6 @@ Array = NDArray[np.float64]
 AT_MAXIMUM = 1.8927
 """Averaging time over T at which the Allan deviation of one process is largest."""
 
-PEAK = 0.61741
-"""Largest Allan deviation of one process over its standard deviation."""
 
 FLICKER_VARIANCE = 2.0 * np.log(2.0) / np.pi
 """Allan variance of flicker noise with B = 1: IEEE Std 952-1997, C.1.1.3."""

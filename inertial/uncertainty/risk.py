@@ -36,40 +36,6 @@ def outside(value: float, u: float, lower: float, upper: float) -> float:
     return float(ndtr((lower - value) / u) + ndtr((value - upper) / u))
 
 
-def posterior(value: float, u: float, mean: float, process: float) -> tuple[float, float]:
-    """Mean and standard deviation of a quantity after its measurement, with a prior N(mean, process²) (JCGM 106, A.4.4)."""
-    precision = 1.0 / u**2 + 1.0 / process**2
-    return (value / u**2 + mean / process**2) / precision, precision**-0.5
-
-
-def global_risk(
-    mean: float, process: float, u: float, limits: tuple[float, float], accepted: tuple[float, float]
-) -> GlobalRisk:
-    """Risks over a production (JCGM 106, 9.3), by quadrature over the true values.
-
-    Parameters
-    ----------
-    mean, process : of the units' true values; u : standard uncertainty of a measurement
-    limits, accepted : lower and upper tolerance limit, and acceptance limit
-    """
-    lower, upper = limits
-    inside = float(ndtr((upper - mean) / process) - ndtr((lower - mean) / process))
-    whole = float(np.hypot(process, u))
-    taken = float(ndtr((accepted[1] - mean) / whole) - ndtr((accepted[0] - mean) / whole))
-    if not u > 0.0:
-        low, high = max(lower, accepted[0]), min(upper, accepted[1])
-        good = max(float(ndtr((high - mean) / process) - ndtr((low - mean) / process)), 0.0)
-    else:
-        good = _both(mean, process, u, limits, accepted)
-    return GlobalRisk(max(taken - good, 0.0), max(inside - good, 0.0), taken, inside)
-
-
-def _both(mean: float, process: float, u: float, limits: tuple[float, float], accepted: tuple[float, float]) -> float:
-    """Probability that a unit conforms and is accepted."""
-    z, weight = _nodes(mean, process, [(limits, 0.0), (accepted, u)])
-    return float(weight @ (_between(z, limits, 0.0) * _between(z, accepted, u)))
-
-
 def lot_risk(
     mean: float,
     process: float,
@@ -119,11 +85,6 @@ def _between(z: Array, ends: tuple[float, float], width: float) -> Array:
     if not width > 0.0:
         return np.asarray((ends[0] <= z) & (z <= ends[1]), dtype=np.float64)
     return np.asarray(ndtr((ends[1] - z) / width) - ndtr((ends[0] - z) / width), dtype=np.float64)
-
-
-def process_for(in_tolerance: float, tolerance: float) -> float:
-    """Standard deviation of a centred production of which so large a share lies within ± tolerance."""
-    return tolerance / float(ndtri(0.5 * (1.0 + in_tolerance)))
 
 
 def guard_factor(allowed: float) -> float:
