@@ -15,7 +15,7 @@ from pipelines.cli.options import (
     TimeColumnOption,
     console,
     error_console,
-    print_json,
+    give,
     short,
 )
 
@@ -111,10 +111,7 @@ def command(
     if output is not None:
         _write(recording, done, output)
     document = _document(recording, fit, done, None if printed else output)
-    if as_json:
-        print_json(document)
-    else:
-        _print(document, error_console() if printed else console())
+    give(document, lambda _: _print(document, error_console() if printed else console()), as_json=as_json)
     consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
     raise typer.Exit(DONE if consistent else PART_FAILED)
 
@@ -242,7 +239,7 @@ def _many(rejected: int, used: int) -> bool:
 
 def _print(document: dict[str, Any], out: Console) -> None:
     def line(text: str, style: str = "") -> None:
-        out.print(text, style=style or None, soft_wrap=True)
+        out.print(text, style=style or None)
 
     def axes(values: dict[str, float]) -> str:
         return ", ".join(f"{axis} {short(value)}" for axis, value in values.items())

@@ -32,7 +32,7 @@ def print_evidence(document: dict[str, Any]) -> None:
     evidence, out = document.get("evidence"), console()
     if not evidence:
         return
-    out.print(evidence_text(document), style="dim", soft_wrap=True)
+    out.print(evidence_text(document), style="dim")
     if document["adequate"] and evidence["degrees_of_freedom"] < FEW_DOF:
         smallest = evidence["smallest_cubic_ug"]
         seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"

@@ -20,7 +20,7 @@ from pipelines.cli.options import (
     JsonOption,
     LeaveOutOption,
     error_console,
-    print_json,
+    give,
 )
 from pipelines.improvement.improvement import ImprovedTables, Improvement
 from schemas.errors import DONE, PART_FAILED, WrongUse
@@ -106,10 +106,7 @@ def command(
     document = improvement.run(judged, _names(choose), yes=yes)
     find = partial(judged_data, data, beside, archive)
     document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
-    if as_json:
-        print_json(document)
-    else:
-        print_improvement(document)
+    give(document, print_improvement, as_json=as_json)
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
 
 

@@ -32,7 +32,7 @@ def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
     fresh = fresh_run_of(store, run)
     if fresh is not None:
         text = f"fresh run: {fresh.id}, the same units measured again"
-        error_console().print(text, soft_wrap=True)
+        error_console().print(text)
         return fresh.id
     if measure is False or not repeatable(run):
         return ""

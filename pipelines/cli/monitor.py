@@ -83,7 +83,7 @@ def command(
         print_json(document)
     else:
         for problem in document["problems"]:
-            console().print(problem, soft_wrap=True)
+            console().print(problem)
         console().print("healthy" if document["ok"] else f"{len(document['problems'])} problems")
     raise typer.Exit(DONE if document["ok"] else PART_FAILED)
 

@@ -147,11 +147,11 @@ def print_extension(out: Console, document: dict[str, Any], find: FindData, mode
     file = model or free_name()
     new = not (model and model.exists())
     if data.refusal is not None and (why := data.refusal([*document["effects"], *document["recommended"]])):
-        out.print(why, style="yellow", soft_wrap=True)
+        out.print(why, style="yellow")
     print_next(out, extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
         its_own = " and its temperatures with --fresh-history" if data.history else ""
-        out.print(MEASURE_AGAIN.format(history=its_own), style="dim", soft_wrap=True)
+        out.print(MEASURE_AGAIN.format(history=its_own), style="dim")
 
 
 def free_name() -> str:

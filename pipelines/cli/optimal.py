@@ -205,7 +205,7 @@ def print_optimum(document: dict[str, Any]) -> None:
     ]
     print_table(["station time, min", "new recipe", document["from"], "textbook plan"], parts)
     for line in _comparison(document):
-        out.print(line, soft_wrap=True)
+        out.print(line)
     if document["rivals"]:
         lines = [[r["true"], r["wrong"], short(r["chi_square"]), short(r["textbook"])] for r in document["rivals"]]
         print_table(["true effect", "fitted effect", "χ², new recipe", "χ², textbook plan"], lines, whole=2)

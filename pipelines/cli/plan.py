@@ -15,6 +15,7 @@ from pipelines.cli.options import (
     RecipeArgument,
     StationOption,
     error_console,
+    give,
     print_json,
 )
 from pipelines.cli.plan_files import save, write_page, write_pictures
@@ -135,10 +136,7 @@ def command(
         document["page"] = str(page)
     if pictures is not None:
         write_pictures(pictures, document, context)
-    if as_json:
-        print_json(document)
-    else:
-        print_plan(document)
+    give(document, print_plan, as_json=as_json)
     stated = document.get("uncertainty")
     if stated is not None and stated["unreachable"]:
         raise typer.Exit(PART_FAILED)

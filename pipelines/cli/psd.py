@@ -20,7 +20,7 @@ from pipelines.cli.options import (
     TimeUnitOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
     short,
 )
@@ -77,10 +77,7 @@ def command(
     with error_console().status("averaging"):
         document = psd_document(series, segment)
     write_pictures(document, plot, page)
-    if as_json:
-        print_json(document)
-    else:
-        _print(document)
+    give(document, _print, as_json=as_json)
 
 
 def psd_document(series: EvenSeries, segment: int | None = None) -> dict[str, Any]:

@@ -92,7 +92,7 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     if document["units"]:
         print_summary(document)
     else:
-        console().print(_unfinished(run), soft_wrap=True)
+        console().print(_unfinished(run))
     console().print(f"tables  {', '.join(tables)}")
 
 

@@ -18,7 +18,7 @@ from pipelines.cli.options import (
     WorkersOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
     short,
 )
@@ -65,10 +65,7 @@ def command(
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
     document = _evaluated(store, runs, change, dask, workers)
-    if as_json:
-        print_json({"archive": str(store.root), **document})
-    else:
-        _print(document)
+    give({"archive": str(store.root), **document}, lambda _: _print(document), as_json=as_json)
     raise typer.Exit(0 if document["verdict"] == BETTER else 1)
 
 

@@ -31,7 +31,7 @@ def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: P
     model : the model file as it was given there
     """
     out = console()
-    out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
+    out.print(verdict(document), style=STYLE_OF[document["adequate"]])
     print_evidence(document)
     print_findings(document)
     _unexplained(out, document, data, model)
@@ -84,13 +84,13 @@ def _dwells(document: dict[str, Any]) -> None:
             without = group["without_influence"]
             if without:
                 text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
-            out.print(text, style="dim", soft_wrap=True)
+            out.print(text, style="dim")
     if not document["classes"] and document["influence"]:
         text = f"largest residuals, share of all: {_carried(document['influence'])}"
         without = document.get("without_influence")
         if without:
             text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
-        out.print(text, style="dim", soft_wrap=True)
+        out.print(text, style="dim")
 
 
 def _carried(rows: list[dict[str, Any]]) -> str:
@@ -164,7 +164,7 @@ def _classes(document: dict[str, Any]) -> None:
         legend += " · in brackets: 68 % interval"
     console().print(legend, style="dim")
     for line in why_not_recommended(document):
-        console().print(line, soft_wrap=True)
+        console().print(line)
 
 
 def why_not_recommended(document: dict[str, Any]) -> list[str]:
@@ -221,7 +221,7 @@ def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, 
     )
     if document["offer"]:
         out.print(f"Formula for {model or 'a model file'}, to be refined:\n")
-        out.print(document["offer"]["toml"], soft_wrap=True)
+        out.print(document["offer"]["toml"])
         if data is not None:
             print_next(out, [_with_formula(document, data())])
 

@@ -82,7 +82,7 @@ def print_adequacy(verdict: AdequacyDocument | None) -> None:
         return
     faulty = f"; left out because of a data fault: {', '.join(verdict['faulty'])}" if verdict["faulty"] else ""
     text = f"model   {plain_verdict(verdict)}{faulty}"
-    console().print(text, style=STYLE_OF[verdict["adequate"]], soft_wrap=True)
+    console().print(text, style=STYLE_OF[verdict["adequate"]])
 
 
 def print_references(judged: ReferencesDocument | None) -> None:
