@@ -76,7 +76,7 @@ def command(
     of the output without its mean: the error of a velocity, in m/s for an output in g.
     """
     from pipelines.archive import Archive
-    from pipelines.cli.allan_documents import allan_document, allan_of_run, statistic_of_run
+    from pipelines.chain.noise_documents import allan_document, allan_of_run, statistic_of_run
     from pipelines.cli.series_options import even_series, write_pictures
 
     if spacing not in SPACINGS:
