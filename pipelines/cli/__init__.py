@@ -6,7 +6,7 @@ import errno
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from inspect import cleandoc
 from itertools import pairwise
@@ -17,7 +17,6 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from inertial.errors import InertialError
-from pipelines.cli.given_texts import take_texts_as_given
 from schemas.errors import DONE, UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.log_lines import VARIABLE as LOG
@@ -25,7 +24,7 @@ from schemas.log_lines import tell
 from schemas.own_files import report_to
 
 if TYPE_CHECKING:
-    from typer._click import Command, Context
+    from typer._click import Command, Context, Parameter
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 PIPE_CLOSED = 141  # the exit status that shells use for a reader that closed the pipe
@@ -285,3 +284,42 @@ def _leave(message: str, status: int) -> None:
     sys.stdout.flush()
     tell(message, level="error", status=status)
     sys.exit(status)
+
+
+class _AsGiven:
+    """The conversion of one parameter; ``convert`` makes that of typer, for the values that need it."""
+
+    def __init__(self, convert: Callable[[], Any], *, text: bool) -> None:
+        self._convert, self._text = convert, text
+
+    def coerce(self, value: Any, param: Any, ctx: Context) -> Any:
+        """The value of a parameter as its command receives it."""
+        several = param.multiple or param.nargs == -1
+        if value is None:
+            return () if several else None
+        if self._text and not several and isinstance(value, str):
+            return value
+        return self._convert().coerce(value, param=param, ctx=ctx)
+
+
+def take_texts_as_given(command: Command) -> None:
+    """Let texts, and parameters that are not given, pass without the validators of typer, where it has them."""
+    stated = command.get_params  # typer adds the option of help when a context asks for it
+
+    def parameters(ctx: Context) -> list[Parameter]:
+        found = stated(ctx)
+        for one in found:
+            _take_as_given(one)
+        return found
+
+    setattr(command, "get_params", parameters)  # noqa: B010 - a method of the class
+
+
+def _take_as_given(parameter: Parameter) -> None:
+    described = getattr(parameter, "type_descriptor", None)
+    convert = getattr(parameter, "get_runtime_param", None)
+    if described is None or convert is None or "get_runtime_param" in vars(parameter):
+        return
+    text = described.annotation is str and described.parameter_info.parser is None
+    own = _AsGiven(convert, text=text)
+    setattr(parameter, "get_runtime_param", lambda: own)  # noqa: B010 - a method of the class

@@ -62,8 +62,6 @@ def check_certificates(
 
 def _archive(name: str | None) -> Archive | None:
     """The archive that is given, or the usual one where there is one."""
-    from pipelines.archive import Archive
-
     if name is None and not os.environ.get("TUMBLELINE_ARCHIVE") and not Path("archive").is_dir():
         return None
     archive = Archive(name)

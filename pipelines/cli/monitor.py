@@ -69,7 +69,6 @@ def command(
         raise WrongUse("monitor: --webhook posts while the service runs, --serve is needed; give it too")
     monitor = Monitor(Archive(archive), days, free_gb, tuple(queue or ()))
     if serve:
-        from pipelines.monitoring.alerts import Poster
         from stations.safety.folder import state_folder
 
         _serve(monitor, host, port, Poster(address, state_folder()) if address else None, audits)

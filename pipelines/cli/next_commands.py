@@ -156,8 +156,6 @@ def print_extension(out: Console, document: dict[str, Any], find: FindData, mode
 
 def free_name() -> str:
     """A name for a new model file; an existing file belongs to another model."""
-    from pathlib import Path
-
     names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
     return next(name for name in names if not Path(name).exists())
 

@@ -63,7 +63,6 @@ def command(
     Old runs are never overwritten: a changed result is a new run. After an interruption, give the same command again to continue.
     Exit status 1: a run could not be re-analysed, or with --check was not reproduced.
     """
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import change_from_options
     from pipelines.parallel import processors
     from pipelines.rerun.selection import selected

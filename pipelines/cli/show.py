@@ -53,8 +53,6 @@ def command(
 
     Exit status 1: no calibration of the unit is valid on that date.
     """
-    from pipelines.archive import Archive
-
     store = Archive(archive)
     if at or known or _is_unit(store, run):
         from pipelines.cli.validity import show_validity

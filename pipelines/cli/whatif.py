@@ -56,7 +56,6 @@ def command(
     The lots are fitted, verified and graded in memory; only the result is stored, as evidence for 'tumbleline release'. Exit
     status 1: the model is not better.
     """
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.selection import selected
     from pipelines.rerun.whatif import BETTER

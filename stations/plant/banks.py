@@ -5,14 +5,13 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, Protocol
 
 from schemas.profile import Profile
 from schemas.station_devices import Device, Devices
 from stations.codec import NotEncodable, Value
 from stations.plant import families
 from stations.plant.bank import Bank, Busy, number
-from stations.plant.line_device import LineDevice
 from stations.plant.memory_bank import MemoryBank
 from stations.plant.table import Axis
 from stations.plant.world import World
@@ -144,3 +143,11 @@ def _module(profile: Profile) -> Any:
             f"stations/plant/families/{profile.adapter}.py with a function 'simulated'"
         )
     return import_module(f"{families.__name__}.{profile.adapter}")
+
+
+class LineDevice(Protocol):
+    """A device that answers lines of text."""
+
+    def answer(self, line: str) -> tuple[str, bool]:
+        """The answer to a line, and whether the line changed anything."""
+        ...

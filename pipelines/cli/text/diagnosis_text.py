@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inertial.uncertainty.rounding import chance, equal
-from pipelines.cli.evidence_text import print_evidence
 from pipelines.cli.next_commands import FindData, JudgedData, command_line, print_extension, print_next
 from pipelines.cli.options import console, print_table, short, short_values
-from pipelines.cli.text.verdict_text import STYLE_OF, verdict
+from pipelines.cli.text.verdict_text import STYLE_OF, print_evidence, verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
