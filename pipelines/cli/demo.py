@@ -210,7 +210,7 @@ class _Game:
             self._one_of_a_class(document, named)
         elif self.hidden.effect in document["unseen"]:
             text = f"The diagnosis named {named}, and listed {self.hidden.effect} as not visible under this plan."
-            out.print(text, style="bold yellow")
+            out.print(text, style="bold yellow", soft_wrap=True)
         else:
             out.print(f"The diagnosis named {named}. Not found.", style="bold red")
         lines = [
@@ -234,7 +234,7 @@ class _Game:
             else "nothing of its class was added"
         )
         text = f"The diagnosis named {named}. Found in a class, not separated: {what}; these data fit equally well with {others}."
-        out.print(text, style="bold yellow")
+        out.print(text, style="bold yellow", soft_wrap=True)
         rows = [row for row in document["next_measurements"] if set(row["why"].split(":")[0].split(" | ")) & set(group)]
         if not rows:
             out.print(
@@ -244,7 +244,7 @@ class _Game:
             out.print("The measurement that separates them:")
             measurements_table(rows, out)
         else:
-            out.print(rows[0]["why"])
+            out.print(rows[0]["why"], soft_wrap=True)
 
     def _step(self, title: str, line: str) -> None:
         if self.asks:

@@ -34,10 +34,10 @@ def measurements_table(proposed: list[dict[str, Any]], out: Console | None = Non
         columns = ["outer\n°", "inner\n°", "chamber\n°C", "wait\ns", "times", "purpose"]
         print_table(columns, lines, title="Measure next, in this order", out=out)
     for row in {p["why"]: p for p in steps if "minutes" in p}.values():
-        where.print(brings(row), style="dim")
+        where.print(brings(row), style="dim", soft_wrap=True)
     for row in proposed:
         if not row.get("measurable", True):
-            where.print(row["why"])
+            where.print(row["why"], soft_wrap=True)
 
 
 def brings(row: dict[str, Any]) -> str:

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inertial.uncertainty.rounding import chance, equal
+from pipelines.cli.evidence_text import print_evidence
 from pipelines.cli.next_commands import FindData, JudgedData, command_line, print_extension, print_next
 from pipelines.cli.options import console, print_table, short, short_values
-from pipelines.cli.text.verdict_text import STYLE_OF, print_evidence, verdict
+from pipelines.cli.text.verdict_text import STYLE_OF, verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,7 +31,7 @@ def print_diagnosis(document: dict[str, Any], *, data: FindData | None, model: P
     model : the model file as it was given there
     """
     out = console()
-    out.print(verdict(document), style=STYLE_OF[document["adequate"]])
+    out.print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
     print_evidence(document)
     print_findings(document)
     _unexplained(out, document, data, model)
@@ -83,13 +84,13 @@ def _dwells(document: dict[str, Any]) -> None:
             without = group["without_influence"]
             if without:
                 text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
-            out.print(text, style="dim")
+            out.print(text, style="dim", soft_wrap=True)
     if not document["classes"] and document["influence"]:
         text = f"largest residuals, share of all: {_carried(document['influence'])}"
         without = document.get("without_influence")
         if without:
             text += f"; without these {without['dwells']} p {equal(without['p_value'])}"
-        out.print(text, style="dim")
+        out.print(text, style="dim", soft_wrap=True)
 
 
 def _carried(rows: list[dict[str, Any]]) -> str:
@@ -163,7 +164,7 @@ def _classes(document: dict[str, Any]) -> None:
         legend += " · in brackets: 68 % interval"
     console().print(legend, style="dim")
     for line in why_not_recommended(document):
-        console().print(line)
+        console().print(line, soft_wrap=True)
 
 
 def why_not_recommended(document: dict[str, Any]) -> list[str]:
@@ -202,6 +203,11 @@ def _within(interval: Sequence[float] | None) -> str:
     return f" ({short(interval[0])} to {short(interval[1])})" if interval else ""
 
 
+def recommended_of(document: dict[str, Any], group: dict[str, Any]) -> str:
+    """The member of a class that is recommended."""
+    return next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
+
+
 def _with_formula(document: dict[str, Any], data: JudgedData) -> str:
     """The command that judges the model with the suggested formula, without a model file."""
     offer = document["offer"]
@@ -220,7 +226,7 @@ def _unexplained(out: Console, document: dict[str, Any], data: FindData | None, 
     )
     if document["offer"]:
         out.print(f"Formula for {model or 'a model file'}, to be refined:\n")
-        out.print(document["offer"]["toml"])
+        out.print(document["offer"]["toml"], soft_wrap=True)
         if data is not None:
             print_next(out, [_with_formula(document, data())])
 

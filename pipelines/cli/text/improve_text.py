@@ -26,7 +26,7 @@ def print_verdict(document: dict[str, Any]) -> None:
     """Print the verdict of a diagnosis."""
     from pipelines.cli.text.verdict_text import STYLE_OF, verdict
 
-    console().print(verdict(document), style=STYLE_OF[document["adequate"]])
+    console().print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
 
 
 def print_improvement(document: dict[str, Any]) -> None:
@@ -48,7 +48,7 @@ def _choices(document: dict[str, Any]) -> None:
             text += f"; these data do not separate it from {others}"
         if choice["decided_by"] == "undecided":
             text += "; --yes does not decide between them: name one with --effect"
-        out.print(text, style="" if choice["added"] else "yellow")
+        out.print(text, style="" if choice["added"] else "yellow", soft_wrap=True)
 
 
 def _ladder(rows: list[dict[str, Any]]) -> None:
