@@ -5,31 +5,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inertial import decisions
-from inertial.criticism.drivers import across, curve, forces_along, quantities, transfer, varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.search import anything
-from inertial.criticism.unknown import Suspect, alike, better_curve, suspects
-from inertial.estimation.alternative import Handling, by_block, rotated_force
-from inertial.estimation.candidate import Candidate
+from inertial.criticism.unknown import Suspect, better_curve, suspects
+from inertial.criticism.wide_suspects import wide_suspects
+from inertial.estimation.alternative import Handling
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import cost_of_model
 from inertial.estimation.problem import Problem
 from inertial.estimation.term import Term
-from inertial.quantities import is_clock
 
 _MANY = 32  # largest number of units of a lot that is searched completely
 _MANY_EFFECTS = 3  # chosen effects from which on curves of every kind are suspected
 _ENOUGH = 24  # units, distributed over a larger lot, that are searched
-
-
-Array = NDArray[np.float64]
-_KNOTS = 6  # of a smooth curve over a driver
-_TURNED_KNOTS = 2  # of the same for the fixture's rotation, whose every column has three coefficients of the whole lot
-_FORCE_KNOTS = 7  # of the same over the force along an axis
-_LEAST = 3  # columns of a curve; fewer are a line, or levels that handling errors already are
 
 
 @dataclass(frozen=True)
@@ -86,30 +76,3 @@ def part_of(field: Candidates, base: Model, *, wide: bool) -> LotPart:
     return LotPart(
         Candidates(problem, field.effects, [a for a in field.handling if a.in_part]), Model(problem, terms), wide
     )
-
-
-def wide_suspects(problem: Problem) -> list[Suspect]:
-    """For every driver that varies in a lot, curves of its misalignment, of the fixture's rotation and of the transfer curve.
-
-    A lot of columns: they are suspected only where several causes, changes of handling among them, were found together.
-    """
-    if problem.lot.radial:
-        return []
-    state = problem.lot.state
-    along = forces_along(problem)
-    rotated = rotated_force(problem.lot)
-    suspected: list[Suspect] = []
-    for name, values, _ in quantities(state):
-        if not varies(values) or (name == "chamber_C" and alike(values, state.temperature)):
-            continue
-        own = curve(values, _KNOTS)  # (units or 1, n, d)
-        if own.shape[-1] < _LEAST - 1:
-            continue
-        suspected.append(Suspect(name, Candidate(across(along, own)[:, :, None, :], shared=False), ways=2, part="axes"))
-        turned = rotated[..., :, None] * curve(values, _TURNED_KNOTS + is_clock(name))[:, :, None, None, :]
-        whole = np.broadcast_to(turned, (problem.blocks // 3, *turned.shape[1:]))
-        columns = by_block(whole.reshape(*whole.shape[:3], -1))
-        suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=True), part="axes"))
-        columns = transfer(along, values, _FORCE_KNOTS)
-        suspected.append(Suspect(name, Candidate(columns[:, :, None, :], shared=False), part="transfer"))
-    return suspected

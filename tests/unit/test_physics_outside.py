@@ -10,7 +10,7 @@ from inertial import effects
 from inertial.criticism.curves import fit_curve
 from inertial.criticism.drivers import across, curve, forces_along, transfer
 from inertial.criticism.examination import ExaminedRun
-from inertial.criticism.lot_part import wide_suspects
+from inertial.criticism.wide_suspects import wide_suspects
 from inertial.estimation.comparison import estimate
 from inertial.estimation.term import Term
 from pipelines.diagnosis.diagnose import diagnose
