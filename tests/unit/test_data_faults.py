@@ -4,7 +4,7 @@ import lots
 import numpy as np
 import pytest
 
-from inertial.data_errors.faults.outputs import lattice_step
+from inertial.data_errors.faults.quantised import lattice_step
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.examination import examination
 
