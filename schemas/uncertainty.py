@@ -21,8 +21,6 @@ STANDARD_GRAVITY = 9.80665
 """m/s², CGPM 1901: a unit, and no site's value."""
 FREE_AIR = -3.086e-6
 """m/s² per m of height."""
-FORMULA_U_PPM = 60.0
-"""Standard uncertainty of the formula: rms of eight published sites 56 ppm, ruled by one of them."""
 
 
 def formula_gravity(latitude_deg: float, height_m: float = 0.0) -> float:

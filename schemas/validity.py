@@ -9,8 +9,6 @@ from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_se
 from schemas.bounds import Celsius, NotNegative, Number, Positive, Seconds, Text
 from schemas.strict import Strict
 
-DAYS_PER_MONTH = 365.25 / 12.0
-
 
 class Ageing(Strict):
     """Change of the bias with time: logarithmic, linear, a walk, or a walk that is bounded.

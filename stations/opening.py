@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
+import tempfile
 from collections.abc import Generator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.errors import RecipeInvalid, StationError
@@ -32,6 +36,9 @@ from stations.station import Station, nobody_else
 
 if TYPE_CHECKING:
     from stations.plant.plant import Plant
+
+
+_NAME = "tumbleline-{user}-processor-{number}.lock"
 
 
 @contextmanager
@@ -116,7 +123,6 @@ def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[s
 @contextmanager
 def serve_devices(config: StationConfig, plant: Plant, roles: Sequence[str] = ()) -> Generator[Links]:
     """The links to a plant's devices, served on loopback: registers over Modbus TCP, lines beside it."""
-    from stations.one_processor import one_processor  # noqa: PLC0415 - hardware needs no plant
     from stations.plant.faults.wire import on_the_wire  # noqa: PLC0415
     from stations.plant.line_server import LineServer  # noqa: PLC0415
     from stations.plant.server import PlantServer  # noqa: PLC0415
@@ -218,3 +224,44 @@ def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[f
 def _slot_registers(config: StationConfig, links: Links, slot: int) -> Registers:
     where = config.devices.slots
     return Registers(f"slot {slot}", links.registers("slots"), where.device_id + slot, profile_of(where))
+
+
+@contextmanager
+def one_processor() -> Generator[None]:
+    """A block whose thread, and those that it starts, stay on a processor that no other such block of the user has.
+
+    Nothing changes where no processor is free, or where the system cannot tie a thread to one.
+    """
+    with ExitStack() as stack:
+        number = _claimed(stack)
+        if number is not None:
+            before = os.sched_getaffinity(0)
+            _tie(number)
+            stack.callback(_tie, *before)
+        yield
+
+
+def _tie(*numbers: int) -> None:
+    """Let this thread run on some processors; it stays where it is when they are no longer its own (a changed cpuset)."""
+    with suppress(OSError):
+        os.sched_setaffinity(0, numbers)
+
+
+def _claimed(stack: ExitStack) -> int | None:
+    """A processor that is claimed until the stack is left, also by a kill; None where all have been or there is but one."""
+    if not hasattr(os, "sched_setaffinity") or len(allowed := os.sched_getaffinity(0)) < 2:
+        return None
+    for number in sorted(allowed):
+        place = Path(tempfile.gettempdir()) / _NAME.format(user=os.getuid(), number=number)
+        try:
+            file = os.open(place, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        except OSError:
+            return None
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:  # another block has it
+            os.close(file)
+            continue
+        stack.callback(os.close, file)
+        return number
+    return None

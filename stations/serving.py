@@ -13,6 +13,7 @@ from schemas.errors import StationError, StationRefused, WrongUse
 from schemas.lot import Lot
 from schemas.profile import Register
 from schemas.station import StationConfig
+from schemas.station_devices import Devices
 from stations.codec import Value, named
 from stations.devices.commands import Commands
 from stations.devices.registers import Registers
@@ -90,7 +91,6 @@ def serve(
         )
     from stations.clock import WallClock  # noqa: PLC0415 - only the server needs these modules
     from stations.opening import make_plant  # noqa: PLC0415
-    from stations.plant.silence import IdleStop  # noqa: PLC0415
 
     plant = make_plant(config, lot)
     silence = IdleStop(plant, config.devices, silence_s)
@@ -205,3 +205,28 @@ def _shown(register: Register, value: Value) -> str:
     if isinstance(value, str):
         return value
     return named(register, value) if register.enumeration else f"{value:.9g}"
+
+
+class IdleStop:
+    """Stops devices without a request for ``seconds``; the time counts from the first request to a device."""
+
+    def __init__(self, plant: Plant, devices: Devices, seconds: float) -> None:
+        self._plant, self._seconds = plant, seconds
+        self._stops: dict[int, Callable[[], None]] = {
+            devices.outer.device_id: lambda: plant.outer.halt(plant.now),
+            devices.inner.device_id: lambda: plant.inner.halt(plant.now),
+            devices.reader.device_id: plant.sampler.stop,
+        }
+        self._last_request: dict[int, float] = {}
+
+    def look(self, now: float) -> None:
+        """Updates the time of the last request of each device at ``now`` s wall time, and stops devices after the time-out."""
+        if self._seconds == 0.0:
+            return
+        with self._plant.lock:
+            self._last_request.update(dict.fromkeys(self._plant.requested & self._stops.keys(), now))
+            self._plant.requested.clear()
+            late = [device_id for device_id, last in self._last_request.items() if now - last > self._seconds]
+            for device_id in late:
+                self._stops[device_id]()
+                del self._last_request[device_id]

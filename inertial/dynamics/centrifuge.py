@@ -1,71 +1,16 @@
-"""Centrifuge: bias, scale and the polynomial over a = rω²/g, one way up or with the input reversed."""
+"""Centrifuge: the polynomial over a = rω²/g, with the input reversed or not."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
-EARTH_RATE = 7.292115e-5  # rad/s, IERS conventions
-
-
-@dataclass(frozen=True)
-class Centrifuge:
-    """Answer of a centrifuge test."""
-
-    bias: float
-    scale: float
-    """Output unit per g."""
-    bias_error: float
-    scale_error: float
-    linearity_percent: float
-    """Largest |V - V_fit| over the full-scale output span, %."""
-    residuals: Array
-    """(n,), output unit."""
-
-
-def centrifuge(
-    rate_rad_s: ArrayLike,
-    output: ArrayLike,
-    radius_m: float,
-    *,
-    full_scale_g: float,
-    standard_gravity: float = STANDARD_GRAVITY,
-) -> Centrifuge:
-    """Bias, scale and linearity error from a = r·ω².
-
-    Parameters
-    ----------
-    rate_rad_s : (n,), rad/s
-    output : (n,), output unit
-    radius_m : to the seismic mass, m; its error is the scale's, in full
-    full_scale_g : range, g, to which the linearity error is referred
-    standard_gravity : m/s² in one g
-    """
-    force = radius_m * np.asarray(rate_rad_s, dtype=np.float64) ** 2 / standard_gravity
-    v = np.asarray(output, dtype=np.float64)
-    if force.size < 3 or float(np.ptp(force)) <= 0.0:
-        msg = f"centrifuge: {force.size} speeds over {np.ptp(force):.3g} g, three different ones are needed; add speeds"
-        raise NotIdentified(msg)
-    rows = np.column_stack([np.ones_like(force), force])
-    c = np.asarray(np.linalg.lstsq(rows, v, rcond=None)[0], dtype=np.float64)
-    residuals = v - rows @ c
-    spread = np.linalg.inv(rows.T @ rows) * (residuals @ residuals) / (force.size - 2)
-    return Centrifuge(
-        bias=float(c[0]),
-        scale=float(c[1]),
-        bias_error=float(np.sqrt(spread[0, 0])),
-        scale_error=float(np.sqrt(spread[1, 1])),
-        linearity_percent=float(100.0 * np.max(np.abs(residuals)) / (abs(c[1]) * full_scale_g)),
-        residuals=residuals,
-    )
-
-
 TERMS = ("bias", "scale", "second_order", "third_order", "arm_stretch_or_odd_quadratic", "mass_offset_or_asymmetry")
 
 
@@ -187,29 +132,3 @@ def _minimax(x: Array, y: Array) -> Array:
             low = one
     left = y - 0.5 * (low + high) * x
     return np.asarray(left - 0.5 * (left.max() + left.min()))
-
-
-def scale_from_two_radii(
-    slopes: tuple[float, float], slope_errors: tuple[float, float], distance_m: float, distance_error_m: float
-) -> tuple[float, float]:
-    """Sensitivity in output per g and its standard uncertainty, from the slopes against ω² at two mounts a known distance apart.
-
-    S = Δ(slope)·g_n/Δr: at one radius, radius and sensitivity are one parameter.
-
-    Parameters
-    ----------
-    slopes, slope_errors : output per (rad/s)², the larger radius second
-    """
-    value = (slopes[1] - slopes[0]) * STANDARD_GRAVITY / distance_m
-    relative = np.hypot(np.hypot(*slope_errors) / (slopes[1] - slopes[0]), distance_error_m / distance_m)
-    return value, float(abs(value) * relative)
-
-
-def lever_arm(rate_deg_s: float, radius_m: float) -> float:
-    """Specific force in g of a point that turns at a radius: ω²r/g_n."""
-    return float(np.radians(rate_deg_s) ** 2 * radius_m / STANDARD_GRAVITY)
-
-
-def earth_rate_share(rate_rad_s: float, latitude_deg: float) -> float:
-    """Relative error of the acceleration where the rate is measured against the Earth: 2Ω sin φ/ω."""
-    return float(2.0 * EARTH_RATE * np.sin(np.radians(latitude_deg)) / rate_rad_s)

@@ -1,4 +1,4 @@
-"""Shock pulses: the half sine and a sensor's response, and peak, duration, baseline and velocity change of a recorded pulse."""
+"""Shock pulses: peak, duration, baseline and velocity change of a recorded pulse."""
 
 from __future__ import annotations
 
@@ -6,63 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import StateSpace, lsim
 
-from inertial.dynamics.settling import settling_time
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 TEN_PERCENT = 1.0 - 2.0 * float(np.arcsin(0.1)) / np.pi
 """0.936: part of a half sine's duration between its 10 % points."""
 TOP = 0.9  # of the largest sample: the part of the pulse through which the parabola is laid
-
-
-@dataclass(frozen=True)
-class Shock:
-    """Answer to a half sine."""
-
-    time: Array
-    """(n,) s"""
-    input: Array
-    """(n,) g"""
-    output: Array
-    """(n,) g, as an output that counts up with acceleration"""
-    overshoot: float
-    """(largest output - amplitude)/amplitude."""
-    undershoot: float
-    """Largest negative output after the pulse, over the amplitude."""
-    return_s: float
-    """Time after the pulse until the output stays within the band."""
-
-
-def half_sine(
-    amplitude: float, duration_s: float, natural_hz: float, damping: float, *, band: float = 0.02, points: int = 4000
-) -> Shock:
-    """Answer of a second-order accelerometer to A0·sin(πt/T).
-
-    Parameters
-    ----------
-    amplitude : A0, g
-    duration_s : T, s; 1 to 10 ms in tests
-    natural_hz, damping : of the accelerometer
-    band : share of the amplitude within which the output has come back
-    points : of the answer
-    """
-    rate, omega = damping * 2.0 * np.pi * natural_hz, 2.0 * np.pi * natural_hz
-    end = duration_s + 12.0 / max(rate, 1e-12)
-    time = np.linspace(0.0, min(end, duration_s + 400.0 / natural_hz), points)
-    pulse = np.where(time <= duration_s, amplitude * np.sin(np.pi * time / duration_s), 0.0)
-    system = StateSpace([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]], [[0.0], [omega**2]], [[1.0, 0.0]], [[0.0]])
-    output = np.asarray(lsim(system, pulse, time)[1], dtype=np.float64)
-    after = time > duration_s
-    return Shock(
-        time=time,
-        input=pulse,
-        output=output,
-        overshoot=float(output.max() / amplitude - 1.0),
-        undershoot=float(max(0.0, -output[after].min() / amplitude)),
-        return_s=settling_time(time[after] - duration_s, output[after], final=0.0, band=band * amplitude),
-    )
 
 
 def velocity_change(peak_g: float, duration_s: float, standard_gravity: float = 9.80665) -> float:

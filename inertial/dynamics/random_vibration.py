@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 Array = NDArray[np.float64]
 
@@ -32,11 +31,6 @@ def interpolated(at: Array, frequency: Array, density: Array) -> Array:
     return np.where(inside, np.exp(np.interp(np.log(safe), np.log(frequency), np.log(density))), 0.0)
 
 
-def slope_exponent(db_per_octave: float) -> float:
-    """Exponent m of the density for a slope in dB per octave: 3 dB is 0.9966."""
-    return float(db_per_octave / 10.0 / np.log10(2.0))
-
-
 def made_signal(frequency: Array, density: Array, rate_hz: float, count: int, rng: np.random.Generator) -> Array:
     """A Gaussian signal (count,) in g with the density of breakpoints, made in the frequency domain."""
     f = np.fft.rfftfreq(count, 1.0 / rate_hz)
@@ -57,13 +51,3 @@ def rectification(level_g: Array, shift_g: Array, error_g: Array) -> tuple[float
     w = error_g**-2.0
     value = float(np.sum(w * x * shift_g) / np.sum(w * x**2))
     return value, float(np.sum(w * x**2) ** -0.5), float(np.sum(w * (shift_g - value * x) ** 2))
-
-
-def gaussian_clipping(level_g: float, mean_g: float, range_g: float) -> float:
-    """Shift in g of the mean of Gaussian vibration around ``mean_g`` by clipping at ± ``range_g``."""
-
-    def excess(distance: float) -> float:
-        u = distance / level_g
-        return float(level_g * (norm.pdf(u) - u * norm.sf(u)))
-
-    return excess(range_g + mean_g) - excess(range_g - mean_g)

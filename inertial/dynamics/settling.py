@@ -57,15 +57,3 @@ def damping_from_overshoot(share: float) -> float:
     """Damping ratio from the overshoot as a share of the step: −ln O/√(π² + ln²O)."""
     log = np.log(share)
     return float(-log / np.sqrt(np.pi**2 + log**2))
-
-
-def damping_from_decrement(first: float, later: float, cycles: int) -> float:
-    """Damping ratio from two extrema of one sign that lie ``cycles`` periods apart; of use below ζ ≈ 0.3 only."""
-    delta = np.log(first / later) / cycles
-    return float(delta / np.sqrt(4.0 * np.pi**2 + delta**2))
-
-
-def settling_angle(damping: float, band: float) -> float:
-    """ω_n·t after which the step response of a second-order system stays within ± ``band`` of the step."""
-    angle = np.linspace(0.0, 60.0 / damping, 400_001)
-    return settling_time(angle, step_response(angle, 0.5 / np.pi, damping), final=1.0, band=band)

@@ -57,11 +57,3 @@ def shock_spectrum(record: Array, rate_hz: float, natural_hz: Array, q: float = 
     tail = np.zeros(int(np.ceil(rate_hz / float(np.min(natural_hz)))) + 1)
     padded = np.concatenate([record, tail])
     return np.array([np.max(np.abs(responses(padded, rate_hz, float(f), q))) for f in natural_hz])
-
-
-def undamped_residual(natural_times_duration: Array) -> Array:
-    """Residual response over the amplitude of a half sine, undamped: |4x·cos πx/(1 − 4x²)|, x = f_n·D."""
-    x = np.asarray(natural_times_duration, dtype=np.float64)
-    with np.errstate(all="ignore"):
-        out = np.abs(4.0 * x * np.cos(np.pi * x) / (1.0 - 4.0 * x**2))
-    return np.where(np.abs(x - 0.5) < 1e-9, np.pi / 2.0, out)

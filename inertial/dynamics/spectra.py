@@ -77,14 +77,6 @@ def response(reference: Array, output: Array, rate_hz: float, *, segment: int, d
     return Response(f, h1, h2, coherence, averages, error)
 
 
-def delay_bias(delay_s: float, span_s: float, window: str = "hann", points: int = 20001) -> float:
-    """Factor by which a delay between the channels lowers |H|: the window's correlation with itself, 1 − τ/T without one."""
-    made: Any = signal.get_window("boxcar" if window == "none" else window, points, fftbins=False)
-    w = np.asarray(made, dtype=np.float64)
-    lag = round(delay_s / span_s * (points - 1))
-    return float(np.sum(w[lag:] * w[: points - lag]) / np.sum(w**2))
-
-
 def density_confidence(averages: float, level: float = 0.99) -> tuple[float, float]:
     """Deviations in dB, low and high, between which a density estimate lies: χ² with 2n degrees of freedom over 2n."""
     dof = 2.0 * averages

@@ -282,10 +282,3 @@ def repeatability(means: Array, own_error: float) -> Repeatability:
 
     low, high = (reduced(float(s2 * dof / chi2.ppf(p, dof))) for p in (0.975, 0.025))
     return Repeatability(reduced(s2), low, high, reduced(float(s2 * dof / chi2.ppf(0.05, dof))), n)
-
-
-def sigma_factors(n: int) -> tuple[float, float, float]:
-    """95 % factors of an estimated standard deviation from n values: two-sided low and high, one-sided upper."""
-    dof = n - 1
-    low, high, upper = (float(np.sqrt(dof / chi2.ppf(p, dof))) for p in (0.975, 0.025, 0.05))
-    return low, high, upper

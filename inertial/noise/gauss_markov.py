@@ -11,8 +11,6 @@ Array = NDArray[np.float64]
 AT_MAXIMUM = 1.8927
 """Averaging time over T at which the Allan deviation of one process is largest."""
 
-PEAK = 0.61741
-"""Largest Allan deviation of one process over its standard deviation."""
 
 FLICKER_VARIANCE = 2.0 * np.log(2.0) / np.pi
 """Allan variance of flicker noise with B = 1: IEEE Std 952-1997, C.1.1.3."""
@@ -180,8 +178,3 @@ def bias_model(
     b = np.asarray(instability, dtype=np.float64)
     n, k, start = (np.broadcast_to(np.asarray(v, dtype=np.float64), b.shape) for v in (white, walk, turn_on))
     return BiasModel(n, b[:, None] * flicker.sd, flicker.correlation_s, k, start)
-
-
-def from_maximum(tau_s: float, deviation: float) -> tuple[float, float]:
-    """T (s) and standard deviation of one process from the maximum of its Allan deviation: T = τ/1.893, s = σ/0.617."""
-    return tau_s / AT_MAXIMUM, deviation / PEAK

@@ -1,7 +1,5 @@
 """Effective degrees of freedom and coverage factors (JCGM 100:2008, G.4, G.6.4)."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
@@ -12,15 +10,8 @@ _LARGEST = 1e9
 FloatArray = NDArray[np.float64]
 
 
-def welch_satterthwaite(u: Sequence[float], dof: Sequence[float]) -> float:
-    """ν_eff = u_c⁴/Σ(u_i⁴/ν_i) (JCGM 100, G.2b); infinite where all are."""
-    parts = np.asarray(u, dtype=float)
-    below = float(np.sum(parts**4 / np.asarray(dof, dtype=float)))
-    return float(np.sum(parts**2) ** 2 / below) if below > 0.0 else float("inf")
-
-
 def effective_degrees(u: FloatArray, dof: FloatArray) -> FloatArray:
-    """:func:`welch_satterthwaite` of every row: u and dof (n, c), result (n,)."""
+    """ν_eff of every row, by Welch and Satterthwaite (JCGM 100, G.2b): contributions u and dof (n, c), result (n,)."""
     parts = np.ascontiguousarray(u, dtype=float)
     below = np.sum(np.ascontiguousarray(parts**4 / np.asarray(dof, dtype=float)), axis=1)
     whole = np.sum(np.ascontiguousarray(parts**2), axis=1) ** 2
@@ -39,8 +30,3 @@ def coverage_factor(dof: float, probability: float = PROBABILITY) -> float:
     if not dof < _LARGEST:
         return float(ndtri(0.5 * (1.0 + probability)))
     return float(stdtrit(max(int(dof), 1), 0.5 * (1.0 + probability)))
-
-
-def from_reliability(relative: float) -> float:
-    """Degrees of freedom of a standard uncertainty that is known within so large a share: ½·(Δu/u)⁻² (JCGM 100, G.3)."""
-    return 0.5 / relative**2

@@ -63,9 +63,3 @@ def bounded_walk(deviation: float, correlation: float, gap: float) -> float:
 def logarithmic(per_decade: float, gap: float, onset: float = DAY_S) -> float:
     """Change by ageing A·log₁₀(1 + t/τ), the unit of A."""
     return per_decade * float(np.log10(1.0 + gap / onset))
-
-
-def walk_from_history(changes: list[float], u: list[float], years: list[float]) -> float:
-    """K of a walk from as-found changes: K² = mean((d² − 2u²)/t), the unit per root of the time's; 0 where u explains them."""
-    d, s, t = (np.asarray(values, dtype=float) for values in (changes, u, years))
-    return float(np.sqrt(max(float(np.mean((d**2 - 2.0 * s**2) / t)), 0.0)))

@@ -36,40 +36,6 @@ def outside(value: float, u: float, lower: float, upper: float) -> float:
     return float(ndtr((lower - value) / u) + ndtr((value - upper) / u))
 
 
-def posterior(value: float, u: float, mean: float, process: float) -> tuple[float, float]:
-    """Mean and standard deviation of a quantity after its measurement, with a prior N(mean, process²) (JCGM 106, A.4.4)."""
-    precision = 1.0 / u**2 + 1.0 / process**2
-    return (value / u**2 + mean / process**2) / precision, precision**-0.5
-
-
-def global_risk(
-    mean: float, process: float, u: float, limits: tuple[float, float], accepted: tuple[float, float]
-) -> GlobalRisk:
-    """Risks over a production (JCGM 106, 9.3), by quadrature over the true values.
-
-    Parameters
-    ----------
-    mean, process : of the units' true values; u : standard uncertainty of a measurement
-    limits, accepted : lower and upper tolerance limit, and acceptance limit
-    """
-    lower, upper = limits
-    inside = float(ndtr((upper - mean) / process) - ndtr((lower - mean) / process))
-    whole = float(np.hypot(process, u))
-    taken = float(ndtr((accepted[1] - mean) / whole) - ndtr((accepted[0] - mean) / whole))
-    if not u > 0.0:
-        low, high = max(lower, accepted[0]), min(upper, accepted[1])
-        good = max(float(ndtr((high - mean) / process) - ndtr((low - mean) / process)), 0.0)
-    else:
-        good = _both(mean, process, u, limits, accepted)
-    return GlobalRisk(max(taken - good, 0.0), max(inside - good, 0.0), taken, inside)
-
-
-def _both(mean: float, process: float, u: float, limits: tuple[float, float], accepted: tuple[float, float]) -> float:
-    """Probability that a unit conforms and is accepted."""
-    z, weight = _nodes(mean, process, [(limits, 0.0), (accepted, u)])
-    return float(weight @ (_between(z, limits, 0.0) * _between(z, accepted, u)))
-
-
 def lot_risk(
     mean: float,
     process: float,
@@ -121,36 +87,9 @@ def _between(z: Array, ends: tuple[float, float], width: float) -> Array:
     return np.asarray(ndtr((ends[1] - z) / width) - ndtr((ends[0] - z) / width), dtype=np.float64)
 
 
-def process_for(in_tolerance: float, tolerance: float) -> float:
-    """Standard deviation of a centred production of which so large a share lies within ± tolerance."""
-    return tolerance / float(ndtri(0.5 * (1.0 + in_tolerance)))
-
-
 def guard_factor(allowed: float) -> float:
     """Guard band over standard uncertainty with which the specific risk at the acceptance limit is ``allowed``."""
     return float(-ndtri(allowed))
-
-
-def acceptance_for(allowed: float, process: float, u: float, tolerance: float) -> float:
-    """Largest acceptance limit over tolerance, at most 1, with a global PFA of a centred production of at most ``allowed``."""
-
-    def pfa(share: float) -> float:
-        a = share * tolerance
-        return global_risk(0.0, process, u, (-tolerance, tolerance), (-a, a)).pfa
-
-    if pfa(1.0) <= allowed:
-        return 1.0
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if pfa(middle) <= allowed else (low, middle)
-    return low
-
-
-def of_several(pfa: list[float], accepted: list[float]) -> tuple[float, float]:
-    """PFA and probability of acceptance of a unit with several independent figures: Π a_i − Π (a_i − PFA_i)."""
-    whole = float(np.prod(accepted))
-    return whole - float(np.prod(np.array(accepted) - np.array(pfa))), whole
 
 
 def process_deviation(values: list[float], independent: float) -> float:

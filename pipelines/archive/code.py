@@ -37,11 +37,11 @@ _DRAWN = (
 CODE = {
     "validate": (
         *(*_SAMPLES, "inertial.pointing", "pipelines.stages.frozen"),
-        *("pipelines.stages.pointing", "pipelines.stages.validate"),
+        "pipelines.stages.validate",
     ),
     "reduce": (*_TABLES, "pipelines.stages.reduce"),
     "fit": (
-        *(*_ENGINE, "pipelines.stages.fit", "pipelines.stages.noisy_fit", "pipelines.stages.nonlinear"),
+        *(*_ENGINE, "pipelines.stages.fit", "pipelines.stages.noisy_fit"),
         "pipelines.stages.uncertainty.bias_measurands",
     ),
     "fit of norms": (

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from inspect import cleandoc
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from inertial.errors import InertialError
-from pipelines.cli.discovery import find_commands
-from pipelines.cli.given_texts import take_texts_as_given
 from schemas.errors import DONE, UNEXPECTED, UNUSABLE, TumblelineError, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.log_lines import VARIABLE as LOG
@@ -24,7 +24,7 @@ from schemas.log_lines import tell
 from schemas.own_files import report_to
 
 if TYPE_CHECKING:
-    from typer._click import Command, Context
+    from typer._click import Command, Context, Parameter
 
 INTERRUPTED = 130  # the exit status that shells use for Ctrl-C
 PIPE_CLOSED = 141  # the exit status that shells use for a reader that closed the pipe
@@ -34,6 +34,67 @@ COMPLETES = "_TUMBLELINE_COMPLETE"
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that BLAS libraries read when they are loaded."""
+
+
+CONSTANT = re.compile(r'^(PART|ORDER|SUMMARY) = (?:"(.+)"|(\d+))$', re.MULTILINE)
+COMMAND = re.compile(r"^(?:def command\(|app = typer\.Typer\()", re.MULTILINE)
+
+
+class IncompleteCommand(Exception):
+    """A module with an incomplete command: a defect that its author must correct."""
+
+
+class CommandModule(NamedTuple):
+    """A command in the help.
+
+    module : name inside this package · part : heading of the help · order : place in the help · summary : one sentence
+    """
+
+    module: str
+    part: str
+    order: int
+    summary: str
+
+
+def find_commands(folder: Path) -> dict[str, CommandModule]:
+    """The commands of a folder by name, in the order of the help.
+
+    The name is the name of the module; a module with a reserved name of Python ends in an underscore (``import_``).
+
+    Raises
+    ------
+    IncompleteCommand
+        A module has the function or application of a command without its constants, or the reverse, or an ORDER twice.
+    """
+    commands: dict[str, CommandModule] = {}
+    for path in sorted(folder.glob("*.py")):
+        if path.stem.startswith("__"):
+            continue
+        command = _read(path)
+        if command is not None:
+            commands[path.stem.removesuffix("_")] = command
+    ordered = sorted(commands.items(), key=lambda item: item[1].order)
+    for (first, one), (second, other) in pairwise(ordered):
+        if one.order == other.order:
+            raise IncompleteCommand(f"{second}.py: ORDER is {one.order}, as in {first}.py; choose another number")
+    return dict(ordered)
+
+
+def _read(path: Path) -> CommandModule | None:
+    """The command of a module; None for a module without a command."""
+    text = path.read_text(encoding="utf-8")
+    values = {name: string or number for name, string, number in CONSTANT.findall(text)}
+    callable_ = COMMAND.search(text) is not None
+    if not values and not callable_:
+        return None
+    missing = [name for name in ("PART", "ORDER", "SUMMARY") if name not in values]
+    if missing or not callable_ or not values["ORDER"].isdigit():
+        needed = ", ".join(missing) or (
+            "an integer ORDER" if callable_ else "a function 'command' or 'app = typer.Typer('"
+        )
+        raise IncompleteCommand(f"{path.name}: a command without {needed}; add it on a line of its own")
+    return CommandModule(path.stem, values["PART"], int(values["ORDER"]), values["SUMMARY"])
+
 
 COMMANDS = find_commands(Path(__file__).parent)
 """The commands by name, in the order of the help."""
@@ -223,3 +284,42 @@ def _leave(message: str, status: int) -> None:
     sys.stdout.flush()
     tell(message, level="error", status=status)
     sys.exit(status)
+
+
+class _AsGiven:
+    """The conversion of one parameter; ``convert`` makes that of typer, for the values that need it."""
+
+    def __init__(self, convert: Callable[[], Any], *, text: bool) -> None:
+        self._convert, self._text = convert, text
+
+    def coerce(self, value: Any, param: Any, ctx: Context) -> Any:
+        """The value of a parameter as its command receives it."""
+        several = param.multiple or param.nargs == -1
+        if value is None:
+            return () if several else None
+        if self._text and not several and isinstance(value, str):
+            return value
+        return self._convert().coerce(value, param=param, ctx=ctx)
+
+
+def take_texts_as_given(command: Command) -> None:
+    """Let texts, and parameters that are not given, pass without the validators of typer, where it has them."""
+    stated = command.get_params  # typer adds the option of help when a context asks for it
+
+    def parameters(ctx: Context) -> list[Parameter]:
+        found = stated(ctx)
+        for one in found:
+            _take_as_given(one)
+        return found
+
+    setattr(command, "get_params", parameters)  # noqa: B010 - a method of the class
+
+
+def _take_as_given(parameter: Parameter) -> None:
+    described = getattr(parameter, "type_descriptor", None)
+    convert = getattr(parameter, "get_runtime_param", None)
+    if described is None or convert is None or "get_runtime_param" in vars(parameter):
+        return
+    text = described.annotation is str and described.parameter_info.parser is None
+    own = _AsGiven(convert, text=text)
+    setattr(parameter, "get_runtime_param", lambda: own)  # noqa: B010 - a method of the class

@@ -21,7 +21,7 @@ from pipelines.cli.options import (
     TimeUnitOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
     short,
 )
@@ -76,7 +76,7 @@ def command(
     of the output without its mean: the error of a velocity, in m/s for an output in g.
     """
     from pipelines.archive import Archive
-    from pipelines.cli.allan_documents import allan_document, allan_of_run, statistic_of_run
+    from pipelines.chain.noise_documents import allan_document, allan_of_run, statistic_of_run
     from pipelines.cli.series_options import even_series, write_pictures
 
     if spacing not in SPACINGS:
@@ -95,10 +95,7 @@ def command(
         else:
             document = statistic_of_run(Archive(archive).run(source), spacing, statistic)
     write_pictures(document, plot, page)
-    if as_json:
-        print_json(document)
-    else:
-        _print(document)
+    give(document, _print, as_json=as_json)
 
 
 def _print(document: dict[str, Any]) -> None:
@@ -109,7 +106,7 @@ def _print(document: dict[str, Any]) -> None:
     )
     _print_terms(document) if document["statistic"] == STATISTICS[0] else _print_curves(document)
     for note in document["notes"]:
-        out.print(note, style="yellow", soft_wrap=True)
+        out.print(note, style="yellow")
 
 
 def _print_terms(document: dict[str, Any]) -> None:

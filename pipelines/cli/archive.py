@@ -156,7 +156,7 @@ def backup(
         return
     out = console()
     counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"
-    out.print(counted, soft_wrap=True)
+    out.print(counted)
     if made is not None:
         out.print(f"database  {made}")
 

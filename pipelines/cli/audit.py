@@ -117,7 +117,7 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], page: Path | None)
     counted = ", ".join(number_of(number[f"{noun}s"], noun) for noun in ("calibration", "unit", "run", "station"))
     out.print(f"{counted}; {period}")
     _show_yield(audited)
-    out.print(_certificates(audited), soft_wrap=True)
+    out.print(_certificates(audited))
     for who, words in WHO.items():
         own = [finding for finding in audit_findings if finding.who == who]
         if own:

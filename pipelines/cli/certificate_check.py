@@ -62,8 +62,6 @@ def check_certificates(
 
 def _archive(name: str | None) -> Archive | None:
     """The archive that is given, or the usual one where there is one."""
-    from pipelines.archive import Archive
-
     if name is None and not os.environ.get("TUMBLELINE_ARCHIVE") and not Path("archive").is_dir():
         return None
     archive = Archive(name)
@@ -89,7 +87,7 @@ def _document(one: CheckedFile) -> dict[str, Any]:
 def _print(one: CheckedFile) -> None:
     out = console()
     head = f"{one.path}: certificate {one.facts.number}, unit {one.facts.serial}" if one.facts else str(one.path)
-    out.print(head, style="bold", soft_wrap=True)
+    out.print(head, style="bold")
     for check in one.checks:
         mark = {"good": "ok", "bad": "WRONG", "not checked": "-"}[check.state]
         out.print(f"  {mark:<6}{check.check:<11} {check.message}", style=STYLES[check.state])

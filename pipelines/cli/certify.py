@@ -14,7 +14,7 @@ from pipelines.cli.options import (
     RunArgument,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
 )
 
@@ -90,10 +90,7 @@ def command(
             make_imported_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
         error_console().print(f"certify: the report was not made again: {problem}")
-    if as_json:
-        print_json(_document(source.id, done))
-    else:
-        _print(source.id, done)
+    give(_document(source.id, done), lambda _: _print(source.id, done), as_json=as_json)
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
 

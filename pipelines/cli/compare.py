@@ -18,7 +18,7 @@ from pipelines.cli.options import (
     ModelOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
     short,
     short_values,
@@ -62,10 +62,7 @@ def command(
     first, temperatures, again, again_temperatures = both_runs(dwells, history, fresh, fresh_history, archive)
     table, _ = without_dwells(first, leave_out)
     document = compared(chosen or default_model(table), table, temperatures, again, again_temperatures)
-    if as_json:
-        print_json(document)
-    else:
-        print_comparison(document)
+    give(document, print_comparison, as_json=as_json)
 
 
 def compared(

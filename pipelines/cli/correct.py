@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.archive import Run
 from pipelines.cli.options import (
     ArchiveOption,
     JsonOption,
@@ -15,14 +14,14 @@ from pipelines.cli.options import (
     TimeColumnOption,
     console,
     error_console,
-    print_json,
+    give,
     short,
 )
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
+    from pipelines.export.corrected import Corrected
     from pipelines.export.recording import CorrectableRecording
 
 PART = "Results"
@@ -92,6 +91,7 @@ def command(
     from pipelines.archive import Archive
     from pipelines.cli.standard_output import is_standard_output
     from pipelines.export.corrected import corrected, fit_of_unit
+    from pipelines.export.correction import correction_document, tracking_of
     from pipelines.export.recording import at_nominal_supply, read_recording
     from pipelines.jobs.model_files import use_formulas_of
     from pipelines.jobs.terms import archived_terms
@@ -107,62 +107,16 @@ def command(
     terms = archived_terms(run.about)
     if terms is not None and terms.follows is not None:
         recording = at_nominal_supply(recording, terms.follows)
-    done = corrected(recording, fit, _tracking(run, recording, force, gravity, turn_on, step, at_rest=at_rest))
-    if output is not None:
-        _write(recording, done, output)
-    document = _document(recording, fit, done, None if printed else output)
-    if as_json:
-        print_json(document)
-    else:
-        _print(document, error_console() if printed else console())
-    consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
-    raise typer.Exit(DONE if consistent else PART_FAILED)
-
-
-def _tracking(
-    run: Run,
-    recording: CorrectableRecording,
-    force: str,
-    gravity: float | None,
-    turn_on: float | None,
-    step: float,
-    *,
-    at_rest: bool,
-) -> Tracking | None:
-    """How the bias is tracked; None where the force is known at no sample."""
-    import numpy as np
-
-    from pipelines.export.corrected import Tracking
-    from pipelines.jobs.terms import archived_terms
-    from schemas.errors import WrongUse
-    from schemas.foreign import shown
-    from schemas.units import STANDARD_GRAVITY_M_S2
-
-    if not (force or at_rest or bool(np.isfinite(recording.known).all(axis=1).any())):
-        return None
-    known = None
-    if force:
-        try:
-            known = np.array([float(part) for part in force.split(",")])
-        except ValueError:
-            known = np.array([])
-        if known.shape != (3,) or not np.isfinite(known).all():
-            raise WrongUse(f"--force: found '{shown(force)}', three numbers X,Y,Z in g are needed; correct it")
-    terms = archived_terms(run.about)
     if turn_on is None and terms is not None and terms.stability is not None:
         turn_on = terms.stability.switch_on_ug
-    if turn_on is None:
-        raise WrongUse(
-            f"correct: run {run.id} states no change of the bias from switch-on to switch-on, it is needed to weigh the first "
-            "updates; give it with --turn-on UG (data sheet, or the power cycles of a run)"
-        )
-    local = gravity if gravity is not None else run.about.get("recipe", {}).get("local_gravity_m_s2")
-    if at_rest and (not isinstance(local, int | float) or not 9.7 < local < 9.9):
-        raise WrongUse(
-            f"correct: local gravity {local}, 9.7 to 9.9 m/s² is needed with --at-rest; give it with --gravity"
-        )
-    magnitude = float(local) / STANDARD_GRAVITY_M_S2 if at_rest and isinstance(local, int | float) else None
-    return Tracking(known, magnitude, turn_on, step)
+    tracking = tracking_of(run, recording, force, gravity, turn_on, step, at_rest=at_rest)
+    done = corrected(recording, fit, tracking)
+    if output is not None:
+        _write(recording, done, output)
+    document = correction_document(recording, fit, done, None if printed else output)
+    give(document, lambda _: _print(document, error_console() if printed else console()), as_json=as_json)
+    consistent = document["bias"] is None or document["bias"]["stated_uncertainty"] != "too small"
+    raise typer.Exit(DONE if consistent else PART_FAILED)
 
 
 def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> None:
@@ -188,61 +142,9 @@ def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> No
         files.publish(output, data, "correct", files.ELSEWHERE)
 
 
-def _document(recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, output: Path | None) -> dict[str, Any]:
-    import numpy as np
-
-    from schemas.units import AXES, MICRO
-
-    sd = MICRO * np.sqrt(np.diagonal(done.covariance, axis1=1, axis2=2))
-    certificate = fit.exported.certificate
-    document: dict[str, Any] = {
-        "file": recording.name,
-        "run": fit.run,
-        "unit": fit.exported.unit,
-        "certificate": None if certificate is None else certificate.document(),
-        "samples": len(recording.time),
-        "outside_temperature": done.outside,
-        "temperatures_C": list(fit.exported.temperatures),
-        "u_ug": dict(zip(AXES, np.sqrt(np.mean(sd**2, axis=0)).tolist(), strict=True)),
-        "u_contains": [
-            "references and noise of the calibration" if fit.budget else "noise of the calibration only",
-            *(["bias", "white noise of a sample"] if done.track is not None else []),
-        ],
-        "output": None if output is None else str(output),
-        "bias": None,
-    }
-    if done.track is None or done.flicker is None:
-        return document
-    track, check = done.track, done.track.consistency
-    end = np.sqrt(np.diagonal(track.covariance[-1]))
-    document["bias"] = {
-        "last_ug": dict(zip(AXES, (MICRO * track.bias[-1]).tolist(), strict=True)),
-        "u_last_ug": dict(zip(AXES, (MICRO * end).tolist(), strict=True)),
-        "u_last_at_limits_ug": None
-        if done.at_limits is None
-        else dict(zip(AXES, (MICRO * np.sqrt(np.diagonal(done.at_limits.covariance[-1]))).tolist(), strict=True)),
-        "updates": int(track.updated.sum()),
-        "steps": len(track.updated),
-        "rejected": track.rejected,
-        "nis": check.nis,
-        "nis_bounds": [check.low, check.high],
-        "lag_1": check.lag_1,
-        "lag_1_bound": check.lag_1_bound,
-        "stated_uncertainty": "too small" if _many(track.rejected, check.count) else check.stated,
-        "processes_s": done.flicker.correlation_s.tolist(),
-        "processes_flat": done.flicker.flatness,
-    }
-    return document
-
-
-def _many(rejected: int, used: int) -> bool:
-    """Whether more than 1 % of the updates were rejected, beyond five standard deviations."""
-    return rejected > 1 + 0.01 * used
-
-
 def _print(document: dict[str, Any], out: Console) -> None:
     def line(text: str, style: str = "") -> None:
-        out.print(text, style=style or None, soft_wrap=True)
+        out.print(text, style=style or None)
 
     def axes(values: dict[str, float]) -> str:
         return ", ".join(f"{axis} {short(value)}" for axis, value in values.items())

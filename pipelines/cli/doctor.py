@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, print_json, print_table
+from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, give, print_table
 
 if TYPE_CHECKING:
     from pipelines.doctor.documents import DoctorDocument
@@ -40,10 +40,7 @@ def command(
     from schemas.errors import DONE, PART_FAILED
 
     document = examine(archive, station, free_gb)
-    if as_json:
-        print_json(document)
-    else:
-        _show(document)
+    give(document, _show, as_json=as_json)
     raise typer.Exit(DONE if document["ok"] else PART_FAILED)
 
 
@@ -70,5 +67,5 @@ def _show(document: DoctorDocument) -> None:
             needed = f", needed: {c['needed']}" if c["needed"] else ""
             remedy = f"; {c['remedy']}" if c["remedy"] else ""
             text = f"{state}: {c['part']}, {c['check']}: {c['found']}{needed}{remedy}"
-            out.print(text, style=COLOURS[state], soft_wrap=True)
+            out.print(text, style=COLOURS[state])
     out.print(f"{document['faults']} faults, {document['warnings']} warnings")

@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli.import_document import import_document
 from pipelines.cli.options import (
     ArchiveOption,
     GroupOption,
     JoinOption,
     JsonOption,
     console,
+    error_console,
     print_json,
     print_table,
     short,
@@ -158,6 +158,7 @@ def command(
         raise typer.Exit(import_and_print(files, procedure, part, unit, stated, archive, as_json=as_json))
     if procedure:
         raise typer.Exit(_transfer(files, procedure, unit, effects, archive, as_json=as_json))
+    from pipelines.diagnosis.import_document import import_document
     from pipelines.importers import mapping as mapped
 
     given: dict[str, Any] = mapped.from_file(mapping) if mapping else {}
@@ -194,7 +195,8 @@ def command(
 
         stated = stated_references(references, keys)
     sets = [files] if keys.get("join") else [[path] for path in files]
-    imports = [import_document(paths, keys, str(mapping or "import"), fit, archive, stated) for paths in sets]
+    working, where = error_console().status, str(mapping or "import")
+    imports = [import_document(paths, keys, where, fit, archive, stated, working) for paths in sets]
     verdicts = [one["adequate"] for one in imports if one["fit"]]
     adequate = False if False in verdicts else None if None in verdicts else True
     if as_json:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.archive import Run
-from pipelines.cli.options import console, error_console, print_json
+from pipelines.cli.options import console, error_console, give
 from schemas.errors import DONE, PART_FAILED
 from schemas.units import AXES
 
@@ -40,10 +40,7 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
         )
         done = Archive(run.archive.root).run(outcome.new)
         document = fit_document(done, run.id)
-    if as_json:
-        print_json(document)
-    else:
-        _print(document)
+    give(document, _print, as_json=as_json)
     passed = all(unit["outcome"] == "pass" for unit in document["units"])
     return DONE if document["adequate"] is True and passed else PART_FAILED
 

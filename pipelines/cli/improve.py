@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive, Run
 from pipelines.cli.options import (
     ArchiveOption,
     ByOption,
@@ -20,13 +21,15 @@ from pipelines.cli.options import (
     JsonOption,
     LeaveOutOption,
     error_console,
-    print_json,
+    give,
 )
 from pipelines.improvement.improvement import ImprovedTables, Improvement
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from pipelines.jobs.job import Job
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 215
@@ -37,6 +40,9 @@ EXAMPLES = (
 )
 CHOICES = "y or Enter adds it, n leaves it out; Ctrl-C stops, and nothing is written"
 UNATTENDED = "improve: standard input ended before an answer, a line is needed; give --yes to run without an operator"
+
+
+MEASURES = "y or Enter measures them, n leaves it; Ctrl-C stops, and the same command continues"
 
 
 def command(
@@ -106,10 +112,7 @@ def command(
     document = improvement.run(judged, _names(choose), yes=yes)
     find = partial(judged_data, data, beside, archive)
     document["next"] = next_lines(document, target, find, after=document["after"] or document["diagnosis"])
-    if as_json:
-        print_json(document)
-    else:
-        print_improvement(document)
+    give(document, print_improvement, as_json=as_json)
     raise typer.Exit(DONE if document["adequate"] and not document["refuted"] else PART_FAILED)
 
 
@@ -158,7 +161,6 @@ class _Terminal:
 
     def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
         """A fresh run of the archive, or one that the station measures now."""
-        from pipelines.cli.improve_fresh import fresh_run
         from pipelines.cli.inputs import dwells_and_history
 
         name = fresh_run(self._data, self._archive, measure=self._measure)
@@ -182,3 +184,55 @@ def _target(model: Path | None, output: Path | None) -> Path:
 
 def _names(listed: str) -> list[str]:
     return list(dict.fromkeys(part.strip() for part in listed.split(",") if part.strip()))
+
+
+def fresh_run(source: str, archive: str | None, *, measure: bool | None) -> str:
+    """The fresh run of a run; empty where there is none and none is measured.
+
+    Parameters
+    ----------
+    source : a file or a run, as it was named
+    measure : whether the station measures one where the archive has none; None: ask at the terminal, else not
+    """
+    from pipelines.importers.files import is_file
+    from pipelines.jobs.fresh_run import fresh_run_of, repeatable
+
+    if is_file(source):
+        return ""
+    store = Archive(archive)
+    run = store.run(source)
+    fresh = fresh_run_of(store, run)
+    if fresh is not None:
+        text = f"fresh run: {fresh.id}, the same units measured again"
+        error_console().print(text)
+        return fresh.id
+    if measure is False or not repeatable(run):
+        return ""
+    return _measured(store, run, ask=measure is None)
+
+
+def _measured(store: Archive, run: Run, *, ask: bool) -> str:
+    from pipelines.cli.terminal import agreed, attended
+    from pipelines.jobs.fresh_run import fresh_repeat
+    from pipelines.jobs.job import job_of_run, measured_again
+
+    if ask and not attended():
+        return ""
+    job = measured_again(job_of_run(run), fresh_repeat(store, run))
+    question = (
+        f"Measure the same {len(job.lot.units)} units again on station {job.station.name} as a fresh run "
+        f"({_minutes(job):.0f} min of station time)?"
+    )
+    if ask and not agreed(question, MEASURES):
+        return ""
+    from pipelines.cli.run import measured
+
+    return measured(job, store, None, asks=attended() and job.station.kind == "modbus").id
+
+
+def _minutes(job: Job) -> float:
+    """Station time of a job, min."""
+    from pipelines.schedule.steps import steps
+    from pipelines.schedule.timing import minutes
+
+    return minutes(steps(job.recipe), job.station, job.recipe).total

@@ -130,7 +130,7 @@ def _print(one: InspectDocument) -> None:
     _print_intervals(one)
     for text in one["open"]:
         out.print(f"  to be added by you: {text}")
-    out.print(one["command"], soft_wrap=True)
+    out.print(one["command"])
 
 
 def _print_columns(one: InspectDocument) -> None:

@@ -19,7 +19,7 @@ from pipelines.cli.options import (
     StationOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
     short,
 )
@@ -102,10 +102,7 @@ def command(
         request, Archive(archive), settings, _approval(yes=yes, at_terminal=at_terminal), direct=direct, paused=paused
     )
     document["command"] = _continue_command() if document["ended"] in {"asked", "declined"} else None
-    if as_json:
-        print_json(document)
-    else:
-        print_inquiry(document, archive)
+    give(document, lambda _: print_inquiry(document, archive), as_json=as_json)
     raise typer.Exit(DONE if document["ended"] in SETTLED else PART_FAILED)
 
 
@@ -176,7 +173,7 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
 
     runs = len(joint.lineage.runs)
     text = f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}"
-    error_console().print(text, soft_wrap=True)
+    error_console().print(text)
 
 
 def _continue_command() -> str:
@@ -196,7 +193,7 @@ def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
 
     out = console()
     good = document["ended"] in {"adequate", "told_apart"}
-    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red", soft_wrap=True)
+    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red")
     _rounds(document)
     print_findings(document)
     out.print(f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow")
@@ -214,7 +211,7 @@ def _rounds(document: dict[str, Any]) -> None:
         f"Station time: {first} min first run ({document['run']}), {further} min follow-ups "
         f"({100.0 * minutes['share']:.0f} %), {short(minutes['budget'])} min budget."
     )
-    console().print(text, soft_wrap=True)
+    console().print(text)
     if document["rounds"]:
         lines = [[r["run"], short(r["minutes"]), "\n".join(r["why"])] for r in document["rounds"]]
         print_table(["run", "station time, min", "reason"], lines, title="Follow-ups")

@@ -69,7 +69,7 @@ def command(
     for what in ([f"PROV in {prov}"] if prov else []) + (
         [f"RO-Crate with {number_of(copied, 'file')} in {crate}"] if crate else []
     ):
-        console().print(what, soft_wrap=True)
+        console().print(what)
 
 
 def _print(tree: Tree) -> None:

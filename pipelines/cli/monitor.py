@@ -69,7 +69,6 @@ def command(
         raise WrongUse("monitor: --webhook posts while the service runs, --serve is needed; give it too")
     monitor = Monitor(Archive(archive), days, free_gb, tuple(queue or ()))
     if serve:
-        from pipelines.monitoring.alerts import Poster
         from stations.safety.folder import state_folder
 
         _serve(monitor, host, port, Poster(address, state_folder()) if address else None, audits)
@@ -83,7 +82,7 @@ def command(
         print_json(document)
     else:
         for problem in document["problems"]:
-            console().print(problem, soft_wrap=True)
+            console().print(problem)
         console().print("healthy" if document["ok"] else f"{len(document['problems'])} problems")
     raise typer.Exit(DONE if document["ok"] else PART_FAILED)
 

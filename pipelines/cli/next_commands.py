@@ -147,17 +147,15 @@ def print_extension(out: Console, document: dict[str, Any], find: FindData, mode
     file = model or free_name()
     new = not (model and model.exists())
     if data.refusal is not None and (why := data.refusal([*document["effects"], *document["recommended"]])):
-        out.print(why, style="yellow", soft_wrap=True)
+        out.print(why, style="yellow")
     print_next(out, extension(file, document["recommended"], document["effects"], data, new=new))
     if not data.fresh:
         its_own = " and its temperatures with --fresh-history" if data.history else ""
-        out.print(MEASURE_AGAIN.format(history=its_own), style="dim", soft_wrap=True)
+        out.print(MEASURE_AGAIN.format(history=its_own), style="dim")
 
 
 def free_name() -> str:
     """A name for a new model file; an existing file belongs to another model."""
-    from pathlib import Path
-
     names = ("model.toml", *(f"model-{k}.toml" for k in range(2, 1000)))
     return next(name for name in names if not Path(name).exists())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -144,6 +144,14 @@ def error_console() -> Console:
     from pipelines.cli.console import WordConsole
 
     return WordConsole(stderr=True, highlight=False, markup=False, emoji=False)
+
+
+def give(document: Any, show: Callable[[Any], object], *, as_json: bool) -> None:
+    """The result of a command: its document as JSON, or what ``show`` prints of it for people."""
+    if as_json:
+        print_json(document)
+    else:
+        show(document)
 
 
 def print_json(document: Any) -> None:

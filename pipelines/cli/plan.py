@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -15,10 +15,10 @@ from pipelines.cli.options import (
     RecipeArgument,
     StationOption,
     error_console,
+    give,
     print_json,
 )
 from pipelines.cli.plan_files import save, write_page, write_pictures
-from pipelines.cli.plan_options import DeviceOption, EffectsOption, NoiseOption, PageOption, WanderOption, with_model
 from pipelines.cli.text.plan_text import print_plan, print_procedures
 from schemas.errors import PART_FAILED
 from schemas.limits import Limits
@@ -26,6 +26,7 @@ from schemas.recipe import Recipe
 
 if TYPE_CHECKING:
     from typer._click import Context
+
 
 PART = "Measure"
 ORDER = 120
@@ -48,6 +49,32 @@ EXAMPLES_OF = {
 
 
 RECIPE = "recipe"
+
+
+DeviceOption = Annotated[
+    str,
+    typer.Option(
+        "--device", metavar="PRESET", help="Preset with the noise of the device; the recipe's device by default."
+    ),
+]
+NoiseOption = Annotated[
+    float | None,
+    typer.Option("--noise", min=0.0, help="White noise density of the device, µg/√Hz; the preset's by default."),
+]
+WanderOption = Annotated[
+    float | None,
+    typer.Option(
+        "--wander",
+        min=0.0,
+        help="Flicker floor of the Allan deviation, µg, without random walk; flicker and random walk of the preset by default.",
+    ),
+]
+EffectsOption = Annotated[
+    str, typer.Option("--effects", metavar="a,b,c", help="Effects of the model; the recipe's by default.")
+]
+PageOption = Annotated[
+    Path | None, typer.Option("--page", metavar="FILE.html", help="Also write an HTML page with pictures to this file.")
+]
 
 
 class _RecipeFirst(TyperGroup):
@@ -135,10 +162,7 @@ def command(
         document["page"] = str(page)
     if pictures is not None:
         write_pictures(pictures, document, context)
-    if as_json:
-        print_json(document)
-    else:
-        print_plan(document)
+    give(document, print_plan, as_json=as_json)
     stated = document.get("uncertainty")
     if stated is not None and stated["unreachable"]:
         raise typer.Exit(PART_FAILED)
@@ -284,3 +308,24 @@ def _limits(recipe: Recipe, home: Path) -> Limits | None:
         return load_limits(recipe, home)
     except RecipeInvalid:
         return None
+
+
+def with_model(recipe: str, effects: str, model: Path | None, archive: str | None, station: str) -> Recipe:
+    """The recipe, with another model where one is given; the archive is read only for a recipe with the line's model."""
+    from pipelines.jobs.model_files import chosen_effects, use_formulas
+    from pipelines.jobs.recipes import load_recipe
+
+    chosen = chosen_effects(effects, model, "plan")
+
+    def line(device: str) -> dict[str, Any]:
+        from pipelines.archive import Archive
+        from pipelines.jobs.releases import line_model
+
+        if chosen:
+            return {"effects": chosen}
+        keys = line_model(Archive(archive), device, station)
+        use_formulas(keys["formulas"], "the line's model")
+        return keys
+
+    loaded = load_recipe(recipe, line)
+    return loaded.model_copy(update={"effects": list(chosen)}) if chosen else loaded

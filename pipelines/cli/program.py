@@ -14,7 +14,7 @@ from pipelines.cli.options import (
     StationOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
 )
 
@@ -79,10 +79,7 @@ def command(
         lambda text: out.print(f"program: {text}"),
     )
     result = document(source, outcomes, given)
-    if as_json:
-        print_json(result)
-    else:
-        _print(result)
+    give(result, _print, as_json=as_json)
     raise typer.Exit(PART_FAILED if any(one.outcome != "proved" for one in outcomes) else DONE)
 
 

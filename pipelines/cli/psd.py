@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -20,14 +20,11 @@ from pipelines.cli.options import (
     TimeUnitOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
     short,
 )
 from schemas.errors import WrongUse
-
-if TYPE_CHECKING:
-    from pipelines.importers.series import EvenSeries
 
 PART = "Results"
 ORDER = 375
@@ -36,13 +33,6 @@ EXAMPLES = (
     "tumbleline psd rest.csv --rate 100",
     "tumbleline psd rest.csv --rate 100 --plot psd.png",
 )
-
-SHORTEST_SEGMENT = 64
-SHORTEST_TAU = 8
-"""Samples of the shortest averaging time from the spectrum: what lies above half the sampling rate is missing in it."""
-
-LONGEST_TAU = 8
-"""Parts of a segment that the longest averaging time from the spectrum is: slower is not resolved."""
 
 
 def command(
@@ -67,6 +57,7 @@ def command(
 
     σ²(τ) = 2·∫ S(f)·sin⁴(πfτ)/(πfτ)² df (IEEE Std 952). Where the two differ, the record holds lines, jumps or a drift.
     """
+    from pipelines.chain.noise_documents import psd_document
     from pipelines.cli.series_options import even_series, write_pictures
 
     series = even_series(source, columns, (time, time_unit, rate), unit, archive, stretch)
@@ -77,61 +68,7 @@ def command(
     with error_console().status("averaging"):
         document = psd_document(series, segment)
     write_pictures(document, plot, page)
-    if as_json:
-        print_json(document)
-    else:
-        _print(document)
-
-
-def psd_document(series: EvenSeries, segment: int | None = None) -> dict[str, Any]:
-    """Spectra of every channel of a series, and σ(τ) from them and from the samples.
-
-    Raises
-    ------
-    DataRejected
-        The record is too short for a segment.
-    """
-    import numpy as np
-
-    from inertial.noise.allan import overlapping
-    from inertial.noise.psd import allan_variance, one_sided
-    from schemas.errors import DataRejected
-
-    n = series.values.shape[1]
-    length = n // 8 if segment is None else segment
-    if not SHORTEST_SEGMENT <= length <= n:
-        raise DataRejected(
-            f"{series.where}: segments of {length} samples in a record of {n}, {SHORTEST_SEGMENT} to {n} are possible; "
-            f"{'record longer' if segment is None else 'correct --segment'}"
-        )
-    spectrum = one_sided(series.values, series.rate_hz, segment=length)
-    m = SHORTEST_TAU * 2 ** np.arange(int(np.log2(max(length // LONGEST_TAU // SHORTEST_TAU, 1))) + 1)
-    m = m[2 * m <= n - 1]
-    direct = overlapping(series.values, series.rate_hz, m)
-    # the segment's mean is taken out: its zero frequency says nothing
-    density = spectrum.density.copy()
-    density[..., 0] = density[..., 1]
-    derived = np.sqrt(allan_variance(spectrum.frequency, density, direct.tau))
-    rows = [
-        {
-            "channel": name,
-            "density": spectrum.density[k].tolist(),
-            "median_amplitude": float(np.median(spectrum.amplitude[k, 1:])),
-            "tau_s": direct.tau.tolist(),
-            "deviation_from_density": derived[k].tolist(),
-            "deviation": direct.deviation[k].tolist(),
-        }
-        for k, name in enumerate(series.names)
-    ]
-    return {
-        "source": series.where,
-        "unit": series.unit,
-        "rate_hz": series.rate_hz,
-        "samples": n,
-        "segment": length,
-        "frequency_hz": spectrum.frequency.tolist(),
-        "spectra": rows,
-    }
+    give(document, _print, as_json=as_json)
 
 
 def _print(document: dict[str, Any]) -> None:

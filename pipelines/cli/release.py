@@ -43,8 +43,6 @@ def command(
     Recipes with model = "line" use the model from this date on. It needs a what-if in the archive with the verdict 'better' (see
     'tumbleline whatif'), or --force and a reason. Releases are never changed; a later release replaces an earlier one.
     """
-    from pipelines.archive import Archive
-
     store = Archive(archive)
     if listed:
         _refuse_both(model)

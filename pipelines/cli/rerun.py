@@ -22,7 +22,7 @@ from pipelines.cli.options import (
     WorkersOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
 )
 
@@ -63,7 +63,6 @@ def command(
     Old runs are never overwritten: a changed result is a new run. After an interruption, give the same command again to continue.
     Exit status 1: a run could not be re-analysed, or with --check was not reproduced.
     """
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import change_from_options
     from pipelines.parallel import processors
     from pipelines.rerun.selection import selected
@@ -82,10 +81,7 @@ def command(
     outcomes: list[RerunOutcome] = _mapped(run_again, store, runs, (change, dask, count), report=report)
     add_runs(store, [one.new for one in outcomes if one.new])
     document = {"archive": str(store.root), "runs": [asdict(one) for one in outcomes], **_counts(outcomes)}
-    if as_json:
-        print_json(document)
-    else:
-        _print(outcomes, document, archive)
+    give(document, lambda _: _print(outcomes, document, archive), as_json=as_json)
     raise typer.Exit(1 if document["failed"] else 0)
 
 
@@ -179,10 +175,7 @@ def _check(store: Archive, runs: list[str], change: ModelChange, how: tuple[str,
         "same": len(results) - len(differ),
         "runs": [{**asdict(one), "same": one.same} for one in results],
     }
-    if as_json:
-        print_json(document)
-    else:
-        _print_check(results)
+    give(document, lambda _: _print_check(results), as_json=as_json)
     raise typer.Exit(1 if differ else 0)
 
 

@@ -70,7 +70,6 @@ def command(
     measurements. A lot that is larger than the fixture is measured in several fillings, if an operator at the terminal seats the
     units.
     """
-    from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.cli.next_commands import print_next
     from pipelines.cli.summary import exit_status, print_summary, summary

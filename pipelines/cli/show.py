@@ -53,8 +53,6 @@ def command(
 
     Exit status 1: no calibration of the unit is valid on that date.
     """
-    from pipelines.archive import Archive
-
     store = Archive(archive)
     if at or known or _is_unit(store, run):
         from pipelines.cli.validity import show_validity
@@ -92,7 +90,7 @@ def _show_run(run: Run, *, as_json: bool) -> None:
     if document["units"]:
         print_summary(document)
     else:
-        console().print(_unfinished(run), soft_wrap=True)
+        console().print(_unfinished(run))
     console().print(f"tables  {', '.join(tables)}")
 
 

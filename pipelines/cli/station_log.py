@@ -35,8 +35,6 @@ def log(
     as_json: JsonOption = False,
 ) -> None:
     """Show events that paused or ended runs (from the archive) and events of stations (from the log of this computer)."""
-    from pipelines.archive import Archive
-
     recorded = [*_of_runs(Archive(archive), run), *([] if run else _of_machine())]
     events = [event for event in recorded if everything or event["kind"] not in QUIET]
     events = sorted(events, key=lambda event: event["when"])[-limit:]

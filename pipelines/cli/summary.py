@@ -97,9 +97,9 @@ def print_summary(document: dict[str, Any]) -> None:
     print_table(["slot", "unit", "result", "grade", *(title for _, title in shown)], lines)
     out = console()
     if calibrated:
-        out.print(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim", soft_wrap=True)
+        out.print(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim")
         if any(name == "velocity_random_walk_ug_rtHz" for name, _ in shown):
-            out.print(NOISE_LEGEND, style="dim", soft_wrap=True)
+            out.print(NOISE_LEGEND, style="dim")
     for unit in document["units"]:
         if unit["reasons"]:
             out.print(f"  {unit['unit']}: {unit['reasons']}")
@@ -107,7 +107,7 @@ def print_summary(document: dict[str, Any]) -> None:
     if any(unit.get("basis") != "budget" for unit in document["units"]):
         out.print(f"  {NOISE_ONLY}", style="dim")
     for line in _interrupted(document["interruptions"]):
-        out.print(line, soft_wrap=True)
+        out.print(line)
     total = len(document["units"])
     out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
     out.print(f"run     {document['run']}")

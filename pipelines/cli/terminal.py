@@ -67,7 +67,7 @@ def agreed(question: str, choices: str = MEASURES, unattended: str = UNATTENDED)
         if answer in STOP:
             return False
         message = f"'{answer}' is neither yes nor no: {choices}"
-        error_console().print(message, style="yellow", soft_wrap=True)
+        error_console().print(message, style="yellow")
 
 
 def attended() -> bool:
@@ -77,7 +77,7 @@ def attended() -> bool:
 
 def _line(question: str, unattended: str = UNATTENDED) -> str:
     """A line of standard input; its end is an error."""
-    error_console().print(question, end="", soft_wrap=True)
+    error_console().print(question, end="")
     line = sys.stdin.readline()
     if not line:
         raise WrongUse(unattended)

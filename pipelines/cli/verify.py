@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, give
 from pipelines.integrity import Report
 from schemas.errors import DONE, PART_FAILED
 
@@ -98,10 +98,7 @@ def command(
             also=[check_index],
             progress=lambda done, total: status.update(f"reading {done}/{total}"),
         )
-    if as_json:
-        print_json(report.document())
-    else:
-        _print(report)
+    give(report.document(), lambda _: _print(report), as_json=as_json)
     raise typer.Exit(DONE if report.whole else PART_FAILED)
 
 

@@ -18,7 +18,7 @@ from pipelines.cli.options import (
     WorkersOption,
     console,
     error_console,
-    print_json,
+    give,
     print_table,
     short,
 )
@@ -56,7 +56,6 @@ def command(
     The lots are fitted, verified and graded in memory; only the result is stored, as evidence for 'tumbleline release'. Exit
     status 1: the model is not better.
     """
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.selection import selected
     from pipelines.rerun.whatif import BETTER
@@ -65,10 +64,7 @@ def command(
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
     document = _evaluated(store, runs, change, dask, workers)
-    if as_json:
-        print_json({"archive": str(store.root), **document})
-    else:
-        _print(document)
+    give({"archive": str(store.root), **document}, lambda _: _print(document), as_json=as_json)
     raise typer.Exit(0 if document["verdict"] == BETTER else 1)
 
 

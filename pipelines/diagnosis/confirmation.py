@@ -33,7 +33,7 @@ def progress(
     ----------
     before, after : fitted to the same dwells; out : of ``after``, on dwells left out
     fresh : the fresh run in the scale of the first; None if there is none
-    doubt : why the run itself may imitate the effects, see :func:`pipelines.diagnosis.doubts.doubt_of_run`; called only
+    doubt : why the run itself may imitate the effects, see :func:`pipelines.diagnosis.compare.doubt_of_run`; called only
         without a fresh run, where dwells left out are for the effects
 
     Returns

@@ -15,7 +15,6 @@ LARGEST_OFFSET_S = 5.0
 """Largest difference of two clocks, s: the order of runs and the days of certificates follow the clock of the host."""
 
 PROBE_BYTES = 2**20  # more than one block or one quota's grain: a full disk refuses it
-MEBI = 2**20
 
 
 class Check(NamedTuple):

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.importers.content import Content, unit_in
-from pipelines.importers.text_layout import BLANKS, Layout, filled_lines, is_comment, layout
+from pipelines.importers.text_layout import Layout, filled_lines, is_comment, layout
 from pipelines.importers.thousands import without_thousands
 from schemas.errors import DataRejected
 from schemas.foreign import foreign, shown
@@ -194,8 +194,3 @@ def _remarks(detected: Layout, lines: Sequence[str], encoding: str) -> tuple[str
     if encoding != "UTF-8":
         remarks.append(f"text in {encoding}")
     return tuple(remarks)
-
-
-def divider_name(divider: str) -> str:
-    """A divider as text."""
-    return {"\t": "tab", BLANKS: "blanks", ",": "comma", ";": "semicolon", "|": "bar"}[divider]

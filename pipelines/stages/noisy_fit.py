@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial import design
+from inertial import effects as catalogue
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.refinement import terms_of
 from inertial.fits.linear import LotFit, felt_force, fit_lot, own_axes, pseudo_inverses
 from inertial.fits.wander import WanderFit, fit_lot_with_wander, student
-from pipelines.stages.nonlinear import profiled
 from pipelines.tables.dwells import LotArrays
 from schemas.errors import DataRejected
 from schemas.units import STANDARD_GRAVITY_M_S2
@@ -22,6 +24,9 @@ FEWEST_TO_SPARE = 4  # degrees of freedom of the lot, below which the kind of it
 _PER_G = {"g": 1.0, "m/s^2": STANDARD_GRAVITY_M_S2}
 """Output per g by the name of the output's unit, for models without a scale."""
 _TURNED_G = 0.1  # difference of force between dwells from which on they have more than one orientation
+
+
+PLAIN = ("bias", "scale", "misalignment")
 
 
 @dataclass(frozen=True)
@@ -153,3 +158,31 @@ def _per_g(lot: LotArrays, lot_fit: LotFit) -> Array:
 def birge_squared(lot_fit: LotFit) -> Array:
     """χ²/ν of every unit and axis, never below one, (units, 3)."""
     return np.maximum(1.0, lot_fit.chi2 / np.maximum(lot_fit.dof, 1))
+
+
+def profiled(lot: LotArrays, effects: Sequence[str], used: NDArray[np.bool_]) -> dict[str, dict[str, Any]]:
+    """Values of nonlinear parameters and constants by effect id, one or one per axis; none for a linear model.
+
+    Parameters
+    ----------
+    used : (n,), the dwells that are fitted
+    """
+    model = catalogue.get_all(effects)
+    if not any(effect.parameters(lot.state) for effect in model):
+        return {}
+    return {term.effect.id: term.keywords for term in terms_of(model, Problem(_in_g(lot, used))) if term.keywords}
+
+
+def _in_g(lot: LotArrays, used: NDArray[np.bool_]) -> Lot:
+    """The lot in g, over the nominal scale of each unit and axis; dwells that are not fitted count as missing."""
+    response = fit_lot(PLAIN, lot.state, lot.output, np.where(used[:, None], lot.standard_error, np.inf)).response()
+    scale = np.abs(np.diagonal(response, axis1=-2, axis2=-1))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    error = lot.standard_error / scale[:, None, :]
+    error = np.where(error > 0.0, error, np.median(error))
+    return Lot(
+        lot.state,
+        np.where(used[:, None], lot.output / scale[:, None, :], 0.0),
+        np.where(used[:, None], error, np.inf),
+        response / scale[..., None],
+    )

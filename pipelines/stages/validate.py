@@ -13,9 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
-from inertial.pointing import contradicts
+from inertial.pointing import _force, contradicts, pointing_error
 from pipelines.stages.frozen import frozen
-from pipelines.stages.pointing import pointing_of
 from pipelines.tables.samples import PROCEDURE, STATIC
 from pipelines.tables.summaries import HIGHS, LOWS, means, summarised
 from schemas.lot import Unit
@@ -27,6 +26,9 @@ FOLLOWED_SHARE = 0.2  # a sensor that follows less than a fifth of the chamber's
 FORCE_EXPLAINS = 0.5  # of an axis' variance over the poses; a live channel has more than 0.99
 TURNED_G = 0.5  # a follow-up may stay in a few poses: an axis that they hardly turn shows no response
 SAMPLES_KEPT = 0.99
+
+
+Array = NDArray[np.float64]
 
 
 class DataFault(NamedTuple):
@@ -236,3 +238,27 @@ def _explained_by_force(rows: pd.DataFrame) -> NDArray[np.float64]:
         1.0 - np.sum(left**2, axis=0) / np.where(total > 0.0, total, 1.0),
         0.0,
     )
+
+
+def pointing_of(means: pd.DataFrame, readings: pd.DataFrame) -> float:
+    """The largest pointing error of a run's soaks, from the mean outputs and the readings of its static dwells.
+
+    Parameters
+    ----------
+    means : unit, record and the mean outputs x, y, z; a unit with a gap in a soak does not count there
+    """
+    static = readings[(readings["kind"] != STATIC)].drop_duplicates("record").set_index("record").sort_index()
+    return max((_of_soak(means, rows) for _, rows in static.groupby("soak")), default=0.0)
+
+
+def _of_soak(means: pd.DataFrame, static: pd.DataFrame) -> float:
+    kept = [_by_record(rows, static.index) for _, rows in means.groupby("unit")]
+    whole = [table for table in kept if np.all(np.isfinite(table))]
+    if not whole:
+        return 0.0
+    return pointing_error(_force(static[["outer_deg", "inner_deg"]].to_numpy(dtype=float)), np.stack(whole, axis=1))
+
+
+def _by_record(rows: pd.DataFrame, records: pd.Index) -> Array:
+    """Mean outputs (n, 3) of one unit in order of record; NaN where one is missing."""
+    return rows.set_index("record")[list(AXES)].reindex(records).to_numpy(dtype=float)

@@ -12,10 +12,9 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, RedirectResponse, Response
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from inertial.errors import InertialError
-from pipelines.workbench.bodies import SmallBodies
 from pipelines.workbench.pages import Workbench, page
 from pipelines.workbench.security import Guard
 from pipelines.workbench.services import lots
@@ -27,6 +26,12 @@ from schemas.errors import TumblelineError
 from schemas.installed import not_installed
 
 ROUTES = "pipelines.workbench.routes"
+
+
+LARGEST = 1_000_000
+STREAMED = "/upload/file"
+"""Goes to the disk as it arrives, with a limit of its own."""
+CHANGING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 
 
 def create_app(settings: WorkbenchSettings, ending: Callable[[], bool] = lambda: False) -> ASGIApp:
@@ -84,3 +89,37 @@ def _answer(request: Request, text: str, status: int) -> Response:
     if "text/html" in request.headers.get("accept", "") and request.method == "GET":
         return page(request, "problem.html", PageState(), status=status, text=text)
     return JSONResponse({"problem": text}, status)
+
+
+class SmallBodies:
+    """Passes on requests whose body is of at most :data:`LARGEST` bytes."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on with its whole body, or answer 413."""
+        if scope["type"] != "http" or scope["method"] not in CHANGING or scope["path"] == STREAMED:
+            await self._app(scope, receive, send)
+            return
+        body, more = bytearray(), True
+        while more:
+            message = await receive()
+            if message["type"] != "http.request":  # the client has gone
+                return
+            body += message.get("body", b"")
+            more = message.get("more_body", False)
+            if len(body) > LARGEST:
+                text = f"{scope['path'][:80]}: more than {LARGEST} bytes, at most these are taken; send less"
+                await JSONResponse({"problem": text}, 413, {"connection": "close"})(scope, receive, send)
+                return
+        sent = False
+
+        async def given() -> Message:
+            nonlocal sent
+            if sent:
+                return await receive()
+            sent = True
+            return {"type": "http.request", "body": bytes(body), "more_body": False}
+
+        await self._app(scope, given, send)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, Protocol
 
 from schemas.profile import Profile
 from schemas.station_devices import Device, Devices
 from stations.codec import NotEncodable, Value
+from stations.plant import families
 from stations.plant.bank import Bank, Busy, number
-from stations.plant.line_device import LineDevice
 from stations.plant.memory_bank import MemoryBank
-from stations.plant.simulations import axis_bank, chamber_bank, chamber_line_device
+from stations.plant.table import Axis
 from stations.plant.world import World
 from stations.profile_files import profile_of
 
@@ -111,3 +114,40 @@ def _slot(world: World, unit: int, profile: Profile) -> Bank:
         **memory.sources(),
     }
     return Bank(profile, sources, commanded, lambda first, count: sampler.words(world.seats[unit], first, count))
+
+
+def family_names() -> list[str]:
+    """Names of the simulated families, sorted."""
+    return sorted(module.name for module in pkgutil.iter_modules(families.__path__))
+
+
+def axis_bank(world: World, axis: Axis, profile: Profile) -> Bank:
+    """The registers of the drive with a profile."""
+    return _module(profile).simulated(world, axis, profile)
+
+
+def chamber_bank(world: World, profile: Profile) -> Bank:
+    """The registers of the chamber controller with a profile."""
+    return _module(profile).simulated(world, profile)
+
+
+def chamber_line_device(world: World, profile: Profile) -> LineDevice:
+    """The chamber controller with a profile of text commands."""
+    return _module(profile).simulated(world, profile)
+
+
+def _module(profile: Profile) -> Any:
+    if profile.adapter not in family_names():
+        raise LookupError(
+            f"profile {profile.name}: no simulation of family {profile.adapter}, one is needed; add "
+            f"stations/plant/families/{profile.adapter}.py with a function 'simulated'"
+        )
+    return import_module(f"{families.__name__}.{profile.adapter}")
+
+
+class LineDevice(Protocol):
+    """A device that answers lines of text."""
+
+    def answer(self, line: str) -> tuple[str, bool]:
+        """The answer to a line, and whether the line changed anything."""
+        ...

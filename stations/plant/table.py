@@ -18,7 +18,6 @@ RING_TAU_S = 0.35
 HOLD_DEG = 0.0004  # where the servo comes to rest, one sigma around the target
 ENCODER_NOISE_DEG = 0.0003
 ENCODER_STEP_DEG = 0.001
-IN_POSITION_DEG = 0.005
 IN_POSITION_S = 1.5  # by then the ringing has fallen below the window
 
 

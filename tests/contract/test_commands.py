@@ -13,8 +13,7 @@ from typer.core import TyperCommand
 from typer.main import get_command
 from typer.testing import CliRunner
 
-from pipelines.cli import COMMANDS, app
-from pipelines.cli.discovery import IncompleteCommand, find_commands
+from pipelines.cli import COMMANDS, IncompleteCommand, app, find_commands
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

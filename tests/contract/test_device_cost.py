@@ -15,7 +15,7 @@ from stations.devices import families
 from stations.devices.adapters import adapters, axis_adapter, chamber_adapter
 from stations.opening import make_plant, open_station
 from stations.plant import families as simulated_families
-from stations.plant.simulations import family_names
+from stations.plant.banks import family_names
 from stations.profile_files import load_profile, profile_names
 
 ROOT = Path(__file__).resolve().parents[2]

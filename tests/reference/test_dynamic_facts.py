@@ -21,40 +21,22 @@ from inertial.errors import NotIdentified
 
 
 @pytest.mark.parametrize(
-    ("zeta", "three_db", "five_percent"),
+    ("zeta", "three_db"),
     [
-        *((0.5, 1.272, 0.322), (0.6, 1.148, 0.844), (0.65, 1.080, 0.720), (0.7, 1.010, 0.591)),
-        *((0.7071, 1.000, 0.573), (0.75, 0.940, 0.476), (0.8, 0.871, 0.390), (1.0, 0.644, 0.229)),
+        *((0.5, 1.272), (0.6, 1.148), (0.65, 1.080), (0.7, 1.010)),
+        *((0.7071, 1.000), (0.75, 0.940), (0.8, 0.871), (1.0, 0.644)),
     ],
 )
-def test_band_edges_of_a_second_order_sensor(zeta: float, three_db: float, five_percent: float) -> None:
+def test_band_edges_of_a_second_order_sensor(zeta: float, three_db: float) -> None:
     assert second_order.bandwidth(1.0, zeta) == pytest.approx(three_db, abs=6e-4)
-    assert second_order.flat_band(1.0, zeta) == pytest.approx(five_percent, abs=6e-4)
 
 
-@pytest.mark.parametrize("zeta", [0.01, 0.05, 0.1, 0.2, 0.3, 0.38])
-def test_half_power_width_gives_the_damping_exactly(zeta: float) -> None:
-    from scipy.optimize import brentq
-
-    height, place = second_order.peak(zeta)
-
-    def over(r: float) -> float:
-        return abs(complex(second_order.transfer(r, 1.0, zeta))) - height / np.sqrt(2.0)
-
-    low, high = brentq(over, 1e-9, place, xtol=1e-14), brentq(over, place, 3.0, xtol=1e-14)
-    assert second_order.damping_from_half_power(low, high) == pytest.approx(zeta, rel=1e-9)
-
-
-def test_the_usual_estimates_from_the_width_err_as_known() -> None:
-    for zeta, by_peak, by_natural in ((0.05, 0.005, 0.0025), (0.2, 0.091, 0.047), (0.38, 0.71, 0.45)):
-        phi = np.arcsin(zeta)
-        low, high = np.sqrt(np.cos(2 * phi) - np.sin(2 * phi)), np.sqrt(np.cos(2 * phi) + np.sin(2 * phi))
-        assert (high - low) / (2 * second_order.peak(zeta)[1]) / zeta - 1 == pytest.approx(by_peak, rel=0.06)
-        assert (high - low) / 2 / zeta - 1 == pytest.approx(by_natural, rel=0.06)
-
-
-def test_group_delay_at_rest() -> None:
-    assert second_order.group_delay(0.0, 2500.0, 0.7) == pytest.approx(89.1e-6, rel=2e-3)
+@pytest.mark.parametrize(("natural", "damping"), [(2500.0, 0.7), (2200.0, 0.6), (1800.0, 0.75), (900.0, 0.05)])
+def test_the_gain_at_the_bandwidth_is_three_decibels_down(natural: float, damping: float) -> None:
+    band = second_order.bandwidth(natural, damping)
+    assert abs(second_order.transfer(band, natural, damping)) == pytest.approx(1.0 / np.sqrt(2.0))
+    assert second_order.transfer(0.0, natural, damping) == -1.0
+    assert np.angle(-second_order.transfer(natural, natural, damping)) == pytest.approx(-np.pi / 2.0)
 
 
 SEVERITIES = {
@@ -66,23 +48,6 @@ SEVERITIES = {
 @pytest.mark.parametrize(("severity", "velocity"), SEVERITIES.items())
 def test_velocity_change_of_the_severities_of_iec_60068_2_27(severity: tuple[float, float], velocity: float) -> None:
     assert pulses.velocity_change(severity[0], 1e-3 * severity[1]) == pytest.approx(velocity, abs=6e-3)
-
-
-@pytest.mark.parametrize(
-    ("zeta", "peaks", "under"),
-    [
-        (0.7, (-0.051, 0.0, 0.0, 0.0, 0.0), (0.038, 0.024, 0.016, 0.010, 0.005)),
-        (0.6, (0.005, 0.019, 0.007, 0.003, 0.001), (0.081, 0.046, 0.031, 0.019, 0.009)),
-        (0.05, (0.62, 0.21, 0.10, 0.043, 0.011), None),
-    ],
-)
-def test_a_sensors_own_error_on_a_half_sine(zeta: float, peaks: tuple[float, ...], under: tuple | None) -> None:
-    for k, product in enumerate((1.0, 2.0, 3.0, 5.0, 10.0)):
-        shock = pulses.half_sine(1.0, product / 1000.0, 1000.0, zeta, band=0.02, points=20_000)
-        inside = shock.output[shock.time <= product / 1000.0 * 1.6].max() - 1.0
-        assert inside == pytest.approx(peaks[k], abs=0.006)
-        if under:
-            assert shock.undershoot == pytest.approx(under[k], abs=7e-4)
 
 
 def test_the_peak_of_a_noisy_pulse_is_not_its_largest_sample(rng: np.random.Generator) -> None:
@@ -137,8 +102,6 @@ def test_the_largest_response_and_the_undamped_residual() -> None:
         spectrum = shock_spectrum.shock_spectrum(np.sin(np.pi * t), 2000.0, x, q)
         assert spectrum.max() == pytest.approx(largest, abs=3e-4)
         assert x[int(np.argmax(spectrum))] == pytest.approx(place, abs=0.004)
-    assert shock_spectrum.undamped_residual(0.5) == pytest.approx(np.pi / 2.0)
-    assert shock_spectrum.undamped_residual(0.1) == pytest.approx(0.3963, abs=1e-4)
     with pytest.raises(NotIdentified, match="sample faster"):
         shock_spectrum.shock_spectrum(np.ones(10), 100.0, np.array([20.0]))
 
@@ -201,11 +164,6 @@ def test_response_by_h1_and_h2_and_its_random_error(rng: np.random.Generator) ->
     assert np.std(scatter) == pytest.approx(1.0, abs=0.08)
 
 
-def test_a_delay_between_the_channels_biases_the_magnitude() -> None:
-    assert [spectra.delay_bias(s, 1.0) for s in (1 / 32, 1 / 8, 1 / 4)] == pytest.approx([0.994, 0.90, 0.66], abs=0.006)
-    assert spectra.delay_bias(0.25, 1.0, "none") == pytest.approx(0.75, abs=1e-3)
-
-
 def test_confidence_of_a_density_and_butterworth_figures() -> None:
     for n, low, high in ((60, -2.3, 1.9), (120, -1.6, 1.3), (240, -1.1, 1.0)):
         assert spectra.density_confidence(n / 2.0) == pytest.approx((low, high), abs=0.13)
@@ -219,9 +177,7 @@ def test_what_five_times_the_bandwidth_leaves_folded() -> None:
         assert folded == pytest.approx([second, one], abs=0.6)
 
 
-def test_rectification_by_clipping_and_the_hann_mean(rng: np.random.Generator) -> None:
-    for reach, shift in ((2.0, -0.436), (2.048, -0.425), (4.0, -0.119), (8.0, -0.002)):
-        assert random_vibration.gaussian_clipping(2.5, 1.0, reach) == pytest.approx(shift, abs=2e-3)
+def test_overall_level_and_the_hann_mean(rng: np.random.Generator) -> None:
     flat = np.array([20.0, 2000.0]), np.array([0.03, 0.03])
     made = np.array([random_vibration.made_signal(*flat, 8000.0, 16_000, rng)[4000:12_000] for _ in range(60)])
     assert np.std(made) == pytest.approx(random_vibration.overall_level(*flat), rel=0.01)
@@ -241,12 +197,17 @@ def test_step_response_overshoot_and_settling() -> None:
         1.0: (4.74, 5.83, 6.64, 9.23),
     }
     for zeta, angles in table.items():
-        assert [settling.settling_angle(zeta, band) for band in (0.05, 0.02, 0.01, 0.001)] == pytest.approx(
-            angles, abs=0.012
-        )
-    assert settling.damping_from_decrement(1.0, np.exp(-2 * np.pi * 0.1 / np.sqrt(1 - 0.01) * 3), 3) == pytest.approx(
-        0.1
-    )
+        t = np.linspace(0.0, 60.0 / zeta, 400_001)
+        step = settling.step_response(t, 0.5 / np.pi, zeta)
+        settled = [settling.settling_time(t, step, final=1.0, band=band) for band in (0.05, 0.02, 0.01, 0.001)]
+        assert settled == pytest.approx(angles, abs=0.012)
+
+
+def test_settling_is_the_time_after_which_nothing_leaves_the_band() -> None:
+    t = np.linspace(0.0, 10.0, 10_001)
+    assert settling.settling_time(t, 1.0 - np.exp(-t), final=1.0, band=0.01) == pytest.approx(np.log(100.0), abs=2e-3)
+    with pytest.raises(NotIdentified, match="record longer"):
+        settling.settling_time(t[:1000], 1.0 - np.exp(-t[:1000]), final=1.0, band=0.01)
 
 
 def test_budget_of_a_shaker_by_the_gum() -> None:
@@ -254,9 +215,6 @@ def test_budget_of_a_shaker_by_the_gum() -> None:
     parts = [0.25, 0.2 / r3, 0.1 / r3, 100 * 0.03 * 0.10 / r3, 0.2 / r3, 0.04 / r3, 0.1 / r3, 0.05, 0.1 / np.sqrt(5.0)]
     assert exciter.combined(parts) == pytest.approx(0.362, abs=1e-3)
     assert 2.0 * exciter.combined(parts) == pytest.approx(0.72, abs=5e-3)
-    rng = np.random.default_rng(1)
-    s, a, beta = rng.uniform(0, 1, (3, 400_000)) * np.array([1.0, 1.0, 2 * np.pi])[:, None]
-    assert np.std(s * a * np.cos(beta)) == pytest.approx(exciter.transverse_error(1.0, 1.0), rel=5e-3)
 
 
 def test_limits_of_the_exciter_decide_the_level() -> None:
@@ -267,18 +225,6 @@ def test_limits_of_the_exciter_decide_the_level() -> None:
 
 
 def test_centrifuge_relations() -> None:
-    assert [1e6 * centrifuge.earth_rate_share(w, 45.0) for w in (5.0, 20.0, 60.0)] == pytest.approx(
-        [21, 5, 1.7], abs=0.4
-    )
-    assert [1e3 * centrifuge.lever_arm(w, 1e-3) for w in (100, 300, 360, 1000)] == pytest.approx(
-        [0.31, 2.8, 4.0, 31], rel=0.02
-    )
-    slope = 0.5 / centrifuge.STANDARD_GRAVITY
-    for distance, ppm in ((0.02, 440), (0.05, 179), (0.1, 92), (0.2, 50)):
-        far = slope * (0.5 + distance) / 0.5
-        estimate, error = centrifuge.scale_from_two_radii((slope, far), (1e-5 * slope, 1e-5 * far), distance, 5e-6)
-        assert estimate == pytest.approx(1.0)
-        assert 1e6 * error == pytest.approx(ppm, rel=0.04)
     x = np.linspace(0.1, 1.0, 10)
     for largest, k2, k3 in ((1.0, 69, 127), (10.0, 0.69, 0.13), (100.0, 0.0069, 0.00013)):
         a = np.sqrt(x) * largest if False else np.concatenate([x, -x]) * largest
@@ -329,14 +275,6 @@ def test_warm_up_time_of_an_exponential() -> None:
     assert time == pytest.approx(899.0, abs=2.0)
     with pytest.raises(NotIdentified, match="record longer"):
         stability.warm_up_time(t[:800], 1000.0 * np.exp(-t[:800] / 300.0), band=5.0, window_s=1.0)
-
-
-def test_factors_of_a_standard_deviation_from_few_cycles() -> None:
-    for n, low, high, upper in (
-        *((5, 0.60, 2.87, 2.37), (6, 0.62, 2.45, 2.09), (10, 0.69, 1.83, 1.65)),
-        *((20, 0.76, 1.46, 1.37), (30, 0.80, 1.34, 1.28)),
-    ):
-        assert stability.sigma_factors(n) == pytest.approx((low, high, upper), abs=6e-3)
 
 
 def test_own_error_of_the_cycles_is_removed(rng: np.random.Generator) -> None:

@@ -9,13 +9,11 @@ from inertial.noise.bias_filter import BiasFilter, consistency, track
 from inertial.noise.gauss_markov import (
     AT_MAXIMUM,
     FLICKER_VARIANCE,
-    PEAK,
     BiasModel,
     FlickerTerms,
     allan_variance,
     bias_model,
     flicker_terms,
-    from_maximum,
 )
 
 
@@ -43,12 +41,10 @@ def test_the_allan_deviation_of_a_process_has_its_maximum_where_the_literature_h
     assert tau[np.argmax(curve)] == pytest.approx(1.893, abs=1e-3)
     assert curve.max() == pytest.approx(0.6174, abs=1e-4)
     assert pytest.approx(1.893, rel=2e-4) == AT_MAXIMUM
-    assert pytest.approx(0.6174, rel=2e-4) == PEAK
     short, long = 1e-4, 1e5
     assert allan_variance(short, 1.0) == pytest.approx(2.0 * short / 3.0, rel=1e-3)  # a walk with K² = 2/T
     assert allan_variance(long, 1.0) == pytest.approx(2.0 / long, rel=1e-3)  # white with N² = 2T
     assert allan_variance(np.array([9.99e-4, 1.001e-3]), 1.0) == pytest.approx(2.0 / 3e3, rel=3e-3)
-    assert from_maximum(189.27, 6.1741) == pytest.approx((100.0, 10.0), rel=1e-4)
 
 
 def test_the_allan_deviation_of_a_process_is_that_of_a_simulated_one(rng: np.random.Generator) -> None:

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand
 from typer.testing import CliRunner
 
-from pipelines.cli.given_texts import take_texts_as_given
+from pipelines.cli import take_texts_as_given
 
 
 class _Direct(TyperCommand):

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2, norm
 
-from inertial.dynamics.folded import magnitude
 from inertial.dynamics.stability import deviation_interval, stability
-from inertial.dynamics.tilt import TiltFit, fit_tilt
+from inertial.dynamics.tilt import TiltFit, fit_tilt, magnitude
 from inertial.dynamics.wandering_means import IdentifiedNoise
 
 SECONDS, RUNS = 3600, 300

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from schemas.station_devices import Device
-from stations.safety.addresses import address_of
+from stations.safety.lease_parts import address_of
 
 
 def at(**where: object) -> str:

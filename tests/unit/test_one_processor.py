@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from stations.one_processor import one_processor
+from stations.opening import one_processor
 
 pytestmark = pytest.mark.skipif(
     not hasattr(os, "sched_setaffinity") or len(os.sched_getaffinity(0)) < 2, reason="needs two processors"

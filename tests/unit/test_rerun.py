@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -279,7 +280,7 @@ def test_says_why_a_selection_names_nothing(run: Run, words: list[str], message:
 @pytest.fixture
 def imported(tmp_path: Path) -> Run:
     """Six faces of one unit as another's recording, kept as an import."""
-    from pipelines.cli.import_document import import_document
+    from pipelines.diagnosis.import_document import import_document
 
     rng = np.random.default_rng(3)
     faces = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
@@ -297,7 +298,9 @@ def imported(tmp_path: Path) -> Run:
         "local_gravity_m_s2": 9.80665,
     }
     archive = tmp_path / "imports"
-    return Archive(archive).run(import_document([tmp_path / "six.csv"], how, "test", "", str(archive), None)["run"])
+    return Archive(archive).run(
+        import_document([tmp_path / "six.csv"], how, "test", "", str(archive), None, nullcontext)["run"]
+    )
 
 
 def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:

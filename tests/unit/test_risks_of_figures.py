@@ -11,7 +11,7 @@ from inertial.errors import NotIdentified
 from inertial.population.capability import cpk, shape_of
 from inertial.population.gauge import gauge_study
 from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
-from inertial.uncertainty.risk import global_risk, lot_risk
+from inertial.uncertainty.risk import lot_risk
 from pipelines.procedures.figures import FigureValue, worst
 from pipelines.stages.bias_stability import bias_stability
 from pipelines.stages.figures import UNITS
@@ -84,9 +84,6 @@ def test_an_error_of_the_references_moves_the_whole_lot(rng: np.random.Generator
         risk = lot_risk(mean, process, u, shared, (-1.0, 1.0), (-accept, accept))
         assert risk.pfa == pytest.approx(np.mean((np.abs(true) > 1.0) & (np.abs(read) <= accept)), abs=2e-3)
         assert risk.pfr == pytest.approx(np.mean((np.abs(true) <= 1.0) & (np.abs(read) > accept)), abs=2e-3)
-    alone = global_risk(0.0, 0.5, 0.25, (-1.0, 1.0), (-1.0, 1.0))
-    same = lot_risk(0.0, 0.5, 0.25, 0.0, (-1.0, 1.0), (-1.0, 1.0))
-    assert same.pfa == pytest.approx(alone.pfa, abs=1e-12)
 
 
 def test_the_printed_risk_of_a_lot_has_the_error_of_its_references() -> None:

@@ -1,21 +1,59 @@
-"""Writing certificates: which ones are meant, and their files, all or none of a certificate."""
+"""Writing certificates: which ones are meant, and their files, all or none of a certificate; the PDF is typeset by typst."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from pipelines.archive import Archive, Run, files
 from pipelines.certificates import Calibration, Ledger
 from pipelines.certificates.document.compose import compose
+from pipelines.certificates.document.content import CertificateContent
 from pipelines.certificates.document.dcc import dcc
 from pipelines.certificates.document.laboratory import LaboratoryFile
-from pipelines.certificates.document.pdf import pdf
-from pipelines.certificates.document.schema_files import WHERE
+from pipelines.certificates.document.pages import page_content
+from pipelines.certificates.document.schema_files import EXTRA, WHERE
 from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
 from pipelines.tables.frames import rows_of
 from schemas.errors import WrongUse
+from schemas.library import library
+
+
+def pdf(content: CertificateContent, xml: bytes, address: str = "") -> bytes:
+    """The PDF of a certificate.
+
+    The document claims PDF/A-3b; typst refuses to write what breaks the rules that it knows. That claim has not been checked with
+    an independent validator (veraPDF).
+
+    Parameters
+    ----------
+    xml : of the same content, attached as its alternative form.
+    address : printed as a QR code; none where empty.
+
+    Raises
+    ------
+    WrongUse
+        typst, or segno for a QR code, is not installed.
+    """
+    typst = library("typst", EXTRA, WHERE)
+    inputs: dict[str, Any] = page_content(content) | {"qr": _qr(address) if address else ""}
+    compiler = typst.Compiler(
+        (resources.files("pipelines.certificates.document") / "certificate.typ").read_bytes(),
+        font_paths=typst.Fonts(include_system_fonts=False, include_embedded_fonts=True),
+        sys_inputs={"content": json.dumps(inputs), "xml": xml.decode("utf-8")},
+    )
+    issued = datetime.fromisoformat(content.issued).replace(tzinfo=UTC)
+    return compiler.compile(format="pdf", pdf_standards="a-3b", timestamp=issued)
+
+
+def _qr(address: str) -> str:
+    segno = library("segno", EXTRA, WHERE)
+    return segno.make(address, error="m", micro=False).svg_inline(border=1)
 
 
 @dataclass(frozen=True)

@@ -192,7 +192,7 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     for name, rules in reach["not_stated"].items():
         out.print(f"not stated: {name} (dominates {rules})")
     for line in (*reach["remarks"], *(f"cannot be met: {one}" for one in reach["unreachable"])):
-        out.print(line, soft_wrap=True)
+        out.print(line)
 
 
 def _line(row: dict[str, Any]) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -134,8 +133,3 @@ class Acutrol(Equipment):
             raise OperatorNeeded(
                 f"{self.name}: interlock {state}; remove the cause, reset the interlock and give the command again"
             )
-
-
-def rate_of(force_g: float, radius_m: float) -> float:
-    """Rate in °/s for a centripetal acceleration in g at a radius."""
-    return math.degrees(math.sqrt(force_g * 9.80665 / radius_m))

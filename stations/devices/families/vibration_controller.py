@@ -17,9 +17,6 @@ from stations.devices.result_files import read_recording
 POLL_S = 0.5
 GRACE_S = 30.0
 LEVEL_SHARE = 0.3  # by which the level that was reached may depart from the order
-FLAT_TOP = (
-    0.02  # share of the samples within a thousandth of the extremes: a sine has a tenth of it, a clipped one more
-)
 
 
 class VibrationController(Equipment):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from schemas.profile import Profile
+from schemas.vibration_profile import load_vibration_profile
 from stations.plant.bench import Waveforms
 from stations.plant.result_files import ResultFiles
 from stations.plant.world import World
@@ -14,6 +16,11 @@ STROKE_M, VELOCITY_M_S, ACCELERATION_G = 0.0127, 1.5, 50.0
 STANDARD_G = 9.80665
 SETTLE_S = 0.5
 RANDOM_FINE_HZ, RANDOM_HZ = 25600.0, 12800.0
+
+
+Array = NDArray[np.float64]
+REST_S = 1.0
+RAMP_S = 0.05
 
 
 def simulated(world: World, profile: Profile) -> Controller:
@@ -104,8 +111,22 @@ class Controller:
 
     def _random(self, seconds: float, tick: int) -> np.ndarray:
         """Gaussian vibration along the axis at the fine rate, at rest at both ends."""
-        from stations.plant.densities import random_force  # noqa: PLC0415 - read from files when it is needed
-
         rng = self._world.bench.stream_at(tick, 6)
         share = 0.3 if "level_not_reached" in self._conditions else 1.0
         return random_force(self._density, share * self._set["LEVEL"], seconds, RANDOM_FINE_HZ, rng)
+
+
+def random_force(profile: str, level_g: float, seconds: float, rate_hz: float, rng: np.random.Generator) -> Array:
+    """Force (n,) in g: rest, ``seconds`` of vibration of this overall level with short ramps, rest."""
+    points = np.array(load_vibration_profile(profile).breakpoints)
+    count = round(seconds * rate_hz)
+    f = np.fft.rfftfreq(count, 1.0 / rate_hz)
+    inside = (f >= points[0, 0]) & (f <= points[-1, 0])
+    density = np.zeros_like(f)
+    density[inside] = np.exp(np.interp(np.log(f[inside]), np.log(points[:, 0]), np.log(points[:, 1])))
+    z = rng.standard_normal((2, f.size))
+    wave = np.fft.irfft(np.sqrt(density) * (z[0] + 1j * z[1]), count)
+    wave *= level_g / float(np.sqrt(np.mean(wave**2)))
+    ramp = np.minimum(1.0, np.minimum(np.arange(count), np.arange(count)[::-1]) / (RAMP_S * rate_hz))
+    rest = np.zeros(round(REST_S * rate_hz))
+    return np.concatenate([rest, wave * ramp, rest])

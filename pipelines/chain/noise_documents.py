@@ -1,4 +1,4 @@
-"""What ``allan`` prints: curves and noise terms of a series or a captured run, in the order of the document."""
+"""Documents of noise: Allan deviation with its terms, another statistic, the spectrum; of a series or a captured run."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from inertial.noise.allan import CONFIDENCE, overlapping
+from inertial.noise.psd import allan_variance, one_sided
 from inertial.noise.terms import NAMES, NoiseTerms, fit_terms, model_deviation
 from pipelines.archive import Run
 from pipelines.importers.series import EvenSeries
@@ -15,6 +16,12 @@ from pipelines.tables.frames import rows_of
 from schemas.errors import DataRejected, WrongUse
 
 Array = np.ndarray
+
+SHORTEST_SEGMENT = 64
+SHORTEST_TAU = 8
+"""Samples of the shortest averaging time from the spectrum: what lies above half the sampling rate is missing in it."""
+LONGEST_TAU = 8
+"""Parts of a segment that the longest averaging time from the spectrum is: slower is not resolved."""
 
 ALLAN = {"statistic": "allan", "statistic_name": "overlapping Allan deviation"}
 
@@ -151,7 +158,7 @@ def statistic_of_run(run: Run, spacing: str, statistic: str) -> dict[str, Any]:
         The run has no static record.
     """
     document = allan_of_run(run)
-    from pipelines.chain.chain import static_inputs  # loads the chain, which a file does not need
+    from pipelines.chain.chain import static_inputs  # loads every stage, which a file does not need
 
     record = static_record(*static_inputs(run))
     assert record is not None
@@ -173,3 +180,48 @@ def statistic_of_run(run: Run, spacing: str, statistic: str) -> dict[str, Any]:
         document["notes"].append(f"the record is averaged over {record.size} samples before the statistic is made")
     shown = {key: parts[0][key] for key in ("statistic", "statistic_name", "deviation_unit")}
     return {**document, **shown, "curves": [curve for part in parts for curve in part["curves"]]}
+
+
+def psd_document(series: EvenSeries, segment: int | None = None) -> dict[str, Any]:
+    """Spectra of every channel of a series, and σ(τ) from them and from the samples.
+
+    Raises
+    ------
+    DataRejected
+        The record is too short for a segment.
+    """
+    n = series.values.shape[1]
+    length = n // 8 if segment is None else segment
+    if not SHORTEST_SEGMENT <= length <= n:
+        raise DataRejected(
+            f"{series.where}: segments of {length} samples in a record of {n}, {SHORTEST_SEGMENT} to {n} are possible; "
+            f"{'record longer' if segment is None else 'correct --segment'}"
+        )
+    spectrum = one_sided(series.values, series.rate_hz, segment=length)
+    m = SHORTEST_TAU * 2 ** np.arange(int(np.log2(max(length // LONGEST_TAU // SHORTEST_TAU, 1))) + 1)
+    m = m[2 * m <= n - 1]
+    direct = overlapping(series.values, series.rate_hz, m)
+    # the segment's mean is taken out: its zero frequency says nothing
+    density = spectrum.density.copy()
+    density[..., 0] = density[..., 1]
+    derived = np.sqrt(allan_variance(spectrum.frequency, density, direct.tau))
+    rows = [
+        {
+            "channel": name,
+            "density": spectrum.density[k].tolist(),
+            "median_amplitude": float(np.median(spectrum.amplitude[k, 1:])),
+            "tau_s": direct.tau.tolist(),
+            "deviation_from_density": derived[k].tolist(),
+            "deviation": direct.deviation[k].tolist(),
+        }
+        for k, name in enumerate(series.names)
+    ]
+    return {
+        "source": series.where,
+        "unit": series.unit,
+        "rate_hz": series.rate_hz,
+        "samples": n,
+        "segment": length,
+        "frequency_hz": spectrum.frequency.tolist(),
+        "spectra": rows,
+    }

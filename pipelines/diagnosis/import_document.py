@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.cli.options import error_console
 from pipelines.importers.content import Content
 from schemas.errors import WrongUse
 from schemas.foreign import shown
@@ -22,8 +23,16 @@ def import_document(
     fit: str,
     archive: str | None,
     stated: ImportReferences | None,
+    working: Callable[[str], AbstractContextManager[Any]],
 ) -> dict[str, Any]:
-    """Read, judge and store one recording; the document for JSON."""
+    """Read, judge and store one recording; the document for JSON.
+
+    Parameters
+    ----------
+    keys : of the mapping; ``where`` they stand, for messages
+    fit : the name of a fit; empty: none
+    working : shows what is done, until it is
+    """
     from pipelines.importers import keep, record, sources
     from pipelines.importers import mapping as mapped
     from pipelines.importers.dwell_list import dwell_rows
@@ -33,7 +42,7 @@ def import_document(
     columns, units = keys.get("columns"), keys.get("units")
     if isinstance(columns, dict) and isinstance(units, dict) and "output" in units:
         mapped.build(keys, where)  # an error of the mapping is reported before a file is read
-    with error_console().status(f"reading {name}"):
+    with working(f"reading {name}"):
         time = str(columns.get("time", "")) if isinstance(columns, dict) else ""
         content, source, breaks = sources.read(
             paths, join=str(keys.get("join", "")), time=time, group=str(keys.get("group", ""))
@@ -44,7 +53,7 @@ def import_document(
     if fit:
         from pipelines.diagnosis.imported import judge
 
-        with error_console().status("fitting and judging"):
+        with working("fitting and judging"):
             judged = judge(fit, data, how)
     run = keep.keep(data, source, how, judged, archive, stated)
     turned = fit == "plane" and judged is not None and judged.adequate is not False  # its one axis is meant to be still

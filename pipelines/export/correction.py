@@ -1,0 +1,109 @@
+"""A correction as it is ordered and reported: how the bias is tracked, and the document of what was done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.archive import Run
+from pipelines.export.corrected import Corrected, FitOfUnit, Tracking
+from pipelines.export.recording import CorrectableRecording
+from schemas.errors import WrongUse
+from schemas.foreign import shown
+from schemas.units import AXES, MICRO, STANDARD_GRAVITY_M_S2
+
+
+def tracking_of(
+    run: Run,
+    recording: CorrectableRecording,
+    force: str,
+    gravity: float | None,
+    turn_on: float | None,
+    step: float,
+    *,
+    at_rest: bool,
+) -> Tracking | None:
+    """How the bias is tracked; None where the force is known at no sample.
+
+    Parameters
+    ----------
+    force : true specific force as it was given, X,Y,Z in g; empty: what the recording states
+    gravity : m/s²; None: that of the run
+    turn_on : µg, given or stated by the run
+    step : s
+    """
+    if not (force or at_rest or bool(np.isfinite(recording.known).all(axis=1).any())):
+        return None
+    known = None
+    if force:
+        try:
+            known = np.array([float(part) for part in force.split(",")])
+        except ValueError:
+            known = np.array([])
+        if known.shape != (3,) or not np.isfinite(known).all():
+            raise WrongUse(f"--force: found '{shown(force)}', three numbers X,Y,Z in g are needed; correct it")
+    if turn_on is None:
+        raise WrongUse(
+            f"correct: run {run.id} states no change of the bias from switch-on to switch-on, it is needed to weigh the first "
+            "updates; give it with --turn-on UG (data sheet, or the power cycles of a run)"
+        )
+    local = gravity if gravity is not None else run.about.get("recipe", {}).get("local_gravity_m_s2")
+    if at_rest and (not isinstance(local, int | float) or not 9.7 < local < 9.9):
+        raise WrongUse(
+            f"correct: local gravity {local}, 9.7 to 9.9 m/s² is needed with --at-rest; give it with --gravity"
+        )
+    magnitude = float(local) / STANDARD_GRAVITY_M_S2 if at_rest and isinstance(local, int | float) else None
+    return Tracking(known, magnitude, turn_on, step)
+
+
+def correction_document(
+    recording: CorrectableRecording, fit: FitOfUnit, done: Corrected, output: Path | None
+) -> dict[str, Any]:
+    """What was corrected, with which calibration, how well, and the bias where it was tracked."""
+    sd = MICRO * np.sqrt(np.diagonal(done.covariance, axis1=1, axis2=2))
+    certificate = fit.exported.certificate
+    document: dict[str, Any] = {
+        "file": recording.name,
+        "run": fit.run,
+        "unit": fit.exported.unit,
+        "certificate": None if certificate is None else certificate.document(),
+        "samples": len(recording.time),
+        "outside_temperature": done.outside,
+        "temperatures_C": list(fit.exported.temperatures),
+        "u_ug": dict(zip(AXES, np.sqrt(np.mean(sd**2, axis=0)).tolist(), strict=True)),
+        "u_contains": [
+            "references and noise of the calibration" if fit.budget else "noise of the calibration only",
+            *(["bias", "white noise of a sample"] if done.track is not None else []),
+        ],
+        "output": None if output is None else str(output),
+        "bias": None,
+    }
+    if done.track is None or done.flicker is None:
+        return document
+    track, check = done.track, done.track.consistency
+    end = np.sqrt(np.diagonal(track.covariance[-1]))
+    document["bias"] = {
+        "last_ug": dict(zip(AXES, (MICRO * track.bias[-1]).tolist(), strict=True)),
+        "u_last_ug": dict(zip(AXES, (MICRO * end).tolist(), strict=True)),
+        "u_last_at_limits_ug": None
+        if done.at_limits is None
+        else dict(zip(AXES, (MICRO * np.sqrt(np.diagonal(done.at_limits.covariance[-1]))).tolist(), strict=True)),
+        "updates": int(track.updated.sum()),
+        "steps": len(track.updated),
+        "rejected": track.rejected,
+        "nis": check.nis,
+        "nis_bounds": [check.low, check.high],
+        "lag_1": check.lag_1,
+        "lag_1_bound": check.lag_1_bound,
+        "stated_uncertainty": "too small" if _many(track.rejected, check.count) else check.stated,
+        "processes_s": done.flicker.correlation_s.tolist(),
+        "processes_flat": done.flicker.flatness,
+    }
+    return document
+
+
+def _many(rejected: int, used: int) -> bool:
+    """Whether more than 1 % of the updates were rejected, beyond five standard deviations."""
+    return rejected > 1 + 0.01 * used
