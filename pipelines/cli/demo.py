@@ -222,7 +222,7 @@ class _Game:
 
     def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
         """The result if the hidden effect is in a class with others, and the measurement that separates them."""
-        from pipelines.cli.measurements_text import measurements_table
+        from pipelines.cli.text.diagnosis_text import print_next_measurement
 
         out, hidden = console(), self.hidden.effect
         group = next(g for g in document["not_told_apart"] if hidden in g)
@@ -242,7 +242,7 @@ class _Game:
             )
         elif "minutes" in rows[0]:
             out.print("The measurement that separates them:")
-            measurements_table(rows, out)
+            print_next_measurement(rows, out)
         else:
             out.print(rows[0]["why"], soft_wrap=True)
 
