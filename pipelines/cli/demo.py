@@ -267,15 +267,11 @@ def _write_model(file: Path, start: tuple[str, ...], chosen: list[str]) -> tuple
     """The model's file with one version per effect; its effects."""
     from datetime import UTC, datetime
 
-    from pipelines.jobs.model_files import ModelStep, extended, new_model, publish_model
+    from pipelines.improvement.improvement import with_effects
+    from pipelines.jobs.model_files import ModelStep, new_model, publish_model
 
     now = datetime.now(UTC).replace(microsecond=0)
-    text = new_model(file, start, "demo", now)
-    effects = tuple(start)
-    for name in chosen:
-        text, model = extended(
-            text, ModelStep(name, "demo", now, "the diagnosis names it", "dwells.parquet"), f"model {file.name}"
-        )
-        effects = tuple(model.model.effects)
+    steps = [ModelStep(name, "demo", now, "the diagnosis names it", "dwells.parquet") for name in chosen]
+    text, model = with_effects(new_model(file, start, "demo", now), steps, file)
     publish_model(file, text)
-    return effects
+    return tuple(model.model.effects) if model else start
