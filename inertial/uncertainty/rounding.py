@@ -1,9 +1,10 @@
-"""Rounding for print: of a value and its uncertainty (JCGM 100:2008, 7.2.6), and of a probability.
+"""Rounding for print: of a value and its uncertainty (JCGM 100:2008, 7.2.6), of a number alone, and of a probability.
 
 Commands that only print are to start quickly: this module imports no library of arrays.
 """
 
 import math
+from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_HALF_UP, Decimal
 
 
@@ -54,3 +55,22 @@ def equal(p: float | None) -> str:
     """The same with its sign."""
     text = chance(p)
     return text if text.startswith("<") else f"= {text}"
+
+
+def short(value: float | None, digits: int = 3) -> str:
+    """A number for people: so many significant digits, without an exponent if possible, empty for None."""
+    if value is None or not math.isfinite(value):
+        return ""
+    if value == 0.0:
+        return "0"
+    places = digits - 1 - math.floor(math.log10(abs(value)))
+    if -3 <= places <= 6:
+        return f"{round(value, places):.{max(places, 0)}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def short_values(value: float | Sequence[float] | None) -> str:
+    """A number, or one per axis, for people."""
+    if isinstance(value, list | tuple):
+        return " / ".join(short(float(v)) for v in value)
+    return short(value)  # pyright: ignore[reportArgumentType]  # not a sequence any more

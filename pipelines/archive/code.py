@@ -73,7 +73,7 @@ CODE = {
     "import of a transfer function": _READ,
     "report": (
         *(*_DRAWN, "stations", "pipelines.capture", "pipelines.importers"),
-        *("pipelines.jobs", "pipelines.schedule"),
+        *("pipelines.diagnosis.sections", "pipelines.diagnosis.sentences", "pipelines.jobs", "pipelines.schedule"),
     ),
     "report of an import": (*_DRAWN, "pipelines.diagnosis"),
     "inquiry": ("schemas", "inertial", "pipelines.diagnosis", "pipelines.procedures", "pipelines.tables"),

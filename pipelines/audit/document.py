@@ -9,6 +9,7 @@ import numpy as np
 
 from inertial.population.control_charts import RULES
 from pipelines.audit.calibrations import date_of
+from pipelines.audit.documents import AuditDocument, AuditFindingDocument, DueDocument, DueUnit
 from pipelines.audit.due import uncertified
 from pipelines.audit.finding import WHO, AuditFinding
 from pipelines.audit.parameters import unit_text
@@ -22,7 +23,7 @@ MOST_UNITS = 200  # histories in the document; ``tumbleline query`` gives the ot
 SCHEMA = 1
 
 
-def document(audit: Audit, listed: list[AuditFinding], archive: str) -> dict[str, Any]:
+def document(audit: Audit, listed: list[AuditFinding], archive: str) -> AuditDocument:
     """The results of the audit, findings first; dates are ISO and UTC."""
     return {
         "schema": SCHEMA,
@@ -32,7 +33,7 @@ def document(audit: Audit, listed: list[AuditFinding], archive: str) -> dict[str
         "device": audit.scope.device,
         "station": audit.scope.station,
         "counts": counts(audit),
-        "findings": [{**asdict(finding), "whose": WHO[finding.who]} for finding in listed],
+        "findings": [_finding(finding) for finding in listed],
         "due": _due(audit),
         "drift": {"kinds": _kinds(audit), "units": [_unit(d) for d in furthest(audit, MOST_UNITS)]},
         "stations": [_series(series) for series in (*audit.stations, *audit.slots)],
@@ -46,6 +47,18 @@ def document(audit: Audit, listed: list[AuditFinding], archive: str) -> dict[str
         },
         "gauge": [_study(study) for study in audit.studies],
         "rules": audit.rules.model_dump(mode="json"),
+    }
+
+
+def _finding(finding: AuditFinding) -> AuditFindingDocument:
+    return {
+        "who": finding.who,
+        "kind": finding.kind,
+        "subject": finding.subject,
+        "message": finding.message,
+        "units": list(finding.units),
+        "evidence": finding.evidence,
+        "whose": WHO[finding.who],
     }
 
 
@@ -75,12 +88,12 @@ def date_or_none(day: float) -> str | None:
     return date_of(day) if np.isfinite(day) else None
 
 
-def _due(audit: Audit) -> dict[str, Any]:
+def _due(audit: Audit) -> DueDocument:
     own, until = audit.due, audit.scope.until
     late = np.flatnonzero(own.day < until)
     soon = np.flatnonzero((own.day >= until) & (own.day < until + audit.rules.notice_days))
 
-    def listed(which: Any) -> list[dict[str, Any]]:
+    def listed(which: Any) -> list[DueUnit]:
         return [
             {
                 "unit": str(audit.all.unit[row]), "device": str(audit.all.device[row]),

@@ -71,15 +71,14 @@ def compared(
     history: pd.DataFrame | None,
     fresh: pd.DataFrame | None,
     fresh_history: pd.DataFrame | None,
-    before: list[str] | None = None,
 ) -> dict[str, Any]:
-    """The comparison, on one thread: the matrices are small. With ``before``, the effects that it lacks are judged."""
+    """The comparison, on one thread: the matrices are small."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1), error_console().status("fitting"):
         from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
 
-        return compare(dwells, effects, history, fresh, fresh_history, before)
+        return compare(dwells, effects, history, fresh, fresh_history)
 
 
 def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:

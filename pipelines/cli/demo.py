@@ -222,7 +222,7 @@ class _Game:
 
     def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
         """The result if the hidden effect is in a class with others, and the measurement that separates them."""
-        from pipelines.cli.measurements_text import measurements_table
+        from pipelines.cli.text.diagnosis_text import print_next_measurement
 
         out, hidden = console(), self.hidden.effect
         group = next(g for g in document["not_told_apart"] if hidden in g)
@@ -242,7 +242,7 @@ class _Game:
             )
         elif "minutes" in rows[0]:
             out.print("The measurement that separates them:")
-            measurements_table(rows, out)
+            print_next_measurement(rows, out)
         else:
             out.print(rows[0]["why"], soft_wrap=True)
 
@@ -267,15 +267,11 @@ def _write_model(file: Path, start: tuple[str, ...], chosen: list[str]) -> tuple
     """The model's file with one version per effect; its effects."""
     from datetime import UTC, datetime
 
-    from pipelines.jobs.model_files import ModelStep, extended, new_model, publish_model
+    from pipelines.improvement.improvement import with_effects
+    from pipelines.jobs.model_files import ModelStep, new_model, publish_model
 
     now = datetime.now(UTC).replace(microsecond=0)
-    text = new_model(file, start, "demo", now)
-    effects = tuple(start)
-    for name in chosen:
-        text, model = extended(
-            text, ModelStep(name, "demo", now, "the diagnosis names it", "dwells.parquet"), f"model {file.name}"
-        )
-        effects = tuple(model.model.effects)
+    steps = [ModelStep(name, "demo", now, "the diagnosis names it", "dwells.parquet") for name in chosen]
+    text, model = with_effects(new_model(file, start, "demo", now), steps, file)
     publish_model(file, text)
-    return effects
+    return tuple(model.model.effects) if model else start

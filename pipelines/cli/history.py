@@ -51,17 +51,17 @@ def command(
 
     Without --dwells only the changes are shown.
     """
-    from pipelines.cli.compare import compared
     from pipelines.cli.inputs import add_effect_files, both_runs
-    from pipelines.diagnosis.model_history import FIGURES, JUDGED, change_row, evolution
+    from pipelines.diagnosis.model_history import FIGURES, JUDGED, change_row
+    from pipelines.improvement.improvement import ImprovedTables, errors_by_version
     from pipelines.jobs.model_files import read_model, versions
 
     add_effect_files(effect_file)
     model_file = read_model(model)
     _refuse_picture(picture, dwells)
     if dwells:
-        tables = both_runs(dwells, history, fresh, fresh_history, archive)
-        rows = evolution(versions(model_file), lambda effects, before: compared(effects, *tables, before=before))
+        tables = ImprovedTables(*both_runs(dwells, history, fresh, fresh_history, archive))
+        rows = errors_by_version(versions(model_file), tables, lambda: error_console().status("fitting"))
     else:
         rows = [
             {**change_row(version), **dict.fromkeys([*FIGURES, *JUDGED]), "text": "", "warnings": []}

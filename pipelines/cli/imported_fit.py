@@ -97,9 +97,8 @@ def _of_a_plane(done: Run, source: str) -> dict[str, Any]:
 
 def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
     """The verdict on a fit with commanded poses, and its basis as lines."""
-    from pipelines.cli.evidence_text import evidence_text
-    from pipelines.cli.text.verdict_text import verdict
     from pipelines.diagnosis.diagnose import diagnose
+    from pipelines.diagnosis.sentences import evidence_text, verdict
 
     document = diagnose(dwells, past, effects)
     document["units"] = list(dict.fromkeys(dwells["unit"].astype(str)))

@@ -129,13 +129,13 @@ def _approval(
 
 def _question(inquiry: Inquiry, follow_up: FollowUp) -> Consent:
     """The answer at the terminal to a proposed follow-up."""
-    from pipelines.cli.measurements_text import measurements_table
     from pipelines.cli.terminal import agreed
+    from pipelines.cli.text.diagnosis_text import print_next_measurement
 
     out = error_console()
     for sentence in follow_up.why:
         out.print(f"\n{sentence}.")
-    measurements_table(list(follow_up.rows), out)
+    print_next_measurement(list(follow_up.rows), out)
     left = inquiry.budget - inquiry.spent
     text = f"Measure this follow-up ({follow_up.minutes:.1f} min; {left:.1f} of {inquiry.budget:.1f} min budget left)?"
     return "go" if agreed(text) else "stop"
@@ -169,7 +169,7 @@ def _run(
 
 def _print_diagnosis(joint: JointDiagnosis) -> None:
     """Print one line about a joint diagnosis."""
-    from pipelines.cli.text.verdict_text import verdict
+    from pipelines.diagnosis.sentences import verdict
 
     runs = len(joint.lineage.runs)
     text = f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}"
@@ -186,10 +186,9 @@ def _continue_command() -> str:
 
 def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
     """Print an inquiry; ``archive`` as it was given, for the commands to give next."""
-    from pipelines.cli.measurements_text import measurements_table
     from pipelines.cli.next_commands import judged_data, print_extension, print_next
-    from pipelines.cli.text.diagnosis_text import print_findings
-    from pipelines.cli.text.verdict_text import verdict
+    from pipelines.cli.text.diagnosis_text import print_findings, print_next_measurement
+    from pipelines.diagnosis.sentences import verdict
 
     out = console()
     good = document["ended"] in {"adequate", "told_apart"}
@@ -198,7 +197,7 @@ def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
     print_findings(document)
     out.print(f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow")
     if document["ended"] in {"asked", "declined"}:
-        measurements_table(document["next_measurements"])
+        print_next_measurement(document["next_measurements"])
         print_next(out, [document["command"]])
     else:
         print_extension(out, document, partial(judged_data, document["run"], "", archive), None)

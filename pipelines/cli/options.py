@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inertial.uncertainty import rounding
 from pipelines.archive import Run
 from pipelines.tables.json_values import json_value
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
+short, short_values = rounding.short, rounding.short_values
+"""Numbers as commands print them."""
 
 ArchiveOption = Annotated[
     str | None,
@@ -278,25 +280,6 @@ def _longest(texts: Sequence[str], between: str | None) -> int:
 
 def _is_number(text: str) -> bool:
     return text.replace(".", "", 1).replace("-", "", 1).replace("−", "", 1).replace("e", "", 1).isdigit() or not text
-
-
-def short(value: float | None, digits: int = 3) -> str:
-    """A number for people: so many significant digits, without an exponent if possible, empty for None."""
-    if value is None or not math.isfinite(value):
-        return ""
-    if value == 0.0:
-        return "0"
-    places = digits - 1 - math.floor(math.log10(abs(value)))
-    if -3 <= places <= 6:
-        return f"{round(value, places):.{max(places, 0)}f}"
-    return f"{value:.{digits - 1}e}"
-
-
-def short_values(value: float | Sequence[float] | None) -> str:
-    """A number, or one per axis, for people."""
-    if isinstance(value, list | tuple):
-        return " / ".join(short(float(v)) for v in value)
-    return short(value)  # pyright: ignore[reportArgumentType]  # not a sequence any more
 
 
 def print_remarks(run: Run, serials: Sequence[str]) -> None:

@@ -1,7 +1,11 @@
-"""Diagnosis, choice of effects, new versions of the model, error of each version; whoever asks and shows is handed in."""
+"""Diagnosis, choice of effects, new versions of the model, error of each version; whoever asks and shows is handed in.
+
+The demonstration, the history of a model and the workbench use its parts.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +16,7 @@ from schemas.errors import WrongUse, did_you_mean
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pipelines.jobs.model_files import Version
+    from pipelines.jobs.model_files import ModelFile, ModelStep, Version
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,38 @@ class Attendant(Protocol):
     def fresh_run(self) -> tuple[str, pd.DataFrame, pd.DataFrame | None] | None:
         """Name, dwells and temperatures of a fresh run that is there or is measured now; None without one."""
         ...
+
+
+def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str, ModelFile | None]:
+    """The text of a model file with one version more per step, and its model; None without a step."""
+    from pipelines.jobs.model_files import extended
+
+    model = None
+    for step in steps:
+        text, model = extended(text, step, f"model {file.name}")
+    return text, model
+
+
+def errors_by_version(
+    versions: Sequence[Version], tables: ImprovedTables, working: Callable[[], AbstractContextManager[Any]]
+) -> list[dict[str, Any]]:
+    """The errors of each version and the verdict on its change, on one thread: the matrices are small.
+
+    Parameters
+    ----------
+    working : is entered while a version is fitted
+    """
+    from threadpoolctl import threadpool_limits
+
+    from pipelines.diagnosis.model_history import evolution
+
+    def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
+        with threadpool_limits(1), working():
+            from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
+
+            return compare(tables.dwells, effects, tables.history, tables.fresh, tables.fresh_history, before)
+
+    return evolution(versions, compared)
 
 
 @dataclass(frozen=True)
@@ -170,7 +206,7 @@ class Improvement:
         self, effects: list[str], added: list[str], choices: list[dict[str, Any]]
     ) -> tuple[list[Version], str]:
         """The model that was judged and one version per added effect; the text of the model file, empty without a change."""
-        from pipelines.jobs.model_files import Version, extended, model_step, model_text, new_model, versions
+        from pipelines.jobs.model_files import Version, model_step, model_text, new_model, versions
 
         judged = Version(1, tuple(effects), (), (), None)
         if not added:
@@ -178,9 +214,7 @@ class Improvement:
         others = {choice["effect"]: choice["not_separated_from"] for choice in choices}
         steps = [model_step(name, self._reason(others[name]), self.by, self.data) for name in added]
         text = model_text(self.model) if self.model else self._begun(new_model, effects, steps[0])
-        model = None
-        for step in steps:
-            text, model = extended(text, step, f"model {self.target.name}")
+        text, model = with_effects(text, steps, self.target)
         return (versions(model)[-len(added) - 1 :] if model else [judged]), text
 
     def _begun(self, new_model: Any, effects: list[str], step: Any) -> str:
@@ -202,20 +236,10 @@ class Improvement:
 
     def _rows(self, versions: list[Version], noise: float | None, given: ImprovedTables) -> list[dict[str, Any]]:
         """Errors of each version; none where no unit can be judged."""
-        from threadpoolctl import threadpool_limits
-
-        from pipelines.diagnosis.model_history import JUDGED, evolution
+        from pipelines.diagnosis.model_history import JUDGED
 
         if noise is None:
             return []
-        tables = (given.history, given.fresh, given.fresh_history)
-
-        def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
-            from pipelines.diagnosis.diagnose import compare
-
-            with threadpool_limits(1), self.attendant.working("fitting"):
-                return compare(given.dwells, effects, *tables, before)
-
-        rows = evolution(versions, compared)
+        rows = errors_by_version(versions, given, lambda: self.attendant.working("fitting"))
         keys = ("version", "added", "fitted_ug", "heldout_ug", "fresh_ug", *JUDGED, "text")
         return [{key: row[key] for key in keys} | {"noise_ug": noise, "warnings": row["warnings"]} for row in rows]

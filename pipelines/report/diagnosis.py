@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inertial import effects
 from inertial.criticism.diagnosis import Diagnosis
 from inertial.data_errors.handling import named as handled
-from inertial.uncertainty.rounding import chance, equal
+from pipelines.diagnosis.sections import worded
 from pipelines.report.diagnosis_pictures import driver_chart, model_chart, pose_chart
 from pipelines.report.interactive import figure_of, interactive
 from pipelines.report.numbers import significant
@@ -46,46 +46,26 @@ def render_diagnosis(
         document=document,
         coefficients=coefficients or [],
         units=len(measurement.units),
-        classes=[_class(group, document) for group in document["classes"]],
-        unseen=[
-            (name, document.get("reasons", {}).get(name) or document["breakers"][name]) for name in document["unseen"]
-        ],
+        **worded(document),
+        members=[_members(group, document) for group in document["classes"]],
         pictures=None if diagnosis is None else _pictures(diagnosis, sound),
         ladder=[] if diagnosis is None else _ladder(diagnosis),
         number=significant,
-        chance=chance,
-        equal=equal,
     )
     return interactive(page)
 
 
-def _class(group: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
+def _members(group: dict[str, Any], document: dict[str, Any]) -> list[dict[str, Any]]:
+    """The effects of a class, or its handling errors, each with symbol and equation, and which one is recommended."""
     simplest = next((name for name in document["recommended"] if name in group["effects"]), group["effects"][0])
-    if group["scope"] == "data":
-        values = [group.get("evidence", "")]
-    else:
-        own = group.get("nonlinear_of") or simplest
-        known = [p for p in effects.get(own).nonlinear if group["nonlinear"].get(p.name) is not None]
-        values = [f"{p.name} = {_value(group['nonlinear'][p.name])} {p.unit}".rstrip() for p in known]
-        if values and len(group["effects"]) > 1:
-            values[0] = f"{own}: {values[0]}"
-    members = [_member(name) for name in group["effects"]]
-    return {**group, "members": members, "recommended": simplest, "values": ", ".join(values)}
+    return [{**_member(name), "recommended": name == simplest} for name in group["effects"]]
 
 
 def _member(name: str) -> dict[str, str]:
-    """An effect, or a handling error, with its symbol and equation."""
     known = handled(name) or (effects.get(name) if name in effects.catalogue() or ":" in name else None)
     if known is None:
         return {"id": name, "symbol": "", "equation": "one dwell of one unit"}
     return {"id": name, "symbol": known.symbol, "equation": known.equation}
-
-
-def _value(value: float | tuple[float, ...] | list[float] | None) -> str:
-    """A number, or one per axis."""
-    if isinstance(value, list | tuple):
-        return " / ".join(significant(float(v)) for v in value)
-    return "" if value is None else significant(value)
 
 
 def _pictures(diagnosis: Diagnosis, units: tuple[str, ...]) -> dict[str, Any]:

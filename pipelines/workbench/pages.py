@@ -187,10 +187,14 @@ def static_version() -> str:
     return digest.hexdigest()[:12]
 
 
+_TEMPLATES = {"sections.html": files("pipelines.report") / "sections.html"}
+"""Templates of reports that pages use as they are."""
+
+
 @cache
 def _environment() -> Environment:
     loader = FunctionLoader(
-        lambda name: (files("pipelines.workbench") / "templates" / name).read_text(encoding="utf-8")
+        lambda name: (_TEMPLATES.get(name) or files("pipelines.workbench") / "templates" / name).read_text("utf-8")
     )
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True

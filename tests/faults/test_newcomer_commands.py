@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from pipelines.archive import Archive
 from pipelines.certificates import Ledger
 from pipelines.cli import COMMANDS, app, main
-from pipelines.cli.text.verdict_text import verdict
+from pipelines.diagnosis.sentences import verdict
 
 
 def told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:

@@ -16,8 +16,9 @@ from pipelines.archive import Run
 from pipelines.cli import app
 from pipelines.cli.run import _next
 from pipelines.cli.summary import summary
-from pipelines.cli.text.verdict_text import judged, print_adequacy, verdict
+from pipelines.cli.text.verdict_text import judged, print_adequacy
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.sentences import verdict
 from pipelines.jobs.adequacy import adequacy, adequacy_of
 from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant

@@ -8,9 +8,9 @@ import pytest
 from inertial.criticism.examination import Named
 from inertial.criticism.left_out import LeftOut
 from inertial.criticism.reproduced_change import ReproducedChange
-from pipelines.cli.text.diagnosis_text import why_not_recommended
 from pipelines.diagnosis import confirmation
 from pipelines.diagnosis.model_history import text_of
+from pipelines.diagnosis.sentences import why_not_recommended
 
 ROW = {"removed": []}
 

@@ -9,10 +9,10 @@ from benchmarks.made_recordings import NOISES, Recording, make
 from inertial.fits.ellipsoid import fit_ellipsoid
 from inertial.norm_fit import fit_norms
 from inertial.probability import passes
-from pipelines.cli.text.diagnosis_text import _parameters_of
-from pipelines.cli.text.verdict_text import verdict
 from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.sections import parameters_of
+from pipelines.diagnosis.sentences import verdict
 from pipelines.stages.unknown_poses.fit import norms_fitted
 from pipelines.tables.dwells import measured
 from pipelines.tables.leave_out import leave_out, named_dwells
@@ -159,7 +159,6 @@ def test_what_the_norm_does_not_determine_is_refused_by_name(effects: tuple[str,
 
 
 def test_a_class_names_the_effect_that_its_parameters_are_of() -> None:
-    from inertial import effects
 
     group = {
         "effects": ["aging_linear", "warm_up"],
@@ -167,9 +166,9 @@ def test_a_class_names_the_effect_that_its_parameters_are_of() -> None:
         "nonlinear": {"tau": 7200.0},
         "nonlinear_of": "warm_up",
     }
-    assert _parameters_of(group, effects) == "warm_up: tau = 7200 s"
-    assert _parameters_of({**group, "nonlinear": {}, "nonlinear_of": None}, effects) == ""
-    assert _parameters_of({**group, "effects": ["warm_up"]}, effects) == "tau = 7200 s"
+    assert parameters_of(group) == "warm_up: tau = 7200 s"
+    assert parameters_of({**group, "nonlinear": {}, "nonlinear_of": None}) == ""
+    assert parameters_of({**group, "effects": ["warm_up"]}) == "tau = 7200 s"
 
 
 def test_a_memory_that_was_at_rest_has_no_column_for_its_state() -> None:

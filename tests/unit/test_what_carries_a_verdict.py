@@ -59,7 +59,8 @@ def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, c
     assert f"without these {without['dwells']} p" in text
     html = page.read_text(encoding="utf-8")
     assert (
-        f"{first['unit']} {first['dwell']} {share}" in html.split("Dwells with the largest influence on the verdict")[1]
+        f"{first['unit']} dwell {first['dwell']} {share}"
+        in html.split("Dwells with the largest influence on the verdict")[1]
     )
 
 
@@ -83,7 +84,7 @@ def test_a_converters_fault_in_every_unit_is_no_verdict_on_the_model(tmp_path):
     document = json.loads(done.stdout)
     assert (document["adequate"], done.exit_code) == (None, 1)
     assert "every unit (2) has a data fault" in document["reason"]
-    assert "Cannot be judged: every unit (2)" in page.read_text(encoding="utf-8")
+    assert "CANNOT BE JUDGED: every unit (2)" in page.read_text(encoding="utf-8")
 
 
 def test_missing_dwells_are_told_in_the_report_and_at_the_terminal(tmp_path):

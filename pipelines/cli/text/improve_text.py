@@ -24,7 +24,8 @@ def print_heading(text: str, *, quiet: bool) -> None:
 
 def print_verdict(document: dict[str, Any]) -> None:
     """Print the verdict of a diagnosis."""
-    from pipelines.cli.text.verdict_text import STYLE_OF, verdict
+    from pipelines.cli.text.verdict_text import STYLE_OF
+    from pipelines.diagnosis.sentences import verdict
 
     console().print(verdict(document), style=STYLE_OF[document["adequate"]], soft_wrap=True)
 

@@ -7,8 +7,8 @@ from functools import partial
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
-from inertial.uncertainty.rounding import chance, equal
 from pipelines.diagnosis.inputs import use_written_formulas
+from pipelines.diagnosis.sections import worded
 from pipelines.drawing import Chart
 from pipelines.report.diagnosis_pictures import pose_chart, quantity_chart, slot_chart
 from pipelines.report.evolution import evolution_chart
@@ -55,7 +55,8 @@ def missing(request: Request) -> Response:
         except TumblelineError as problem:
             problems, work = [*problems, str(problem)], {}
     return page(
-        request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows, chance=chance, equal=equal,
+        request, "missing.html", state, problems, sources=chosen, diagnosed=diagnosed, rows=rows,
+        worded=None if diagnosed is None else worded(diagnosed.document),
         jobs={kind: bench.jobs.known(kind, content) for kind, (_, content) in work.items()},
         twin=sources.twin(bench.settings, state.source) if state.source and not state.fresh else "",
         models=models.models(bench.settings),

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from inertial import effects
 from pipelines.diagnosis.inputs import WHY, use_written_formulas
-from pipelines.jobs.model_files import ModelStep, extended, model_text, new_model, publish_model
+from pipelines.improvement.improvement import with_effects
+from pipelines.jobs.model_files import ModelStep, model_text, new_model, publish_model
 from pipelines.jobs.releases import Release
 from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import WrongUse, did_you_mean
@@ -93,17 +94,14 @@ def save(
         use_written_formulas(formulas, "model")
         text = model_text(place) if place.is_file() else new_model(place, list(start), by, at)
         text = _with_formulas(text, formulas, [*start, *added])
-        version = 0
-        for effect in added:
-            if f'"{effect}"' in text.partition("[[change]]")[0]:
-                continue
-            text, after = extended(text, ModelStep(effect, by, at, why.strip(), source), f"model {place.name}")
-            version = after.model.version
-        if version == 0 and place.is_file():
+        lacking = [effect for effect in dict.fromkeys(added) if f'"{effect}"' not in text.partition("[[change]]")[0]]
+        steps = [ModelStep(effect, by, at, why.strip(), source) for effect in lacking]
+        text, after = with_effects(text, steps, place)
+        if after is None and place.is_file():
             raise WrongUse(f"model: {place} has these effects already; nothing was written")
         place.parent.mkdir(parents=True, exist_ok=True)
         publish_model(place, text)
-    return place, version or 1
+    return place, after.model.version if after else 1
 
 
 def _with_formulas(text: str, formulas: Sequence[str], used: Sequence[str]) -> str:

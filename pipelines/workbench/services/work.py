@@ -77,10 +77,12 @@ def diagnose(request: Mapping[str, Any], report_progress: ReportProgress) -> Dia
 
 def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[dict[str, Any]]:
     """The errors of every version of a model: fitted, cross-validated, on a fresh run, and the floor."""
-    from pipelines.diagnosis.compare import compare
+    from contextlib import nullcontext
+    from itertools import count
+
     from pipelines.diagnosis.diagnose import default_model
     from pipelines.diagnosis.inputs import dwells_and_history
-    from pipelines.diagnosis.model_history import evolution
+    from pipelines.improvement.improvement import ImprovedTables, errors_by_version
     from pipelines.jobs.model_files import Version
 
     dwells, history, judged = _inputs(request, "compare")
@@ -93,15 +95,14 @@ def ladder(request: Mapping[str, Any], report_progress: ReportProgress) -> list[
         Version(k + 1, (*start, *added[:k]), tuple(added[k - 1 : k]) if k else (), (), None)
         for k in range(len(added) + 1)
     ]
-    count = 0
+    fitted = count()
 
-    def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
-        nonlocal count
-        report_progress(count, len(versions), f"fitting version {count + 1}")
-        count += 1
-        return compare(dwells, effects, history, fresh, fresh_history, before)
+    def working() -> nullcontext[None]:
+        done = next(fitted)
+        report_progress(done, len(versions), f"fitting version {done + 1}")
+        return nullcontext()
 
-    return evolution(versions, compared)
+    return errors_by_version(versions, ImprovedTables(dwells, history, fresh, fresh_history), working)
 
 
 def plan(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:

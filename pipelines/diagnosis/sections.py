@@ -1,0 +1,196 @@
+"""The tables of a diagnosis with their sentences, the same at a terminal, in a report and on a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from inertial import effects
+from inertial.data_errors.handling import named as handling_error
+from inertial.uncertainty.rounding import chance, short, short_values
+from pipelines.diagnosis import sentences
+
+HIDDEN, SHOWN = 3.0, 4
+"""Factor by which slow noise must raise the smallest detectable size of an effect to list it, and the number of effects
+listed."""
+DRIVERS = 8
+"""Drivers of the residual that a terminal lists."""
+
+Number = tuple[str, str]
+"""A column of numbers: its name and their unit, empty for a number without one. A column of text is its name alone."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A table with its title, and the sentences under it; without rows there may still be sentences."""
+
+    title: str
+    columns: tuple[str | Number, ...]
+    rows: list[list[str]]
+    notes: list[str]
+
+    def filled(self) -> list[int]:
+        """The columns that have an entry."""
+        return [k for k in range(len(self.columns)) if any(row[k] for row in self.rows)]
+
+    def heads(self, join: str) -> list[str]:
+        """The headings, ``join`` between a name and its unit."""
+        return [one if isinstance(one, str) else join.join(filter(None, one)) for one in self.columns]
+
+
+def faults(document: dict[str, Any]) -> Section:
+    """The data faults."""
+    rows = [[f["fault"], ", ".join(f["units"]), _numbers(f["dwells"]), f["evidence"]] for f in document["blocked_by"]]
+    title = "Data faults: correct these first; these units are left out"
+    return Section(title, ("fault", "unit", ("dwells", ""), "evidence"), rows, [])
+
+
+def _numbers(dwells: list[int]) -> str:
+    if len(dwells) > 4:
+        return f"{len(dwells)}, from {dwells[0]} on"
+    return ", ".join(map(str, dwells)) or "all"
+
+
+def drivers(document: dict[str, Any], most: int | None = DRIVERS) -> Section:
+    """The recorded quantities that the residual follows, ``most`` of them, all where None."""
+    rows = [
+        [p["driver"], " ".join(p["axes"]), f"{100.0 * p['share']:.0f} %", chance(p["p_value"])]
+        for p in document["where"][:most]
+    ]
+    return Section("Drivers of the residual", ("driver", "axes", ("share of excess", ""), ("p", "")), rows, [])
+
+
+def missing(document: dict[str, Any]) -> Section:
+    """The classes of missing effects, in the order of the document."""
+    rows: list[list[str]] = []
+    for group in document["classes"]:
+        names = "\n".join(f"{name} ({symbol_of(name)})" for name in group["effects"])
+        size = short(group["size_ug"]) if group["size_ug"] > 0.0 else "within noise"
+        size += "" if group["plausible"] else " (!)"
+        errors = short(group["rms_after_ug"]), short(group["heldout_after_ug"]) or "–"
+        text = group.get("evidence") or parameters_of(group)
+        rows.append([names, group["scope"], size, chance(group["p_value"]), *errors, text])
+    columns = (
+        *("effect", "scope", ("size", "µg"), ("p", ""), ("residual", "µg"), ("cross-validated", "µg")),
+        "parameters",
+    )
+    title = "Missing effects; these data cannot separate the effects of one row"
+    return Section(title, columns, rows, _legend(document) if rows else [])
+
+
+def _legend(document: dict[str, Any]) -> list[str]:
+    """The meaning of the columns and marks of the missing effects."""
+    groups = document["classes"]
+    legend = (
+        "residual: with the effect added · cross-validated: on dwells not fitted, the worst of poses, soaks, stretches of "
+        "time"
+    )
+    if any(group["heldout_after_ug"] is None for group in groups):
+        legend += " · –: no dwells left out can judge it"
+    if any(group.get("nonlinear_interval") for group in groups):
+        legend += " · in brackets: 68 % interval"
+    unusual = "(!) larger than the usual size of this effect: check other causes, too"
+    marks = [] if all(group["plausible"] for group in groups) else [unusual]
+    return [*marks, legend]
+
+
+def symbol_of(name: str) -> str:
+    """The symbol of an effect, or of a handling error."""
+    known = handling_error(name)
+    if known is not None:
+        return known.symbol
+    return effects.get(name).symbol if name in effects.catalogue() or ":" in name else "a single dwell"
+
+
+def parameters_of(group: dict[str, Any]) -> str:
+    """Nonlinear parameters with the effect that they belong to; a row may have several effects."""
+    name = group.get("nonlinear_of") or group["effects"][0]
+    if group["scope"] == "data" or not group["nonlinear"]:
+        return ""
+    known = [p for p in effects.get(name).nonlinear if group["nonlinear"].get(p.name) is not None]
+    between = group.get("nonlinear_interval") or {}
+    values = ", ".join(
+        f"{p.name} = {short_values(group['nonlinear'][p.name])}{_within(between.get(p.name))} {p.unit}".rstrip()
+        for p in known
+    )
+    return f"{name}: {values}" if values and len(group["effects"]) > 1 else values
+
+
+def _within(interval: Sequence[float] | None) -> str:
+    """The 68 % interval behind a value."""
+    return f" ({short(interval[0])} to {short(interval[1])})" if interval else ""
+
+
+def next_measurement(proposed: list[dict[str, Any]]) -> Section:
+    """The next measurement step by step, with station time and expected separation, and what no steps separate."""
+    steps = [p for p in proposed if p.get("measurable", True)]
+    rows = [
+        [
+            short(p["outer_deg"]),
+            short(p["inner_deg"]),
+            short(p["chamber_C"]) + ("" if p.get("soaked", True) else " (during the ramp)"),
+            short(p.get("wait_s")) + (f" after {short(p['off_s'] / 60.0)} min off" if p.get("off_s") else ""),
+            str(p.get("repeats", 1)),
+            p["why"],
+        ]
+        for p in steps
+    ]
+    columns = (("outer", "°"), ("inner", "°"), ("chamber", "°C"), ("wait", "s"), ("times", ""), "purpose")
+    notes = [sentences.brings(row) for row in {p["why"]: p for p in steps if "minutes" in p}.values()]
+    notes += [row["why"] for row in proposed if not row.get("measurable", True)]
+    return Section("Measure next, in this order", columns, rows, notes)
+
+
+def unseen(document: dict[str, Any]) -> Section:
+    """The effects that the plan cannot show."""
+    reasons = document.get("reasons", {})
+    rows = [[name, reasons.get(name) or document["breakers"][name]] for name in document["unseen"]]
+    return Section("Effects that this plan cannot show", ("effect", "reason, and measurement that shows it"), rows, [])
+
+
+def unseen_in_part(document: dict[str, Any]) -> Section:
+    """The effects that the plan shows at some values of their parameters only."""
+    parts: dict[str, list[str]] = {}
+    for row in document.get("unseen_in_part", ()):
+        parts.setdefault(row["effect"], []).append(row["text"])
+    rows = [[name, "; ".join(texts)] for name, texts in parts.items()]
+    return Section("Effects that this plan shows only in part", ("effect", "not visible for"), rows, [])
+
+
+def hidden_by_noise(document: dict[str, Any]) -> Section:
+    """The effects that 1/f noise or random walk of this size hides, with the measurement for smaller sizes."""
+    named = document.get("smallest_named", ())
+    raised = [row for row in named if row["size_ug"] > HIDDEN * row["without_slow_noise_ug"]][:SHOWN]
+    rows = [
+        [r["effect"], short(r["size_ug"], 2), short(r["without_slow_noise_ug"], 2), effects.get(r["effect"]).breaker]
+        for r in raised
+    ]
+    columns = (
+        *("effect", ("smallest size", "µg rms"), ("with white noise only", "µg rms")),
+        "measurement for smaller sizes",
+    )
+    return Section("Effects hidden by slow noise (1/f, random walk)", columns, rows, [])
+
+
+def worded(document: dict[str, Any]) -> dict[str, Any]:
+    """A diagnosis as its tables and sentences by name, for a template."""
+    return {
+        "verdict": sentences.verdict(document),
+        "cards": sentences.cards(document),
+        "evidence": sentences.evidence_text(document),
+        "undetected": sentences.undetected(document),
+        "faults": faults(document),
+        "drivers": drivers(document, None),
+        "missing": missing(document),
+        "not_recommended": sentences.why_not_recommended(document),
+        "influences": sentences.influences(document, None),
+        "left_out": sentences.left_out(document),
+        "unexplained_title": sentences.UNEXPLAINED,
+        "unexplained": sentences.unexplained_text(document),
+        "next_measurement": next_measurement(document["next_measurements"]),
+        "unseen": unseen(document),
+        "unseen_in_part": unseen_in_part(document),
+        "shown_by": {row["effect"]: row["breaker"] for row in document.get("unseen_in_part", ())},
+        "hidden_by_noise": hidden_by_noise(document),
+    }

@@ -1,0 +1,224 @@
+"""A diagnosis in sentences: the verdict with its numbers, its basis, the dwells that decide it, the next measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from inertial.counts import degrees_of_freedom
+from inertial.criticism.evidence import FEW_DOF
+from inertial.uncertainty.rounding import chance, equal, short
+from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
+
+BAD_DWELL = "bad_dwell"
+NAMED_DWELLS = 5
+"""Number of dwells named in a sentence."""
+
+UNEXPLAINED = "Significant, but of unknown cause"
+
+
+def verdict(document: dict[str, Any]) -> str:
+    """The verdict in one sentence with its numbers."""
+    error, faulty = document["error"], {u for f in document["blocked_by"] for u in f["units"]}
+    if error["rms_ug"] is None:
+        return (
+            f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; correct the faults, then judge the model."
+        )
+    judged = {"adequate": document["adequate"], "reason": document.get("reason"), **error}
+    told = plain_verdict({**judged, "units": len(document["units"]) - len(faulty)})
+    if document["adequate"] is not False:
+        return f"{told}."
+    spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
+    named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
+    if spoilt:
+        rest = f"; also missing: {', and '.join(named)}" if named else ""
+        return f"{told}; these figures are without the faults of the data: {'; '.join(spoilt)}{rest}."
+    if named:
+        return f"{told}; missing: {', and '.join(named)}."
+    rest = "no recorded quantity explains the residual"
+    if document["unexplained"]:
+        rest = f"{document['unexplained']['text']}, and no effect of the catalogue explains it"
+    return f"{told}; {rest}."
+
+
+def plain_verdict(judged: Mapping[str, Any]) -> str:
+    """The verdict with residual, noise and probability, without a full stop.
+
+    Parameters
+    ----------
+    judged : ``adequate``, ``reason``, ``rms_ug``, ``floor_ug``, ``p_value`` and ``units``, the number of units that were judged
+    """
+    if judged["adequate"] is None:
+        return f"CANNOT BE JUDGED: {judged['reason']}"
+    units = judged["units"]
+    left = f"residual {short(judged['rms_ug'])} µg rms over {units} unit{'s' if units != 1 else ''}"
+    left += f"; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
+    if judged["adequate"]:
+        return f"ADEQUATE: {left}"
+    return f"NOT ADEQUATE: {left}{f'; {SMALL_MISFIT}' if is_small(judged) else ''}"
+
+
+def class_text(group: dict[str, Any]) -> str:
+    """A handling error with its unit and first dwell, and the effects that explain the data equally well."""
+    units, dwells = group.get("units") or [], group.get("dwells") or []
+    where = f"{', '.join(units) or 'all units'}{f', dwell {dwells[0]}' if dwells else ''}"
+    return f"{' or '.join(group['effects'])} ({where})"
+
+
+def cards(document: dict[str, Any]) -> list[tuple[str, str]]:
+    """The figures of a verdict, each with its meaning; none where every unit has a data fault."""
+    error, classes = document["error"], document["classes"]
+    if error["rms_ug"] is None:
+        return []
+    figures = [
+        (f"{short(error['rms_ug'])} µg", "residual of the model, rms"),
+        (f"{short(error['floor_ug'])} µg", "noise of the measurement, rms: with the missing effects in the model"),
+    ]
+    if classes:
+        figures.append((f"{short(classes[-1]['rms_after_ug'])} µg", "rms after the effects are added"))
+    return [*figures, (chance(error["p_value"]), "probability of the residual under noise alone")]
+
+
+def evidence_text(document: dict[str, Any]) -> str:
+    """The basis of the verdict in one line; empty without a verdict."""
+    evidence = document.get("evidence")
+    if not evidence:
+        return ""
+    parts = [degrees_of_freedom(evidence["degrees_of_freedom"])]
+    if evidence["condition"] is not None:
+        parts.append(f"condition {short(evidence['condition'])}")
+    if evidence["bias_jackknife_ug"] is not None and evidence["bias_change_by"] is not None:
+        by = evidence["bias_change_by"]
+        parts.append(
+            f"bias ± {short(evidence['bias_jackknife_ug'])} µg by leaving out single dwells (most by dwell {by['dwell']} "
+            f"of {by['unit']}: {short(evidence['bias_change_ug'])} µg)"
+        )
+    return "; ".join(parts)
+
+
+def few_dwells(document: dict[str, Any]) -> bool:
+    """Whether an adequate model was judged by so few dwells that the smallest detected effect has to be told."""
+    evidence = document.get("evidence")
+    return bool(document["adequate"] and evidence and evidence["degrees_of_freedom"] < FEW_DOF)
+
+
+def undetected(document: dict[str, Any]) -> str:
+    """The smallest cubic term that the dwells show; empty without a verdict."""
+    evidence = document.get("evidence")
+    if not evidence:
+        return ""
+    smallest = evidence["smallest_cubic_ug"]
+    seen = f"below {short(smallest)} µg/g³" if smallest is not None else "of any size"
+    return f"{'few dwells: ' if few_dwells(document) else ''}a cubic term {seen} is not detected (probability 0.5)"
+
+
+def influences(document: dict[str, Any], most: int | None = NAMED_DWELLS) -> list[str]:
+    """The dwells with the largest influence on each class, or on the verdict where nothing is named; none for an adequate model.
+
+    Parameters
+    ----------
+    most : number of dwells that a sentence names; all where None
+    """
+    if document["adequate"]:
+        return []
+    if not document["classes"] and document["influence"]:
+        return [_carried("largest residuals, share of all", document, most)]
+    return [
+        _carried(f"dwells with the largest influence on {' or '.join(group['effects'])}", group, most)
+        for group in document["classes"]
+        if group["effects"] != [BAD_DWELL]
+    ]
+
+
+def _carried(what: str, carried: dict[str, Any], most: int | None) -> str:
+    """Dwells with their shares, and the probability without them."""
+    rows = carried["influence"][:most]
+    dwells = (
+        ", ".join(f"{d['unit']} dwell {d['dwell']} ({100.0 * d['share']:.0f} %)" for d in rows) or "no single dwell"
+    )
+    without = carried.get("without_influence")
+    return f"{what}: {dwells}" + (
+        f"; without these {without['dwells']} p {equal(without['p_value'])}" if without else ""
+    )
+
+
+def without_single_dwells(document: dict[str, Any]) -> str:
+    """The verdict without single dwells that have a fault, and the option that leaves them out; empty where there are none."""
+    single = document.get("leave_out")
+    if not single:
+        return ""
+    names = ",".join(f"{d['unit']}:{d['dwell']}" for d in single["dwells"])
+    found = {True: "adequate", False: "NOT adequate", None: "cannot be judged"}[single["adequate_without"]]
+    these = "these dwells" if len(single["dwells"]) > 1 else "this dwell"
+    return f"without {these} the model is: {found}; to leave out: --leave-out {names}"
+
+
+def tails_left_out(document: dict[str, Any]) -> str:
+    """The dwells that were left out and that the tails of the noise may explain; empty where there are none."""
+    removed = document.get("removed")
+    if not removed or not removed["heavy_tails"]:
+        return ""
+    tails = [d for d in removed["dwells"] if d.get("tail", True)]
+    named = tails[:NAMED_DWELLS]
+    names = ", ".join(f"{d['unit']} dwell {d['dwell']} ({d['deviations']:.1f})" for d in named)
+    return (
+        f"{len(tails)} dwell{'s' if len(tails) != 1 else ''} left out (standard deviations): {names}"
+        f"{' …' if len(tails) > len(named) else ''}; the tails of the noise of this run may reach as far"
+    )
+
+
+def left_out(document: dict[str, Any]) -> list[str]:
+    """What was left out of the judgement, and what the verdict is without it."""
+    removed = document.get("removed")
+    count = len(removed["dwells"]) if removed and not removed["heavy_tails"] else 0
+    were = "s were" if count > 1 else " was"
+    counted = f"{count} single dwell{were} left out before the model was judged" if count else ""
+    return [text for text in (without_single_dwells(document), tails_left_out(document), counted) if text]
+
+
+def why_not_recommended(document: dict[str, Any]) -> list[str]:
+    """Why effects that are named are not recommended for the model."""
+    lines: list[str] = []
+    for group in document["classes"]:
+        if group["scope"] == "data" or set(group["effects"]) & set(document["recommended"]):
+            continue
+        name, before, after = group["effects"][0], group.get("heldout_before_ug"), group["heldout_after_ug"]
+        if after is None or before is None:
+            why = "no dwells left out can judge it; a fresh run of the same units decides"
+        elif after > before:
+            why = f"the error on dwells left out rises from {short(before)} to {short(after)} µg"
+        else:
+            continue
+        lines.append(f"{name} is not recommended: {why}.")
+    return lines
+
+
+def unexplained_text(document: dict[str, Any]) -> str:
+    """What the residual follows without an effect of the catalogue that explains it; empty where there is nothing."""
+    unexplained = document["unexplained"]
+    if not unexplained:
+        return ""
+    return f"{unexplained['text']} as a {unexplained['shape']} (p {equal(unexplained['p_value'])})."
+
+
+def not_separated(document: dict[str, Any]) -> str:
+    """The classes of which one effect of several is recommended; empty where there are none."""
+    added = set(document["recommended"])
+    several = [g["effects"] for g in document["classes"] if len(g["effects"]) > 1 and added & set(g["effects"])]
+    if not several:
+        return ""
+    alternatives = "; ".join(" or ".join(effects) for effects in several)
+    return f"These data do not separate: {alternatives}. The added effect is one of its class."
+
+
+def brings(row: dict[str, Any]) -> str:
+    """Station time and expected separation of the steps of a row of the next measurement."""
+    text = f"{row['why']}: {short(row['minutes'])} min of station time; "
+    expected = row.get("separation_if")
+    if not expected:
+        return text + (
+            f"χ² of a coefficient of typical size {row['separation_before']:.1f} now, {row['separation_after']:.0f} expected"
+        )
+    after = ", ".join(f"{chi:.0f} if {name} is true" for name, chi in expected.items())
+    text += f"χ² between the two {row['separation_before']:.1f} now, expected {after}"
+    return text + (f"; not separated from the first: {', '.join(row['not_parted'])}" if row.get("not_parted") else "")
