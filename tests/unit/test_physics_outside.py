@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 
 from inertial import effects
 from inertial.criticism.curves import fit_curve
@@ -33,7 +34,7 @@ def run_of(world: World, seed: int) -> ExaminedRun:
     return ExaminedRun(lot_of(measured(made.dwells, made.history), square=False), BASE)
 
 
-@pytest.mark.parametrize("index", [0, 2])
+@each([0, 2])
 def test_a_recorded_column_is_not_told_as_a_curve_of_time(index: int) -> None:
     # a humidity that wanders slowly, with an effect that saturates: a curve of time follows it nearly as well
     run = case("covariate_curve", index, 8080)
@@ -86,7 +87,7 @@ def test_columns_across_the_axes_are_products_of_forces() -> None:
     assert not np.any(own.reshape(2, 3, problem.n, -1)[np.repeat(before[:, None], 3, axis=1)])
 
 
-@pytest.mark.parametrize("shift", [1500.0, 1780.0, 1800.0, 1830.0, 1860.0, 3000.0])
+@each([1500.0, 1780.0, 1800.0, 1830.0, 1860.0, 3000.0])
 def test_an_effect_that_died_away_long_ago_leaves_the_range_of_numbers_quietly(shift: float) -> None:
     made = make(World(units=4), SEED + 80)
     dwells = made.dwells.assign(since_power_s=made.dwells["since_power_s"] + shift)
