@@ -21,7 +21,8 @@ from benchmarks.procedure_pulls import PARTS, covered, station_of, tell
 from benchmarks.procedure_truths import of_axis, truths
 from inertial.dynamics.transfer_model import fit_transfer
 from pipelines.procedures import PROCEDURES, step_response
-from pipelines.procedures.base import REFERENCE, Device, FigureValue, ProcedureRecord, UnitRecord
+from pipelines.procedures.figures import FigureValue
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureRecord, UnitRecord
 from pipelines.procedures.sweep_points import transfer_points
 from pipelines.procedures.transfer_figures import figures_of_transfer
 from schemas.lot import Lot, Unit

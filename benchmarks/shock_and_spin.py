@@ -153,57 +153,65 @@ def twice_the_floor(left: Callable[[float], float]) -> float:
     return knob
 
 
+def shock_classes(k: int, seed: int, kind: str | None = None) -> list[tuple[str, ...]]:
+    """What is named in the shock of number k: with a hidden effect of this kind, or with none."""
+    rng = np.random.default_rng([seed, 2 if kind is None else 1, k])
+    drawn, noise = rng.normal(size=(2, 2)), rng.normal(size=(2, 1000))
+    if kind is None:
+        return [one.effects for one in diagnose_shock(shocks("none", 0.0, drawn, noise)).classes]
+    model: tuple[str, ...] = () if kind == "delay" else tuple(SHOCK_MODEL)
+
+    def left(knob: float) -> float:
+        fit = fit_shock(shocks(kind, knob, drawn, None), model)
+        return float(np.sqrt(np.mean(np.concatenate(fit.residuals) ** 2)) / WAVE_FLOOR)
+
+    return [one.effects for one in diagnose_shock(shocks(kind, twice_the_floor(left), drawn, noise), model).classes]
+
+
+def spin_classes(
+    k: int, seed: int, kind: str | None = None, radii: tuple[float, ...] = (0.5,)
+) -> list[tuple[str, ...]]:
+    """What is named in the run of number k of a centrifuge: with a hidden effect of this kind, or with none."""
+    rng, points = np.random.default_rng([seed, 4 if kind is None else 3, k]), spin_points(radii)
+    error = np.full(points.order.size, SPIN_FLOOR)
+    drawn = {r: RADIUS_ERROR * float(rng.normal()) for r in radii} if len(radii) > 1 else {}
+    noise = SPIN_FLOOR * rng.normal(size=error.size)
+    if kind is None:
+        return [one.effects for one in diagnose_spins(points, spun(points, "none", 0.0, drawn) + noise, error).classes]
+    model = tuple(name for name in SPIN_MODEL if name != kind)
+
+    def left(knob: float) -> float:
+        fit = fit_spins(points, spun(points, kind, knob), error, model)
+        return float(np.sqrt(np.mean((fit.residuals / error) ** 2)))
+
+    output = spun(points, kind, twice_the_floor(left), drawn) + noise
+    return [one.effects for one in diagnose_spins(points, output, error, model).classes]
+
+
 def shock(n: int, seed: int) -> None:
     """Shocks with a hidden effect, and without."""
     hits: dict[str, list[bool]] = {kind: [] for kind in SHOCKS}
     for k in range(n):
-        kind, rng = SHOCKS[k % len(SHOCKS)], np.random.default_rng([seed, 1, k])
-        model = () if kind == "delay" else SHOCK_MODEL
-        drawn, noise = rng.normal(size=(2, 2)), rng.normal(size=(2, 1000))
-
-        def left(knob: float, kind: str = kind, drawn: Array = drawn, model: tuple[str, ...] = tuple(model)) -> float:
-            fit = fit_shock(shocks(kind, knob, drawn, None), model)
-            return float(np.sqrt(np.mean(np.concatenate(fit.residuals) ** 2)) / WAVE_FLOOR)
-
-        diagnosis = diagnose_shock(shocks(kind, twice_the_floor(left), drawn, noise), model)
-        _count(hits, kind, [one.effects for one in diagnosis.classes], k, n)
+        kind = SHOCKS[k % len(SHOCKS)]
+        _count(hits, kind, shock_classes(k, seed, kind), k, n)
     _print("shock", hits, n)
-    named = 0
-    for k in range(n):
-        rng = np.random.default_rng([seed, 2, k])
-        diagnosis = diagnose_shock(shocks("none", 0.0, rng.normal(size=(2, 2)), rng.normal(size=(2, 1000))))
-        named += bool(diagnosis.classes)
+    named = sum(bool(shock_classes(k, seed)) for k in range(n))
     print(f"shock: something is named in {named} of {n} without a hidden effect", flush=True)
 
 
 def centrifuge(n: int, seed: int, radii: tuple[float, ...] = (0.5,)) -> None:
     """Runs of a centrifuge with a hidden effect, and without."""
-    points, test = spin_points(radii), "centrifuge" if len(radii) == 1 else "two radii"
-    error, hits = np.full(points.order.size, SPIN_FLOOR), {kind: list[bool]() for kind in SPINS}
+    test = "centrifuge" if len(radii) == 1 else "two radii"
+    hits = {kind: list[bool]() for kind in SPINS}
     alone = dict.fromkeys(SPINS, 0)
-
-    def drawn(rng: np.random.Generator) -> dict[float, float]:
-        return {r: RADIUS_ERROR * float(rng.normal()) for r in radii} if len(radii) > 1 else {}
-
     for k in range(n):
-        kind, rng = SPINS[k % len(SPINS)], np.random.default_rng([seed, 3, k])
-        model = tuple(name for name in SPIN_MODEL if name != kind)
-
-        def left(knob: float, kind: str = kind, model: tuple[str, ...] = model) -> float:
-            fit = fit_spins(points, spun(points, kind, knob), error, model)
-            return float(np.sqrt(np.mean((fit.residuals / error) ** 2)))
-
-        output = spun(points, kind, twice_the_floor(left), drawn(rng)) + SPIN_FLOOR * rng.normal(size=error.size)
-        classes = [one.effects for one in diagnose_spins(points, output, error, model).classes]
+        kind = SPINS[k % len(SPINS)]
+        classes = spin_classes(k, seed, kind, radii)
         _count(hits, kind, classes, k, n)
         alone[kind] += (kind,) in classes
     _print(test, hits, n)
     print(f"{test}: alone in its class: {', '.join(f'{kind} {count}' for kind, count in alone.items())}", flush=True)
-    named = 0
-    for k in range(n):
-        rng = np.random.default_rng([seed, 4, k])
-        output = spun(points, "none", 0.0, drawn(rng)) + SPIN_FLOOR * rng.normal(size=error.size)
-        named += bool(diagnose_spins(points, output, error).classes)
+    named = sum(bool(spin_classes(k, seed, None, radii)) for k in range(n))
     print(f"{test}: something is named in {named} of {n} without a hidden effect", flush=True)
 
 

@@ -27,6 +27,22 @@ _MANY_TURNS_DEG = 1e6  # an encoder may count on over many turns
 
 
 @dataclass(frozen=True)
+class Varied:
+    """How a plan that leaves a quantity alone is changed so that its effects are seen.
+
+    steady : share of its largest value within which the quantity is constant
+    feature : what a plan is said to have in which it is
+    factor : by which it is raised in every second dwell of a repetition
+    cure : the change as an instruction
+    """
+
+    steady: float
+    feature: str
+    factor: float
+    cure: str
+
+
+@dataclass(frozen=True)
 class Quantity:
     """A recorded quantity.
 
@@ -48,7 +64,8 @@ class Quantity:
     joined : how the values of neighbouring dwells become one
     lowest, highest : where values of the column can lie; anything else in a file is a slip
     usual, spread : a value that a plan may take for granted, and how far it wanders about it on a station
-    reading : whether every station reads it beside its records
+    varied : how a plan varies it that leaves it to the station; None where its steps set it
+    reading : place among the columns that every station reads beside its records; 0 where not every station does
     """
 
     column: str
@@ -68,13 +85,14 @@ class Quantity:
     joined: Joined = "mean"
     usual: float = 0.0
     spread: float = 0.0
-    reading: bool = False
+    varied: Varied | None = None
+    reading: int = 0
     lowest: float = -LARGEST
     highest: float = LARGEST
 
     def about(self, wander: Array) -> Array:
-        """Values about the usual one, for standard normal numbers; in the column's unit."""
-        return self.usual + self.spread * wander
+        """Values about the usual one, and above it where none can be negative, for standard normal numbers; column's unit."""
+        return self.usual + self.spread * (wander if self.lowest < 0.0 else np.abs(wander))
 
     @property
     def axis_label(self) -> str:
@@ -87,12 +105,12 @@ HOURS = (1.0 / 3600.0, "h")
 RECORDED: tuple[Quantity, ...] = (
     Quantity(
         "unit_C", "temperature", "°C", "temperature of the unit",
-        formula="temperature", meaning="temperature of the sensor, °C", mapped="temperature", usual=25.0, reading=True,
+        formula="temperature", meaning="temperature of the sensor, °C", mapped="temperature", usual=25.0, reading=2,
         lowest=_KELVIN_0_C, highest=_HOTTEST_C,
     ),
     Quantity(
         "chamber_C", "chamber", "°C", "temperature of the chamber",
-        formula="chamber", meaning="temperature of the chamber, °C", mapped="chamber", usual=25.0, reading=True,
+        formula="chamber", meaning="temperature of the chamber, °C", mapped="chamber", usual=25.0, reading=1,
         lowest=_KELVIN_0_C, highest=_HOTTEST_C,
     ),
     Quantity(
@@ -102,22 +120,23 @@ RECORDED: tuple[Quantity, ...] = (
     ),
     Quantity(
         "since_move_s", "since_move", "s", "time since the last move",
-        formula="since_move", meaning="time since the table last moved, s", usual=2.0, reading=True,
+        formula="since_move", meaning="time since the table last moved, s", usual=2.0, reading=5,
         lowest=0.0, highest=LARGEST_TIME_S,
     ),
     Quantity(
         "since_power_s", "since_power", "s", "time since power-on", clock=True, shown=HOURS,
-        formula="since_power", meaning="time since power-on, s", usual=600.0, reading=True,
+        formula="since_power", meaning="time since power-on, s", usual=600.0, reading=6,
         lowest=0.0, highest=LARGEST_TIME_S,
     ),
     Quantity(
         "supply_V", "supply", "V", "supply",
-        formula="supply", meaning="supply, V", mapped="supply", usual=3.3, spread=1e-3, reading=True,
+        formula="supply", meaning="supply, V", mapped="supply", usual=3.3, spread=1e-3, reading=3,
+        varied=Varied(0.005, "a constant supply voltage", 1.02, "step the supply voltage at constant temperature"),
     ),
     Quantity(
         "vibration_g", "vibration", "g rms", "vibration",
-        formula="vibration", meaning="vibration, g rms", mapped="vibration", usual=1e-3, spread=1e-4, reading=True,
-        lowest=0.0,
+        formula="vibration", meaning="vibration, g rms", mapped="vibration", usual=1e-3, spread=1e-4, reading=4,
+        varied=Varied(0.9, "constant vibration", 10.0, "measure with the compressor on and off"), lowest=0.0,
     ),
     # of runs that switch their devices off and on: it tells apart what a power-on changes, and is no driver by itself
     Quantity(
@@ -145,6 +164,10 @@ RECORDED: tuple[Quantity, ...] = (
 
 BY_COLUMN: Mapping[str, Quantity] = MappingProxyType({row.column: row for row in RECORDED})
 BY_ATTRIBUTE: Mapping[str, Quantity] = MappingProxyType({row.attribute: row for row in RECORDED if row.attribute})
+LEFT_ALONE: tuple[Quantity, ...] = tuple(row for row in RECORDED if row.attribute and row.varied)
+"""Quantities of the state that the steps of a plan do not set."""
+READINGS: tuple[str, ...] = tuple(row.column for row in sorted(RECORDED, key=lambda row: row.reading) if row.reading)
+"""Columns that every station reads beside its records, in their order."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from inertial.criticism.field import Candidates
 from inertial.criticism.search import Rival
-from inertial.data_errors.handling.bias_jump import BiasJump
 from inertial.decisions import CLASS_WIDTH, JUMPS_RARE
 from inertial.estimation.alternative import Handling
 from inertial.estimation.bases import SEEN
@@ -141,7 +140,7 @@ def _best(field: Candidates, space: Space, block: int, single: dict[int, _OfAxis
     """The best jumps of one block: one of the alternatives, or several jumps from level to level."""
     axes = len(space.q)
     tried = [_OfAxis(0.0, ()), *([single[block]] if block in single else [])]
-    jump = field.of(BiasJump.id) if BiasJump.id in field.grids else None
+    jump = next((a for a in field.handling if a.several and a.id in field.grids), None)
     if jump is not None:
         unit, axis = divmod(block, 3)
         for drop, dwells in _several(space, block):

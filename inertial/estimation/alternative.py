@@ -39,6 +39,7 @@ class Handling(Effect):
     ----------
     fewest_units : below which it cannot be separated from effects of the sensor, and is not searched
     of_one_axis : whether it concerns the bias of one axis of one unit, at an ``axis``
+    several : whether an axis may have many of them, each from a ``dwell`` on, which are searched together
     in_part : whether some units of a large lot stand for it: it is the same for all, and mended without a look at each
     """
 
@@ -49,6 +50,7 @@ class Handling(Effect):
     fewest_units: ClassVar[int] = 2
     in_part: ClassVar[bool] = True
     of_one_axis: ClassVar[bool] = False
+    several: ClassVar[bool] = False
 
     @abstractmethod
     def places(self, lot: "Lot") -> list[dict[str, float]]:

@@ -1,7 +1,8 @@
-"""Plans with dwells added: poses in further directions, the opposite order, waits, soaks, power cycles, supply and vibration."""
+"""Plans with dwells added: poses in further directions, the opposite order, waits, soaks, power cycles, raised quantities."""
 
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,27 +101,16 @@ def cycled(state: State) -> State:
     return extended(state, [first, *(replace(first, wait=w, off=0.0) for w in waits)])
 
 
-def supply_steps(state: State) -> State:
-    """The plan, then every pose again, every second one at 2 % higher supply voltage."""
+def raised(state: State, attribute: str, factor: float) -> State:
+    """The plan, then every pose again, every second one with a quantity raised by a factor."""
     repeated = later(state)
-    if repeated.supply is None:
+    values: Array | None = getattr(repeated, attribute)
+    if values is None:
         return state
-    return replace(repeated, supply=_raised(state, repeated.supply, 1.02), memory={})
-
-
-def shaken(state: State) -> State:
-    """The plan, then every pose again, every second one at ten times the vibration."""
-    repeated = later(state)
-    if repeated.vibration is None:
-        return state
-    return replace(repeated, vibration=_raised(state, repeated.vibration, 10.0), memory={})
-
-
-def _raised(state: State, values: Array, factor: float) -> Array:
-    """Recorded values of a plan and its repetition, every second dwell of the repetition multiplied by a factor."""
-    raised = values.copy()
-    raised[n_of(state) :: 2] *= factor
-    return raised
+    values = values.copy()
+    values[n_of(state) :: 2] *= factor
+    changed: dict[str, Any] = {attribute: values}
+    return replace(repeated, **changed, memory={})
 
 
 def up_down(state: State) -> list[float]:

@@ -12,6 +12,7 @@ from inertial.effects import SensorEffect
 from inertial.effects.base import AnyEffect, excited
 from inertial.planning.remedies import Driver
 from inertial.planning.sequences import SequenceStep, StationPace, extended
+from inertial.quantities import LEFT_ALONE, RECORDED
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -105,18 +106,15 @@ def _varied(state: State) -> list[tuple[Driver, State]]:
     if state.temperature is not None:
         warm = state.temperature + rng.uniform(1.0, 15.0, size=n)
         variants.append(("temperature", replace(state, temperature=warm, history=None, memory={})))
-    for name in ("since_move", "since_power", "supply", "vibration"):
+    for name in ("since_move", "since_power", *(row.attribute for row in LEFT_ALONE)):
         value = getattr(state, name)
         if value is not None:
             changed: dict[str, Any] = {name: value * (1.0 + turn[0])}
-            variants.append((name, replace(state, **changed, memory={})))  # pyright: ignore[reportArgumentType]
+            variants.append((name, replace(state, **changed, memory={})))
     return variants
 
 
-_ROWS = (
-    "time", "temperature", "chamber", "outer", "inner", "supply", "vibration", "since_move", "since_power", "power_off",
-    "felt", "output_run",
-)  # fmt: skip
+_ROWS = (*(row.attribute for row in RECORDED if row.attribute and not row.once), "felt", "output_run")
 
 
 def _reordered(state: State) -> State:

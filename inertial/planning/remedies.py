@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 from inertial.planning import additions, features
+from inertial.quantities import LEFT_ALONE, Quantity, Varied
 from inertial.state import State
 
-Driver = Literal["force", "order", "since_move", "temperature", "time", "rate", "since_power", "supply", "vibration"]
+Driver = str
+"""An attribute of the state, or "force", "order" of the poses, "rate" of the temperature."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,16 @@ def _always(instruction: str) -> Callable[[State], str]:
 
 def _degrees(values: list[float]) -> str:
     return ", ".join(f"{v:.0f}" for v in values)
+
+
+def _of(row: Quantity, varied: Varied) -> Remedy:
+    """The remedy of a plan that leaves a quantity alone."""
+    return Remedy(
+        row.attribute,
+        _where(varied.feature, lambda s: features.constant(getattr(s, row.attribute), varied.steady)),
+        lambda s: additions.raised(s, row.attribute, varied.factor),
+        _always(varied.cure),
+    )
 
 
 REMEDIES: tuple[Remedy, ...] = (
@@ -112,17 +123,6 @@ REMEDIES: tuple[Remedy, ...] = (
         additions.cycled,
         _always("switch the power off and on at constant temperature"),
     ),
-    Remedy(
-        "supply",
-        _where("a constant supply voltage", lambda s: features.constant(s.supply, 0.005)),
-        additions.supply_steps,
-        _always("step the supply voltage at constant temperature"),
-    ),
-    Remedy(
-        "vibration",
-        _where("constant vibration", lambda s: features.constant(s.vibration, 0.9)),
-        additions.shaken,
-        _always("measure with the compressor on and off"),
-    ),
+    *(_of(row, row.varied) for row in LEFT_ALONE if row.varied),
 )
 """In order of effort for a test engineer, the least first."""

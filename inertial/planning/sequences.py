@@ -4,11 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial import frames
+from inertial.quantities import LEFT_ALONE
 from inertial.state import T_REFERENCE, History, State
 from inertial.timing import Air, Drive, SoakRule, followed, settling_s, soaked
 
@@ -196,6 +198,7 @@ def extended(
     begin = np.max(state.time) + rest + 0.5 * pace.dwell_s
     powered = None if state.since_power is None else np.minimum(state.since_power[..., -1:] + passed, ran.since_on)
     off = np.array([s.off for s in steps])
+    left: dict[str, Any] = {row.attribute: _repeated(getattr(state, row.attribute), count) for row in LEFT_ALONE}
     return replace(
         state,
         force=whole,
@@ -207,13 +210,12 @@ def extended(
         since_power=_joined_if(state.since_power, powered),
         power_off=_power_off(state, off, wide),
         since_move=_joined_if(state.since_move, np.broadcast_to(ran.since_move, wide)),
-        supply=_repeated(state.supply, count),
-        vibration=_repeated(state.vibration, count),
         outer=_joined_if(state.outer, np.broadcast_to(outer, wide)),
         inner=_joined_if(state.inner, np.broadcast_to(inner, wide)),
         covariates={name: _joined(values, _next(values, count)) for name, values in state.covariates.items()},
         history=_history(history, begin + ran.grid, ran.grid_device + apart[..., None]),
         memory={},
+        **left,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from inertial.quantities import BY_ATTRIBUTE
+from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
 from pipelines.tables.summaries import first_outlier
 from schemas.lot import Unit
 from schemas.poses import Pose
@@ -20,8 +20,6 @@ from stations.devices.reader import Instruments
 from stations.devices.slot import Identity, Samples
 
 POWER_OFF = BY_ATTRIBUTE["power_off"].column
-INSTRUMENTS = tuple(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration"))
-SHARED = 4  # values of an observation that all slots share: two angles, air, vibration
 
 
 @dataclass
@@ -62,7 +60,7 @@ class Record:
     since_move: float = 0.0
     since_power: float = 0.0
     power_off: float | None = None
-    observations: list[NDArray[np.float64]] = field(default_factory=list)
+    observations: list[dict[str, NDArray[np.float64]]] = field(default_factory=list)
     recorded: dict[str, list[float]] = field(default_factory=dict)
     parts: dict[str, list[Samples]] = field(default_factory=dict)
     stored: dict[str, int] = field(default_factory=dict)
@@ -71,22 +69,27 @@ class Record:
 
     def observe(self, angles: tuple[float, float], chamber: float, instruments: Instruments) -> None:
         """Adds one observation: encoders in degrees, air in °C, instruments."""
-        row = (*angles, chamber, instruments.vibration_g, *instruments.temperature_C, *instruments.supply_V)
-        self.observations.append(np.array(row))
+        values: dict[str, float | Sequence[float]] = {
+            **dict(zip(ANGLE_COLUMNS, angles, strict=True)),
+            "chamber_C": chamber,
+            "unit_C": instruments.temperature_C,
+            "supply_V": instruments.supply_V,
+            "vibration_g": instruments.vibration_g,
+        }
+        self.observations.append({column: np.atleast_1d(value) for column, value in values.items()})
         for column, value in instruments.recorded.items():
             self.recorded.setdefault(column, []).append(value)
 
     def observed(self, slot: int) -> dict[str, float]:
         """Means over the observations, for the station and one slot, by column of the readings."""
-        means = np.mean(self.observations, axis=0)
-        slots = (len(means) - SHARED) // 2
+        first = self.observations[0]
+        # in one: the mean of a single column is summed up in another order
+        means = np.mean([np.concatenate(list(one.values())) for one in self.observations], axis=0)
+        by_slot = np.split(means, np.cumsum([values.size for values in first.values()]))
         return {
-            "outer_deg": float(means[0]),
-            "inner_deg": float(means[1]),
-            "chamber_C": float(means[2]),
-            "unit_C": float(means[SHARED + slot]),
-            "supply_V": float(means[SHARED + slots + slot]),
-            "vibration_g": float(means[3]),
+            **{column: float(mean[slot if mean.size > 1 else 0]) for column, mean in zip(first, by_slot, strict=False)},
+            "since_move_s": self.since_move,
+            "since_power_s": self.since_power,
             **{column: float(np.mean(values)) for column, values in self.recorded.items()},
         }
 
@@ -169,13 +172,10 @@ def readings_row(record: Record, unit: Unit, identity: Identity, status: str) ->
         "kind": record.kind,
         "pose": record.pose.name,
         "soak": record.soak,
-        "outer_deg": observed["outer_deg"],
-        "inner_deg": observed["inner_deg"],
+        **{column: observed[column] for column in ANGLE_COLUMNS},
         "outer_command_deg": record.pose.outer_deg,
         "inner_command_deg": record.pose.inner_deg,
-        **{name: observed[name] for name in INSTRUMENTS},
-        "since_move_s": record.since_move,
-        "since_power_s": record.since_power,
+        **{column: observed[column] for column in READINGS},
         **({} if record.power_off is None else {POWER_OFF: record.power_off}),
         "start_s": record.start,
         "duration_s": record.duration,

@@ -27,7 +27,7 @@ from pipelines.orchestrator.credentials import without_credentials
 from pipelines.orchestrator.quick_imports import quick_imports
 from pipelines.orchestrator.server import ADDRESS, CLIENTS, START_LOCK, private_folder
 from pipelines.orchestrator.server_check import check_server
-from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, new_key, settings, use_key
+from pipelines.orchestrator.settings import CLIENT_KEY, KEY_FILE, STARTUP_S, cache_folder, new_key, settings, use_key
 from pipelines.parallel import with_environment
 from pipelines.schedule.steps import steps
 from schemas.errors import ArchiveUnusable, StationTimeout, TumblelineError
@@ -117,10 +117,7 @@ def _home(archive: Archive) -> Path:
     """Folder of the server of an archive: in the archive, or in the user's cache where the archive is an object store."""
     if isinstance(archive.root, Path):
         return archive.root.resolve() / "orchestrator"
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return (
-        cache / "tumbleline" / f"orchestrator-{sha256(without_credentials(archive.address).encode()).hexdigest()[:16]}"
-    )
+    return cache_folder() / f"orchestrator-{sha256(without_credentials(archive.address).encode()).hexdigest()[:16]}"
 
 
 def _run(

@@ -18,16 +18,9 @@ from pipelines.importers import files
 from pipelines.importers.content import Content, unit_in
 from pipelines.importers.documents import WaveformFigure, WaveformImport
 from pipelines.procedures import PROCEDURES
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    FromWaveforms,
-    NominalScale,
-    ProcedureRecord,
-    ProcedureStep,
-    UnitRecord,
-)
+from pipelines.procedures.base import FromWaveforms, NominalScale
 from pipelines.procedures.columns import figure_table, finding_table, gathered_points
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureRecord, ProcedureStep, UnitRecord
 from schemas.errors import DataRejected, WrongUse, did_you_mean
 from schemas.foreign import shown
 from schemas.poses import Pose

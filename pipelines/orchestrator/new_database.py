@@ -1,87 +1,112 @@
-"""A new database of the orchestrator from its finished schema, in place of its migrations.
+"""A new database of the orchestrator as a copy of one that Prefect made once on this machine, in place of its migrations.
 
 A new SQLite database goes through all migrations that Prefect has ever had, some hundred, which takes longer than all else that a
-first run does before it measures. ``prefect-schema.sql`` is what they end with; its first line names the version of Prefect that
-it is of. With another version the database is made by Prefect itself. ``python -m pipelines.orchestrator.new_database`` writes
-the file anew, and a test compares it with what the migrations make.
+first run does before it measures. The first server on a machine has Prefect make an empty database, which is stored in the
+user's cache folder; later ones copy it. It is named for the version of Prefect, for its migrations and for its own content:
+another Prefect has another one, and a damaged or changed file is made again.
 """
-
-from __future__ import annotations
 
 import os
 import sqlite3
+import stat
 import subprocess
 import sys
 import tempfile
-from contextlib import closing
+from contextlib import closing, suppress
+from hashlib import sha256
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
-from pipelines.orchestrator.settings import DATABASE
+from pipelines.orchestrator.settings import DATABASE, STARTUP_S, cache_folder
 
-SCHEMA = Path(__file__).with_name("prefect-schema.sql")
 NAME = "prefect.db"
-_HEAD = "-- Prefect {}"
-_ENTRIES = "INSERT INTO"
-_REVISION = 'INSERT INTO "alembic_version"'
+_MIGRATIONS = "server/database/_migrations/versions/sqlite"
+_OF_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def make_database(home: Path) -> bool:
     """Make ``prefect.db`` in a folder; whether it was made.
 
-    Nothing is done where the database has an address of its own, where there is one already, or where the schema is that of
-    another version of Prefect.
+    Nothing is done where the database has an address of its own or where there is one already, and where nothing can be stored:
+    Prefect makes it at its start, or says why it cannot.
     """
     place = home / NAME
-    if os.environ.get(DATABASE) or place.exists() or not SCHEMA.is_file():
-        return False
-    head, _, script = SCHEMA.read_text(encoding="utf-8").partition("\n")
-    if head != _HEAD.format(version("prefect")):
+    if os.environ.get(DATABASE) or place.exists():
         return False
     try:
-        with tempfile.TemporaryDirectory(dir=home) as folder:
-            made = Path(folder) / NAME
-            with closing(sqlite3.connect(made)) as database:
-                database.executescript(script)
-                database.execute("pragma journal_mode=wal")
-            place.hardlink_to(made)  # complete or not at all, and never over one that another process has just made
-    except (OSError, sqlite3.Error):
-        # made meanwhile, or it cannot be made this way: Prefect makes it, or says why it cannot
+        content = _stored() or _made()
+        with tempfile.NamedTemporaryFile(dir=home) as file:
+            file.write(content)
+            file.flush()
+            place.hardlink_to(
+                file.name
+            )  # complete or not at all, and never over one that another process has just made
+    except (OSError, RuntimeError, sqlite3.Error, subprocess.SubprocessError):  # RuntimeError: the user has no home
         return False
     return True
 
 
-def schema_of(database: Path) -> str:
-    """The statements that make a database that has no entries but its revision.
-
-    Raises
-    ------
-    ValueError
-        The migrations make other entries, which would be the same in every database made from the file.
-    """
-    with closing(sqlite3.connect(database)) as source:
-        statements = [text for text in source.iterdump() if "sqlite_sequence" not in text]
-    entries = [text for text in statements if text.startswith(_ENTRIES) and not text.startswith(_REVISION)]
-    if entries:
-        raise ValueError(f"the migrations make entries ({entries[0][:60]} …), a schema alone is needed")
-    return "\n".join(line.rstrip() for text in statements for line in text.splitlines()) + "\n"
+def _prefix() -> str:
+    """What the names of stored databases of the installed Prefect begin with."""
+    package = find_spec("prefect")
+    if package is None or package.origin is None:
+        raise FileNotFoundError("prefect")
+    migrations = sha256()
+    for path in sorted((Path(package.origin).parent / _MIGRATIONS).glob("*.py")):
+        migrations.update(path.name.encode() + path.read_bytes())
+    return f"prefect-{version('prefect')}-{migrations.hexdigest()[:16]}-"
 
 
-def migrated(home: Path) -> Path:
-    """A new database made by Prefect's own migrations in a folder."""
-    environment = {**os.environ, "PREFECT_HOME": str(home), "PREFECT_SERVER_ANALYTICS_ENABLED": "false"}
-    environment.pop(DATABASE, None)
+def _stored() -> bytes | None:
+    """The stored database of the installed Prefect; None where there is none. What is not as this user stored it is removed."""
+    prefix = _prefix()
+    for path in sorted(cache_folder().glob(f"{prefix}*.db")):
+        with suppress(OSError):  # of another user, or no file: it is made again
+            with path.open("rb") as file:
+                facts = os.fstat(file.fileno())
+                content = file.read()
+            if facts.st_uid == os.getuid() and not facts.st_mode & _OF_OTHERS and path.name == _named(prefix, content):
+                return content
+            path.unlink()
+    return None
+
+
+def _named(prefix: str, content: bytes) -> str:
+    return f"{prefix}{sha256(content).hexdigest()}.db"
+
+
+def _made() -> bytes:
+    """An empty database made by Prefect's own migrations, which is stored."""
+    cache = cache_folder()
+    cache.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=cache, prefix="making-") as folder:  # renamed below: complete or not at all
+        made = Path(folder) / NAME
+        _migrate(made)
+        made.chmod(0o600)
+        content = made.read_bytes()
+        made.rename(cache / _named(_prefix(), content))
+    return content
+
+
+def _migrate(made: Path) -> None:
+    """Have Prefect make a database in a folder of its own, without the settings and the folder of this process."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
+    environment |= {
+        "PREFECT_HOME": str(made.parent),
+        "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+        "DO_NOT_TRACK": "1",
+    }
     command = [sys.executable, "-m", "prefect", "server", "database", "upgrade", "-y"]
-    subprocess.run(command, env=environment, check=True, capture_output=True)  # noqa: S603 - no input of a user
-    return home / NAME
-
-
-def main() -> None:
-    """Write the schema of the installed version of Prefect."""
-    with tempfile.TemporaryDirectory() as folder:
-        text = schema_of(migrated(Path(folder)))
-    SCHEMA.write_text(f"{_HEAD.format(version('prefect'))}\n{text}", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    subprocess.run(  # noqa: S603 - no input of a user
+        command,
+        env=environment,
+        cwd=made.parent,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        check=True,
+        timeout=STARTUP_S / 2.0,
+    )
+    with closing(sqlite3.connect(f"file:{made}?mode=rw", uri=True)) as database:  # no file: Prefect wrote elsewhere
+        database.execute("pragma journal_mode=wal")
+        database.execute("pragma wal_checkpoint(truncate)")  # all of it is in the one file

@@ -31,6 +31,11 @@ EVENTS_D = 7
 LOOPBACK = ("127.0.0.1", "localhost")
 
 
+def cache_folder() -> Path:
+    """The user's folder of what can be made again."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tumbleline"
+
+
 def settings(home: Path, port: int, key: str) -> dict[str, str]:
     """Environment of a local orchestrator, server or client: persistent history, a key, no telemetry, no outgoing connections."""
     address = f"http://127.0.0.1:{port}/api"

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from inspect import isabstract
 from pkgutil import iter_modules
+from types import ModuleType
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -21,9 +23,9 @@ from pipelines.procedures.base import (
     OnEquipment,
     Part,
     Procedure,
-    ProcedureStep,
     SetsEquipment,
 )
+from pipelines.procedures.recorded import ProcedureStep
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
@@ -46,21 +48,6 @@ __all__ = [
 ]
 
 MULTI_POSITION = "multi_position"
-SHARED = (
-    *(
-        "base",
-        "centrifuge_radii",
-        "centrifuge_radius",
-        "columns",
-        "noise_columns",
-        "recorded",
-        "shock_bias",
-        "shock_waves",
-        "sweep_plan",
-        "sweep_points",
-    ),
-    *("transfer_figures", "transfer_chart", "wording", "worst"),
-)
 
 
 class IncompleteProcedure(Exception):
@@ -77,9 +64,10 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     """
     procedures: list[Procedure] = []
     for info in iter_modules(path):
-        if info.name in SHARED or info.ispkg:
-            continue
-        one = getattr(import_module(f"{package}.{info.name}"), "PROCEDURE", None)
+        module = import_module(f"{package}.{info.name}")
+        one = getattr(module, "PROCEDURE", None)
+        if one is None and not _defines_one(module):
+            continue  # a part that procedures share
         if not isinstance(one, Procedure) or one.name != info.name:
             raise IncompleteProcedure(
                 f"{package}.{info.name}: no PROCEDURE of this name, one is needed; define PROCEDURE = … with name = '{info.name}'"
@@ -91,6 +79,12 @@ def find_procedures(package: str, path: Any) -> dict[str, Procedure]:
     if twice:
         raise IncompleteProcedure(f"{package}: figure {', '.join(twice)} is declared twice; rename one")
     return {one.name: one for one in sorted(procedures, key=lambda one: (one.order, one.name))}
+
+
+def _defines_one(module: ModuleType) -> bool:
+    """Whether a module has a procedure of its own, in whole."""
+    own = (one for one in vars(module).values() if isinstance(one, type) and one.__module__ == module.__name__)
+    return any(issubclass(one, Procedure) and not isabstract(one) for one in own)
 
 
 def _refuse_half(module: str, one: Procedure) -> None:

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from collections.abc import Collection, Mapping, Sequence
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from pydantic import Field
 
+from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
+from pipelines.procedures.figures import FigureSpec, FigureValue, Finding, Outcome, Texts, UnitOutcome
+from pipelines.procedures.recorded import Array, Device, ProcedureStep, Records, UnitRecord
 from schemas.errors import RecipeInvalid, did_you_mean
-from schemas.poses import Pose
 from schemas.recipe import Recipe, Strict
 from schemas.station import StationConfig
-
-if TYPE_CHECKING:
-    from inertial.dynamics.wandering_means import IdentifiedNoise
-
-Array = NDArray[np.float64]
-REFERENCE = "@reference"
-"""The name of the reference sensor in the tables of samples; no serial begins with it."""
-StepKind = Literal["dwell", "verification", "allan", "procedure"]
 
 
 class Part(Strict):
@@ -49,144 +41,6 @@ class NominalScale(Part):
                 "multi_position",
                 key="scale",
             )
-
-
-@dataclass(frozen=True)
-class ProcedureStep:
-    """One record of a procedure.
-
-    Attributes
-    ----------
-    name : shown while it is measured
-    lasting_s, rate_hz : of the record; None for those of the recipe
-    wait_s : after the move; None for the recipe's
-    off_s : without power before the move, s
-    soak : number of the soak within the procedure, from 0
-    role : equipment of the station that performs it; empty for a record on the tilt table
-    on_table : the equipment of the role is set first, then the record is taken on the tilt table
-    setting : what the equipment is set to, by name with unit
-    """
-
-    name: str
-    pose: Pose
-    temperature_C: float
-    kind: StepKind = "procedure"
-    lasting_s: float | None = None
-    rate_hz: float | None = None
-    wait_s: float | None = None
-    off_s: float = 0.0
-    soak: int = 0
-    settled: bool = True
-    role: str = ""
-    on_table: bool = False
-    setting: Mapping[str, float] = field(default_factory=dict[str, float])
-
-
-@dataclass(frozen=True)
-class FigureSpec:
-    """A figure that limits may name: its key, unit, and meaning in one line.
-
-    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is kept
-    """
-
-    name: str
-    unit: str
-    meaning: str
-    one_axis: bool = False
-
-
-@dataclass(frozen=True)
-class FigureValue:
-    """A figure of one unit and axis.
-
-    ``low`` and ``high`` are the ends of a 95 % interval. Where ``identified`` is False the value passes no limit, and ``note``
-    states why, and a measurement that determines it. A standard deviation has ``dof`` degrees of freedom, nan for other figures,
-    and ``removed`` is the known part that was taken out of it; see :class:`inertial.uncertainty.deviation_law.DeviationLaw`.
-    """
-
-    figure: str
-    axis: str
-    value: float
-    uncertainty: float
-    low: float = float("nan")
-    high: float = float("nan")
-    identified: bool = True
-    note: str = ""
-    dof: float = float("nan")
-    removed: float = 0.0
-
-    @classmethod
-    def not_determined(
-        cls, figure: str, axis: str, note: str, low: float = float("nan"), high: float = float("nan")
-    ) -> FigureValue:
-        """A figure without a value, with the reason."""
-        return cls(figure, axis, float("nan"), float("nan"), low, high, identified=False, note=note)
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A statement on one unit, or the lot (empty unit): its subject and the text."""
-
-    unit: str
-    subject: str
-    text: str
-
-
-@dataclass(frozen=True)
-class UnitRecord:
-    """The samples of one unit, or of the reference, in one record.
-
-    time : (n,), s on the station's clock; output : (n, 3), unit of the output, or g for the reference
-    """
-
-    time: Array
-    output: Array
-
-    @property
-    def rate_hz(self) -> float:
-        """Nominal rate of the samples, Hz."""
-        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
-
-
-@dataclass(frozen=True)
-class ProcedureRecord:
-    """One record of a procedure as it was measured: its step, the readings (a row for each unit), and samples by unit."""
-
-    number: int
-    step: ProcedureStep
-    readings: pd.DataFrame
-    samples: Mapping[str, UnitRecord]
-
-    def by_unit(self) -> Iterator[tuple[str, dict[str, Any], UnitRecord]]:
-        """Unit, its readings and its samples, of all that were recorded."""
-        for reading in self.readings.to_dict("records"):
-            unit = str(reading["unit"])
-            if unit in self.samples:
-                yield unit, {str(name): value for name, value in reading.items()}, self.samples[unit]
-
-
-@dataclass(frozen=True)
-class Device:
-    """The units before the procedure: nominal scale from the full scale, and their calibration if there is one.
-
-    scale : (3,) output per g of each axis, by unit; full_scale, out_unit : of the lot
-    scale_error : (3,) standard uncertainty of the scale as a share
-    noise : that the static record of the run shows, µg, by unit and axis; none where it has no such record
-    """
-
-    scale: Mapping[str, Array]
-    scale_error: Mapping[str, Array]
-    full_scale: float
-    out_unit: str
-    noise: Mapping[tuple[str, str], IdentifiedNoise] = field(default_factory=dict[tuple[str, str], "IdentifiedNoise"])
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The results of a procedure for the units of a lot."""
-
-    figures: Mapping[str, list[FigureValue]]
-    findings: Sequence[Finding] = ()
 
 
 class Procedure(ABC):
@@ -219,20 +73,44 @@ class Procedure(ABC):
 class Evaluated(Procedure):
     """A procedure with figures of its own; those of others come from the stages ``fit``, ``noise`` and ``grade``.
 
-    rows : of plots in its picture
+    axis : of figures that are not determined, where the part names none
     """
 
+    axis: ClassVar[str] = "*"
+
     @abstractmethod
-    def reduce(self, part: Any, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: Any, records: Records, device: Device) -> pd.DataFrame:
         """Points of the procedure: see the table ``procedure_points``."""
 
     @abstractmethod
-    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
-        """Figures and findings of every unit, from the points alone."""
+    def of_unit(self, part: Any, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
+        """Figures of one unit and statements on it, from its points; :class:`NotIdentified` where they give no figure."""
+
+    def of_lot(self, part: Any, points: pd.DataFrame) -> Texts:
+        """Statements on the lot."""
+        return []
 
     @abstractmethod
     def chart(self, part: Any, points: pd.DataFrame) -> Chart | None:
         """The points of one unit with what was fitted to them; None where they are too few."""
+
+    def evaluate(self, part: Any, points: pd.DataFrame, device: Device) -> Outcome:
+        """Figures and findings of every unit, from the points alone."""
+        figures: dict[str, list[FigureValue]] = {}
+        findings: list[Finding] = []
+        for name, rows in points.groupby("unit", sort=False):
+            unit = str(name)
+            try:
+                figures[unit], texts = self.of_unit(part, unit, rows, device)
+            except NotIdentified as problem:
+                figures[unit], texts = self.nothing(part, str(problem)), []
+            findings += [Finding(unit, *text) for text in texts]
+        return Outcome(figures, [*findings, *(Finding("", *text) for text in self.of_lot(part, points))])
+
+    def nothing(self, part: Any, note: str, axis: str = "") -> list[FigureValue]:
+        """Every figure without a value, with the reason; for no axis in particular the part's, or the procedure's."""
+        axis = axis or getattr(part, "axis", self.axis)
+        return [FigureValue.not_determined(spec.name, axis, note) for spec in self.figures]
 
 
 class InG(Procedure):

@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from inertial.dynamics.stability import block_means, stability
+from inertial.dynamics.stability import StabilityFigures, block_means, stability
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import (
-    Device,
-    Evaluated,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    InG,
-    NominalScale,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    scale_of,
-)
-from pipelines.procedures.columns import points
+from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
+from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
 from pipelines.procedures.wording import with_uncertainty
-from pipelines.procedures.worst import worst
 from schemas.bounds import Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
@@ -47,17 +34,13 @@ class BiasStabilityPart(NominalScale):
 class BiasStability(InG, Evaluated):
     """A bias record of an hour."""
 
-    name: ClassVar[str] = "bias_stability"
-    title: ClassVar[str] = "Bias stability"
-    order: ClassVar[int] = 40
-    states: ClassVar[str] = (
-        "standard deviation of 100 s means, drift per hour, Allan deviation at 100 s, and the other definitions"
-    )
-    source: ClassVar[str] = (
-        "IEEE Std 528 for the terms; definitions differ by up to thirty times for one unit, so each is named"
-    )
-    part: ClassVar[type[Part]] = BiasStabilityPart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    name = "bias_stability"
+    title = "Bias stability"
+    order = 40
+    states = "standard deviation of 100 s means, drift per hour, Allan deviation at 100 s, and the other definitions"
+    source = "IEEE Std 528 for the terms; definitions differ by up to thirty times for one unit, so each is named"
+    part = BiasStabilityPart
+    figures = (
         FigureSpec("bias_stability_ug", "µg", "standard deviation of 100 s means over the record, worst axis"),
         FigureSpec("bias_drift_ug_h", "µg/h", "slope of the record, worst axis"),
         FigureSpec("bias_allan_100s_ug", "µg", "Allan deviation at 100 s, worst axis; it hides a ramp"),
@@ -68,66 +51,37 @@ class BiasStability(InG, Evaluated):
         pose = Pose(name="stability", outer_deg=part.pose_deg[0], inner_deg=part.pose_deg[1])
         return [ProcedureStep(pose.name, pose, part.temperature_C, lasting_s=part.lasting_s, rate_hz=part.rate_hz)]
 
-    def reduce(self, part: BiasStabilityPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: BiasStabilityPart, records: Records, device: Device) -> pd.DataFrame:
         """Means of 1 s in µg from the start of the record; the points keep those of 10 s besides."""
         rows: list[dict[str, Any]] = []
-        for record in records:
-            for unit, _, own in record.by_unit():
-                scale = scale_of(part, device, unit)
-                for i, axis in enumerate(AXES):
-                    second = block_means(own.output[:, i], round(part.rate_hz)) / scale[i] * MICRO
-                    time = own.time[0] + np.arange(second.size) * round(part.rate_hz) / part.rate_hz
-                    white = second.std(ddof=1) if second.size > 1 else np.nan
-                    rows += [
-                        {
-                            "unit": unit, "axis": axis, "series": "mean_1s", "point": k, "setting": t - time[0],
-                            "value": value, "uncertainty": white,
-                        }
-                        for k, (t, value) in enumerate(zip(time, second, strict=True))
-                    ]  # fmt: skip
-        return points(rows)
+        size = round(part.rate_hz)
+        for one in taken(records):
+            scale = scale_of(part, device, one.unit)
+            for i, axis in enumerate(AXES):
+                second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
+                k = np.arange(second.size)
+                time = one.own.time[0] + k * size / part.rate_hz
+                rows += point_rows(
+                    unit=one.unit,
+                    axis=axis,
+                    series="mean_1s",
+                    point=k,
+                    setting=time - time[:1],
+                    value=second,
+                    uncertainty=second.std(ddof=1) if second.size > 1 else np.nan,
+                )
+        return point_table(rows)
 
-    def evaluate(self, part: BiasStabilityPart, points: pd.DataFrame, device: Device) -> Outcome:
+    def of_unit(self, part: BiasStabilityPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of the worst axis; every definition as a finding, so that numbers of others can be compared."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            seconds = round(part.rate_hz) / part.rate_hz
-            by_axis = {
-                str(axis): stability(
-                    own["value"].to_numpy(dtype=float), 1.0 / seconds, device.noise.get((str(unit), str(axis)))
-                )
-                for axis, own in rows.groupby("axis", sort=False)
-            }
-            figures[str(unit)] = [
-                worst(
-                    [
-                        FigureValue(
-                            name,
-                            axis,
-                            getattr(one, key),
-                            getattr(one, f"{key}_error"),
-                            *getattr(one, f"{key}_interval"),
-                            dof=getattr(one, f"{key}_dof", float("nan")),
-                        )
-                        for axis, one in by_axis.items()
-                    ]
-                )
-                for name, key in (
-                    ("bias_stability_ug", "sd_100s"),
-                    ("bias_drift_ug_h", "drift_h"),
-                    ("bias_allan_100s_ug", "allan_100s"),
-                )
-            ]
-            for axis, one in by_axis.items():
-                text = (
-                    f"axis {axis}, µg: standard deviation of 1 s means {one.sd_1s:.4g}, of 100 s "
-                    f"means {one.sd_100s:.4g}; range of "
-                    f"1 s means {one.range_1s:.4g}, of 100 s means {one.range_100s:.4g}; Allan deviation at 100 s "
-                    f"{one.allan_100s:.4g}; drift {with_uncertainty(one.drift_h, 2.0 * one.drift_h_error)} µg/h (k = 2)"
-                )
-                findings.append(Finding(str(unit), "definitions of bias stability", text))
-        return Outcome(figures, findings)
+        rate = 1.0 / (round(part.rate_hz) / part.rate_hz)
+        by_axis = {
+            str(axis): stability(own["value"].to_numpy(dtype=float), rate, device.noise.get((unit, str(axis))))
+            for axis, own in rows.groupby("axis", sort=False)
+        }
+        names = zip(self.figures, ("sd_100s", "drift_h", "allan_100s"), strict=True)
+        figures = [worst([_figure(spec.name, key, axis, one) for axis, one in by_axis.items()]) for spec, key in names]
+        return figures, [("definitions of bias stability", _text(axis, one)) for axis, one in by_axis.items()]
 
     def chart(self, part: BiasStabilityPart, points: pd.DataFrame) -> Chart:
         """Means of 10 s and of 100 s of every axis over time, each about its mean."""
@@ -135,8 +89,8 @@ class BiasStability(InG, Evaluated):
         long: list[Trace] = []
         for axis in AXES:
             own = points[points["axis"] == axis]
-            time, value = own["setting"].to_numpy(dtype=float) / 60.0, own["value"].to_numpy(dtype=float)
-            value = value - value.mean()
+            seconds, value = numbers(own, "setting", "value")
+            time, value = seconds / 60.0, value - value.mean()
             for traces, count, width in ((short, 10, 0.4), (long, 100, 1.8)):
                 x, y = block_means(time, count), block_means(value, count)
                 traces.append(
@@ -144,6 +98,19 @@ class BiasStability(InG, Evaluated):
                 )
         axes = PlotAxis("time / min"), PlotAxis("output about its mean / µg")
         return Chart(self.title, (Plot("thick: means of 100 s", *axes, (*short, *long)),))
+
+
+def _figure(name: str, key: str, axis: str, one: StabilityFigures) -> FigureValue:
+    value, error, ends = (getattr(one, f"{key}{end}") for end in ("", "_error", "_interval"))
+    return FigureValue(name, axis, value, error, *ends, dof=getattr(one, f"{key}_dof", float("nan")))
+
+
+def _text(axis: str, one: StabilityFigures) -> str:
+    return (
+        f"axis {axis}, µg: standard deviation of 1 s means {one.sd_1s:.4g}, of 100 s means {one.sd_100s:.4g}; range of "
+        f"1 s means {one.range_1s:.4g}, of 100 s means {one.range_100s:.4g}; Allan deviation at 100 s "
+        f"{one.allan_100s:.4g}; drift {with_uncertainty(one.drift_h, 2.0 * one.drift_h_error)} µg/h (k = 2)"
+    )
 
 
 PROCEDURE = BiasStability()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -16,29 +16,14 @@ from inertial.dynamics.centrifuge_diagnosis import DEFAULT, SpinDiagnosis, diagn
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    Evaluated,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    InG,
-    NominalScale,
-    OnEquipment,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    refuse_unknown_effects,
-    scale_of,
-)
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
 from pipelines.procedures.centrifuge_radii import figures_of_radii, fitted_radii, of_radii, texts_of_radii
 from pipelines.procedures.centrifuge_radius import diagnosis_text, figures_of_radius, texts_of_radius
-from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.columns import numbers, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, at_rest, taken
 from schemas.bounds import NotNegative, Positive
 from schemas.errors import RecipeInvalid
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from stations.profile_files import profile_of
@@ -94,17 +79,18 @@ class CentrifugePart(NominalScale):
 class CentrifugeTest(InG, OnEquipment, Evaluated):
     """Constant speeds on a centrifuge."""
 
-    name: ClassVar[str] = "centrifuge"
-    title: ClassVar[str] = "Centrifuge"
-    order: ClassVar[int] = 130
-    states: ClassVar[str] = (
+    name = "centrifuge"
+    title = "Centrifuge"
+    order = 130
+    states = (
         "linearity in % of full scale, K2, K3, sensitivity by the radius; at two radii also the offset of the proof mass, "
         "parted from K1′, and arm stretch, parted from Koq"
     )
-    source: ClassVar[str] = "IEEE Std 836 (centrifuge), IEEE Std 1293"
-    roles: ClassVar[tuple[str, ...]] = ("centrifuge",)
-    part: ClassVar[type[Part]] = CentrifugePart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    source = "IEEE Std 836 (centrifuge), IEEE Std 1293"
+    roles = ("centrifuge",)
+    axis = "z"
+    part = CentrifugePart
+    figures = (
         FigureSpec(
             "centrifuge_linearity_percent",
             "%",
@@ -140,7 +126,7 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
     def steps(self, part: CentrifugePart, recipe: Recipe) -> list[ProcedureStep]:
         """One record at each speed: up, down again, then the same with the units reversed, and all at the next radius."""
         way = [*part.forces_g, *(part.forces_g[-2::-1] if part.down_again else ())]
-        pose = Pose(name="centrifuge", outer_deg=0.0, inner_deg=0.0)
+        pose = at_rest("centrifuge")
         return [
             ProcedureStep(
                 f"{'+' if sign > 0 else '−'}{force:g} g" + (f" at {radius:g} m" if part.radii_m else ""),
@@ -161,54 +147,39 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
         rate = math.degrees(math.sqrt(one["force_g"] * 9.80665 / one["radius_m"]))
         return equipment.spin(rate, int(one["direction"]), one["record_s"], slots, one["radius_m"])
 
-    def reduce(self, part: CentrifugePart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: CentrifugePart, records: Records, device: Device) -> pd.DataFrame:
         """Mean output in g over the acceleration by the measured rate."""
         rows: list[dict[str, Any]] = []
-        for k, record in enumerate(records):
-            rate = np.radians(record.samples[REFERENCE].output[:, 0].mean())
-            radius = record.step.setting["radius_m"]
-            force = record.step.setting["direction"] * radius * rate**2 / 9.80665
-            for unit, _, own in record.by_unit():
-                raw = own.output[:, INPUT]
-                output = raw / scale_of(part, device, unit)[INPUT]
-                clipped = bool(np.max(np.abs(raw)) >= device.full_scale)
-                error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
-                rows.append(
-                    {
-                        "unit": unit, "axis": "z", "series": "output", "point": k, "setting": float(force),
-                        "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
-                        "spread": float(output.std(ddof=1)), "radius_m": radius,
-                    }
-                )  # fmt: skip
+        for one in taken(records):
+            rate = np.radians(one.record.samples[REFERENCE].output[:, 0].mean())
+            radius = one.record.step.setting["radius_m"]
+            force = one.record.step.setting["direction"] * radius * rate**2 / 9.80665
+            raw = one.own.output[:, INPUT]
+            output = raw / scale_of(part, device, one.unit)[INPUT]
+            clipped = bool(np.max(np.abs(raw)) >= device.full_scale)
+            error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
+            rows.append(
+                {
+                    "unit": one.unit, "axis": "z", "series": "output", "point": one.number, "setting": float(force),
+                    "value": np.nan if clipped else float(output.mean()), "uncertainty": error,
+                    "spread": float(output.std(ddof=1)), "radius_m": radius,
+                }
+            )  # fmt: skip
         return point_table(rows)
 
-    def evaluate(self, part: CentrifugePart, points: pd.DataFrame, device: Device) -> Outcome:
-        """Coefficients of every unit; the whole polynomial where the input is reversed."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            name = str(unit)
-            note = ""
-            if bool(rows["value"].isna().any()):
-                note = (
-                    f"{int(rows['value'].isna().sum())} of {len(rows)} speeds clip the output; lower "
-                    f"forces_g, or choose a wider range"
-                )
-            elif bool((rows["spread"] <= 0.0).any()):
-                note = "the output is constant; check the unit"
-            elif _responds(rows) < 0.5:
-                note = "the output does not follow the acceleration; check cable and mounting"
-            if note:
-                figures[name] = [FigureValue.not_determined(f.name, "z", note) for f in self.figures]
-                continue
-            try:
-                figures[name], own = _of_radii(part, rows) if part.radii_m else _of_radius(part, rows)
-            except NotIdentified as problem:
-                figures[name] = [FigureValue.not_determined(f.name, "z", str(problem)) for f in self.figures]
-                continue
-            texts = [*own, *diagnosis_text(judged(part, rows))]
-            findings += [Finding(name, subject, text) for subject, text in texts]
-        return Outcome(figures, findings)
+    def of_unit(self, part: CentrifugePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
+        """Coefficients; the whole polynomial where the input is reversed."""
+        lost = int(rows["value"].isna().sum())
+        if lost:
+            raise NotIdentified(
+                f"{lost} of {len(rows)} speeds clip the output; lower forces_g, or choose a wider range"
+            )
+        if bool((rows["spread"] <= 0.0).any()):
+            raise NotIdentified("the output is constant; check the unit")
+        if _responds(rows) < 0.5:
+            raise NotIdentified("the output does not follow the acceleration; check cable and mounting")
+        figures, texts = _of_radii(part, rows) if part.radii_m else _of_radius(part, rows)
+        return figures, [*texts, *diagnosis_text(judged(part, rows))]
 
     def chart(self, part: CentrifugePart, points: pd.DataFrame) -> Chart:
         """Departure from the straight line over the acceleration, with the polynomial; each radius has a line of its own."""
@@ -218,9 +189,9 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
 
     @staticmethod
     def _of_one_radius(part: CentrifugePart, points: pd.DataFrame) -> list[Trace]:
-        force, value = points["setting"].to_numpy(dtype=float), points["value"].to_numpy(dtype=float)
+        force, value, error = numbers(points)
         line = np.polyfit(force, value, 1)
-        shown, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * points["uncertainty"].to_numpy(dtype=float)
+        shown, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * error
         fit = fitted(part, points)
         x = np.linspace(force.min(), force.max(), 300)
         curve = columns(x, fit.names) @ fit.value - np.polyval(line, x)
@@ -232,7 +203,7 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
 
 def fitted(part: CentrifugePart, rows: pd.DataFrame) -> Polynomial:
     """All terms with the input reversed; without it the four that one direction separates."""
-    force, value, error = (rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+    force, value, error = numbers(rows)
     return fit_polynomial(force, value, error, TERMS if part.reversed else TERMS[:4])
 
 
@@ -251,7 +222,7 @@ def _of_radii(part: CentrifugePart, rows: pd.DataFrame) -> tuple[list[FigureValu
 
 def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
     """The diagnosis of the part's model on the points of one unit."""
-    force, value, error = (rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+    force, value, error = numbers(rows)
     radius = rows["radius_m"].to_numpy(dtype=float) if part.radii_m else np.full(force.size, part.radius_m)
     same = (force[1:] * force[:-1] > 0.0) & (radius[1:] == radius[:-1])
     slowing = np.r_[0.0, (np.diff(np.abs(force)) < 0.0) & same].astype(float)
@@ -261,7 +232,7 @@ def judged(part: CentrifugePart, rows: pd.DataFrame) -> SpinDiagnosis:
 
 def _responds(rows: pd.DataFrame) -> float:
     """Share of the output's variance that the acceleration explains."""
-    force, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
+    force, value = numbers(rows, "setting", "value")
     return float(np.corrcoef(force, value)[0, 1] ** 2)
 
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from inertial.dynamics.centrifuge import STANDARD_GRAVITY, columns, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge import STANDARD_GRAVITY, Polynomial, columns, linearity_error, linearity_percent
 from inertial.dynamics.centrifuge_radii import RadiiFit, fit_radii
 from pipelines.drawing.chart import SEVERAL, Trace
-from pipelines.procedures.base import FigureValue
+from pipelines.procedures.columns import numbers
+from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import verdict_of, with_uncertainty
 from schemas.units import MICRO
 
@@ -23,30 +24,35 @@ ONE_MOUNTING = "one mounting: errors of the radii are not parted from the offset
 
 def fitted_radii(rows: pd.DataFrame, radius_error_m: float) -> RadiiFit:
     """The fit over all radii of the points of one unit; :class:`inertial.errors.NotIdentified` as there."""
-    force, value, error, radius = (
-        rows[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty", "radius_m")
-    )
+    force, value, error, radius = numbers(rows, "setting", "value", "uncertainty", "radius_m")
     return fit_radii(force, radius, value, error, radius_error_m)
+
+
+def figures_of_polynomial(fit: Polynomial, full_scale_g: float, radius_percent: float = 0.0) -> list[FigureValue]:
+    """Linearity, K2, K3 and sensitivity; ``radius_percent`` is the uncertainty of a single radius."""
+    k1, k2, k3 = (fit.of(name) for name in ("scale", "second_order", "third_order"))
+    linearity, error = linearity_percent(fit, full_scale_g), linearity_error(fit, full_scale_g)
+    spread = float(np.hypot(100.0 * k1[1], radius_percent))
+    return [
+        FigureValue("centrifuge_linearity_percent", "z", linearity, error),
+        FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
+        FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
+        FigureValue("centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), spread),
+    ]
 
 
 def figures_of_radii(fit: RadiiFit, full_scale_g: float) -> list[FigureValue]:
     """The figures: linearity, K2, K3 and sensitivity are the unit's own, without arm and mounting."""
-    unit = fit.unit
-    k1, k2, k3 = (unit.of(name) for name in ("scale", "second_order", "third_order"))
+    mass, consistency = OF_RADII
     offset, spread = fit.mass_offset_m
-    linearity, error = linearity_percent(unit, full_scale_g), linearity_error(unit, full_scale_g)
     figures = [
-        FigureValue("centrifuge_linearity_percent", "z", linearity, error),
-        FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
-        FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
-        FigureValue("centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), 100.0 * k1[1]),
-        FigureValue("centrifuge_mass_offset_um", "z", MICRO * offset, MICRO * spread),
+        *figures_of_polynomial(fit.unit, full_scale_g),
+        FigureValue(mass, "z", MICRO * offset, MICRO * spread),
     ]
-    name = "centrifuge_radius_consistency_ppm"
     if fit.consistency is None:
-        return [*figures, FigureValue.not_determined(name, "z", ONE_MOUNTING)]
+        return [*figures, FigureValue.not_determined(consistency, "z", ONE_MOUNTING)]
     value, error = fit.consistency
-    return [*figures, FigureValue(name, "z", MICRO * value, MICRO * error)]
+    return [*figures, FigureValue(consistency, "z", MICRO * value, MICRO * error)]
 
 
 def texts_of_radii(fit: RadiiFit, radii: Sequence[float]) -> list[tuple[str, str]]:
@@ -82,9 +88,9 @@ def of_radii(points: pd.DataFrame, radius_error_m: float) -> list[Trace]:
     fit = fitted_radii(points, radius_error_m)
     traces: list[Trace] = []
     for role, (radius, rows) in zip(SEVERAL, points.groupby("radius_m", sort=False), strict=False):
-        force, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
+        force, value, error = numbers(rows)
         line, r = np.polyfit(force, value, 1), float(str(radius))
-        apart, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * rows["uncertainty"].to_numpy(dtype=float)
+        apart, expanded = 1e3 * (value - np.polyval(line, force)), 2e3 * error
         traces.append(Trace(f"{r:g} m, U (k = 2)", force, apart, role=role, error=expanded))
         x = np.linspace(force.min(), force.max(), 301)
         traces.append(Trace(f"{r:g} m, fitted", x, 1e3 * _apart(fit, x, r, force), "line", role, legend=False))

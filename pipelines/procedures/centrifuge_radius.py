@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from inertial.dynamics.centrifuge import Polynomial, linearity_error, linearity_percent
+from inertial.dynamics.centrifuge import Polynomial
 from inertial.dynamics.centrifuge_effects import EFFECTS
 from inertial.dynamics.goodness import p_value
-from pipelines.procedures.base import FigureValue
-from pipelines.procedures.centrifuge_radii import OF_RADII, ONE_RADIUS
+from pipelines.procedures.centrifuge_radii import OF_RADII, ONE_RADIUS, figures_of_polynomial
+from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import improvement, not_separated, probability, verdict_of, with_uncertainty
 from schemas.units import MICRO
 
@@ -22,17 +20,8 @@ def figures_of_radius(
     fit: Polynomial, full_scale_g: float, radius_m: float, radius_error_m: float
 ) -> list[FigureValue]:
     """Figures of a unit at one radius; those that need two are not determined."""
-    linearity = linearity_percent(fit, full_scale_g)
-    spread = linearity_error(fit, full_scale_g)
-    k2, k3, k1 = fit.of("second_order"), fit.of("third_order"), fit.of("scale")
-    radius = 100.0 * radius_error_m / radius_m  # %
     return [
-        FigureValue("centrifuge_linearity_percent", "z", linearity, spread),
-        FigureValue("centrifuge_second_order_ug_g2", "z", MICRO * k2[0], MICRO * k2[1]),
-        FigureValue("centrifuge_third_order_ug_g3", "z", MICRO * k3[0], MICRO * k3[1]),
-        FigureValue(
-            "centrifuge_sensitivity_percent", "z", 100.0 * (k1[0] - 1.0), float(np.hypot(100.0 * k1[1], radius))
-        ),
+        *figures_of_polynomial(fit, full_scale_g, 100.0 * radius_error_m / radius_m),
         *(FigureValue.not_determined(name, "z", ONE_RADIUS) for name in OF_RADII),
     ]
 

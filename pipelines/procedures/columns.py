@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.tables.frames import empty_table
 
@@ -13,7 +15,19 @@ POINT_TEXTS, POINT_NUMBERS, POINT_WHOLE = "unit procedure axis series", "setting
 FIGURE_TEXTS, FIGURE_NUMBERS = "unit procedure figure axis unit_text note", "value uncertainty low high dof removed"
 
 
-def points(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+def numbers(rows: pd.DataFrame, *names: str) -> list[NDArray[np.float64]]:
+    """Columns of points as arrays: setting, value and uncertainty where none is named."""
+    return [rows[name].to_numpy(dtype=float) for name in names or ("setting", "value", "uncertainty")]
+
+
+def point_rows(**columns: Any) -> list[dict[str, Any]]:
+    """Rows of points from columns in their order; what is one value, not a sequence, is that of every row."""
+    count = max(np.size(one) for one in columns.values())
+    spread = {name: [one] * count if np.ndim(one) == 0 else one for name, one in columns.items()}
+    return [dict(zip(spread, row, strict=True)) for row in zip(*spread.values(), strict=True)]
+
+
+def point_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     """Points from rows with unit, axis, series, point, setting, value, uncertainty and further numbers."""
     listed = list(rows)
     if not listed:

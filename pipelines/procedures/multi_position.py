@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
-from pipelines.procedures.base import Part, Procedure, ProcedureStep
+from pipelines.procedures.base import Part, Procedure
+from pipelines.procedures.recorded import ProcedureStep
 from schemas.recipe import Recipe
 
 
@@ -17,14 +18,12 @@ class MultiPositionPart(Part):
 class MultiPosition(Procedure):
     """Static dwells over poses and temperatures."""
 
-    name: ClassVar[str] = "multi_position"
-    title: ClassVar[str] = "Multi-position test"
-    order: ClassVar[int] = 10
-    states: ClassVar[str] = (
-        "bias, scale, misalignment, nonlinearity and their temperature coefficients, by the recipe's model"
-    )
-    source: ClassVar[str] = "IEEE Std 1293, multi-position tumble test; ISO 16063-16 for the reference"
-    part: ClassVar[type[Part]] = MultiPositionPart
+    name = "multi_position"
+    title = "Multi-position test"
+    order = 10
+    states = "bias, scale, misalignment, nonlinearity and their temperature coefficients, by the recipe's model"
+    source = "IEEE Std 1293, multi-position tumble test; ISO 16063-16 for the reference"
+    part = MultiPositionPart
 
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
         """Per temperature the poses of the fit, then those for verification."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -12,27 +12,14 @@ from scipy.signal import welch
 
 from inertial.dynamics.random_vibration import interpolated, overall_level, rectification
 from inertial.dynamics.spectra import HANN_HALF, density_confidence, hann_mean
+from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    Evaluated,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    InG,
-    NominalScale,
-    OnEquipment,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    scale_of,
-)
-from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
+from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, at_rest, taken
 from pipelines.procedures.wording import signed
 from schemas.bounds import Positive
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
 from schemas.vibration_profile import load_vibration_profile, vibration_profiles
@@ -67,18 +54,14 @@ class RandomVibrationPart(NominalScale):
 class RandomVibration(InG, OnEquipment, Evaluated):
     """Gaussian vibration by a profile."""
 
-    name: ClassVar[str] = "random_vibration"
-    title: ClassVar[str] = "Random vibration"
-    order: ClassVar[int] = 115
-    states: ClassVar[str] = (
-        "vibration rectification over g rms² at three levels or more; density of the reference against tolerance"
-    )
-    source: ClassVar[str] = (
-        "IEC 60068-2-64 (tolerances), IEEE Std 1293 (rectification); profiles as files in schemas/vibration"
-    )
-    roles: ClassVar[tuple[str, ...]] = ("exciter",)
-    part: ClassVar[type[Part]] = RandomVibrationPart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    name = "random_vibration"
+    title = "Random vibration"
+    order = 115
+    states = "vibration rectification over g rms² at three levels or more; density of the reference against tolerance"
+    source = "IEC 60068-2-64 (tolerances), IEEE Std 1293 (rectification); profiles as files in schemas/vibration"
+    roles = ("exciter",)
+    part = RandomVibrationPart
+    figures = (
         FigureSpec(
             "vibration_rectification_ug_g2",
             "µg/g²",
@@ -88,7 +71,7 @@ class RandomVibration(InG, OnEquipment, Evaluated):
 
     def steps(self, part: RandomVibrationPart, recipe: Recipe) -> list[ProcedureStep]:
         """One recording at each level."""
-        pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
+        pose = at_rest("exciter")
         return [
             ProcedureStep(
                 f"{part.profile}, {level:g} g rms",
@@ -111,65 +94,72 @@ class RandomVibration(InG, OnEquipment, Evaluated):
         profile = vibration_profiles()[int(one["profile"])]
         return equipment.random(profile, one["level_g"], int(one["axis"]), step.lasting_s or 0.0, slots)
 
-    def reduce(self, part: RandomVibrationPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: RandomVibrationPart, records: Records, device: Device) -> pd.DataFrame:
         """Shift of the mean of every unit at every level, and the density of the reference at the largest level."""
         axis = AXES.index(part.axis)
         rows: list[dict[str, Any]] = []
-        for k, record in enumerate(records):
-            reference = record.samples[REFERENCE]
+        for one in taken(records):
+            reference = one.record.samples[REFERENCE]
             rate = reference.rate_hz
-            driven = reference.output[
-                round((1.0 + GUARD_S) * rate) : round((1.0 + part.seconds - GUARD_S) * rate), axis
-            ]
+            first, last = (round(at * rate) for at in (1.0 + GUARD_S, 1.0 + part.seconds - GUARD_S))
+            driven = reference.output[first:last, axis]
             level = float(np.sqrt(np.mean((driven - driven.mean()) ** 2)))
-            for unit, _, own in record.by_unit():
-                scale = scale_of(part, device, unit)[axis]
-                shift, error = _shift(own.output[:, axis] / scale, own.rate_hz, part.seconds)
-                clipped = int(np.count_nonzero(np.abs(own.output[:, axis]) >= device.full_scale))
-                silent = float(np.std(own.output[:, axis])) < 0.2 * level * scale
-                rows.append(
-                    {
-                        "unit": unit, "axis": part.axis, "series": "shift", "point": k, "setting": level,
-                        "value": np.nan if silent else MICRO * shift, "uncertainty": MICRO * error, "clipped": float(clipped),
-                        "ordered_g": record.step.setting["level_g"],
-                    }
-                )  # fmt: skip
-                if k == len(records) - 1:
-                    rows += [one | {"unit": unit, "axis": part.axis} for one in _density(driven, rate)]
+            output, scale = one.own.output[:, axis], scale_of(part, device, one.unit)[axis]
+            shift, error = _shift(output / scale, one.own.rate_hz, part.seconds)
+            silent = float(np.std(output)) < 0.2 * level * scale
+            rows.append(
+                {
+                    "unit": one.unit, "axis": part.axis, "series": "shift", "point": one.number, "setting": level,
+                    "value": np.nan if silent else MICRO * shift, "uncertainty": MICRO * error,
+                    "clipped": float(np.count_nonzero(np.abs(output) >= device.full_scale)),
+                    "ordered_g": one.record.step.setting["level_g"],
+                }
+            )  # fmt: skip
+            if one.number == len(records) - 1:
+                rows += _density(one.unit, part.axis, driven, rate)
         return point_table(rows)
 
-    def evaluate(self, part: RandomVibrationPart, points: pd.DataFrame, device: Device) -> Outcome:
+    def of_unit(self, part: RandomVibrationPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Slope over g rms², its straightness tested; none where samples are clipped, which imitates it."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        name = "vibration_rectification_ug_g2"
-        for unit, rows in points[points["series"] == "shift"].groupby("unit", sort=False):
-            clipped = int(rows["clipped"].sum())
-            note = ""
-            if clipped:
-                note = (
-                    f"{clipped} samples are clipped, which shifts the mean as rectification does; lower "
-                    f"the levels, or choose a wider range"
-                )
-            elif bool(rows["value"].isna().any()):
-                note = "the output does not follow the vibration; check cable and mounting"
-            if note:
-                figures[str(unit)] = [FigureValue.not_determined(name, part.axis, note)]
-                continue
-            level, shift, error = (rows[one].to_numpy(dtype=float) for one in ("setting", "value", "uncertainty"))
-            value, spread, chi_square = rectification(level, shift, error)
-            figures[str(unit)] = [FigureValue(name, part.axis, value, spread)]
-            text = (
-                f"χ² {chi_square:.2g} for {len(rows) - 1} degrees of freedom of the line through the origin over g rms²"
+        rows = rows[rows["series"] == "shift"]
+        clipped = int(rows["clipped"].sum())
+        if clipped:
+            raise NotIdentified(
+                f"{clipped} samples are clipped, which shifts the mean as rectification does; lower the levels, or choose a "
+                "wider range"
             )
-            findings.append(Finding(str(unit), "straightness", text))
-        findings += _tolerance(part, points)
-        return Outcome(figures, findings)
+        if bool(rows["value"].isna().any()):
+            raise NotIdentified("the output does not follow the vibration; check cable and mounting")
+        value, spread, chi_square = rectification(*numbers(rows))
+        text = f"χ² {chi_square:.2g} for {len(rows) - 1} degrees of freedom of the line through the origin over g rms²"
+        return [FigureValue(self.figures[0].name, part.axis, value, spread)], [("straightness", text)]
+
+    def of_lot(self, part: RandomVibrationPart, points: pd.DataFrame) -> Texts:
+        """Overall level and lines against their tolerances, with the confidence of a line."""
+        shift = points[points["series"] == "shift"]
+        if shift.empty:
+            return []
+        first = shift[shift["unit"] == shift["unit"].iloc[0]]
+        actual, ordered = numbers(first, "setting", "ordered_g")
+        ratio = actual / ordered
+        density = points[(points["series"] == "density") & (points["unit"] == shift["unit"].iloc[0])]
+        f, value = numbers(density, "setting", "value")
+        target = _target(part, points, f)
+        inside = target > 0.0
+        apart = 10.0 * np.log10(value[inside] / target[inside])
+        low, high = density_confidence(float(density["averages"].iloc[0]))
+        beyond = float(np.mean(np.abs(apart) > LINE_DB))
+        text = (
+            f"overall level {signed(100.0 * (ratio.min() - 1.0), 1)} to {signed(100.0 * (ratio.max() - 1.0), 1)} % from the "
+            f"order (± {100.0 * OVERALL:.0f} % allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of "
+            f"the lines of a right level lie within {signed(low, 1)} to {signed(high, 1)} dB"
+        )
+        return [("level of the reference", text)]
 
     def chart(self, part: RandomVibrationPart, points: pd.DataFrame) -> Chart:
         """Density of the reference with the tolerance band, and the shift of the mean over g rms²."""
         density = points[points["series"] == "density"]
-        f, value = density["setting"].to_numpy(dtype=float), density["value"].to_numpy(dtype=float)
+        f, value = numbers(density, "setting", "value")
         target = _target(part, points, f)
         inside = target > 0.0
         low, high = (target[inside] * 10.0 ** (sign * LINE_DB / 10.0) for sign in (-1.0, 1.0))
@@ -185,7 +175,7 @@ class RandomVibration(InG, OnEquipment, Evaluated):
             ),
         )
         shift = points[points["series"] == "shift"]
-        rms, value, error = (shift[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+        rms, value, error = numbers(shift)
         traces = [Trace("measured, U (k = 2)", rms**2, value, error=2.0 * error)]
         if np.isfinite(value).all():
             ends = np.array([0.0, float((rms**2).max())])
@@ -210,20 +200,22 @@ def _shift(output: np.ndarray, rate_hz: float, seconds: float) -> tuple[float, f
     return during - rest, float(np.hypot(noise, white))
 
 
-def _density(driven: np.ndarray, rate_hz: float) -> list[dict[str, Any]]:
+def _density(unit: str, axis: str, driven: np.ndarray, rate_hz: float) -> list[dict[str, Any]]:
     """Density of the reference up to 2.2 kHz, thinned to lines of the segments."""
     segment = round(SEGMENT_S * rate_hz)
     f, p = welch(driven, rate_hz, nperseg=segment, noverlap=segment // 2)
     count = HANN_HALF * ((driven.size - segment // 2) // (segment - segment // 2))
     inside = (f >= 1.0) & (f <= 2200.0)
-    share = 1.0 / np.sqrt(count)
-    return [
-        {
-            "series": "density", "point": k, "setting": float(a), "value": float(b), "uncertainty": float(b * share),
-            "averages": float(count),
-        }
-        for k, (a, b) in enumerate(zip(f[inside], p[inside], strict=True))
-    ]  # fmt: skip
+    return point_rows(
+        unit=unit,
+        axis=axis,
+        series="density",
+        point=np.arange(np.count_nonzero(inside)),
+        setting=f[inside],
+        value=p[inside],
+        uncertainty=p[inside] * (1.0 / np.sqrt(count)),
+        averages=float(count),
+    )
 
 
 def _target(part: RandomVibrationPart, points: pd.DataFrame, f: np.ndarray) -> np.ndarray:
@@ -232,28 +224,6 @@ def _target(part: RandomVibrationPart, points: pd.DataFrame, f: np.ndarray) -> n
     whole = overall_level(profile[:, 0], profile[:, 1])
     level = float(points.loc[points["series"] == "shift", "ordered_g"].iloc[-1])
     return interpolated(f, profile[:, 0], profile[:, 1]) * (level / whole) ** 2
-
-
-def _tolerance(part: RandomVibrationPart, points: pd.DataFrame) -> list[Finding]:
-    """Overall level and lines against their tolerances, with the confidence of a line."""
-    shift = points[points["series"] == "shift"]
-    if shift.empty:
-        return []
-    first = shift[shift["unit"] == shift["unit"].iloc[0]]
-    ratio = first["setting"].to_numpy(dtype=float) / first["ordered_g"].to_numpy(dtype=float)
-    density = points[(points["series"] == "density") & (points["unit"] == shift["unit"].iloc[0])]
-    f = density["setting"].to_numpy(dtype=float)
-    target = _target(part, points, f)
-    inside = target > 0.0
-    apart = 10.0 * np.log10(density["value"].to_numpy(dtype=float)[inside] / target[inside])
-    low, high = density_confidence(float(density["averages"].iloc[0]))
-    beyond = float(np.mean(np.abs(apart) > LINE_DB))
-    text = (
-        f"overall level {signed(100.0 * (ratio.min() - 1.0), 1)} to {signed(100.0 * (ratio.max() - 1.0), 1)} % from the order "
-        f"(± {100.0 * OVERALL:.0f} % allowed); {100.0 * beyond:.1f} % of the lines beyond ± {LINE_DB:g} dB; 99 % of the lines of "
-        f"a right level lie within {signed(low, 1)} to {signed(high, 1)} dB"
-    )
-    return [Finding("", "level of the reference", text)]
 
 
 PROCEDURE = RandomVibration()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import pandas as pd
@@ -11,23 +10,14 @@ from pydantic import Field, model_validator
 
 from inertial.dynamics.ratiometry import Follows, departures, largest_departure, zero_and_sensitivity
 from inertial.dynamics.stability import difference_error, short_noise
+from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import (
-    Device,
-    Evaluated,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    SetsEquipment,
-)
-from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.base import Evaluated, Part, SetsEquipment
+from pipelines.procedures.columns import point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
 from pipelines.procedures.wording import with_uncertainty
-from pipelines.procedures.worst import worst
 from schemas.bounds import NotNegative, Positive, Wait
 from schemas.errors import RecipeInvalid
 from schemas.poses import Pose
@@ -77,18 +67,14 @@ class RatiometryPart(Part):
 class Ratiometry(SetsEquipment, Evaluated):
     """Zero and sensitivity at several supply voltages."""
 
-    name: ClassVar[str] = "ratiometry"
-    title: ClassVar[str] = "Supply voltage"
-    order: ClassVar[int] = 70
-    states: ClassVar[str] = (
-        "zero and sensitivity over the supply voltage: ratiometric error, or rejection of the supply"
-    )
-    source: ClassVar[str] = (
-        "IEEE Std 1293, input-voltage sensitivity; IEEE Std 2700, ratiometricity and power-supply rejection"
-    )
-    roles: ClassVar[tuple[str, ...]] = ("power_supply",)
-    part: ClassVar[type[Part]] = RatiometryPart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    name = "ratiometry"
+    title = "Supply voltage"
+    order = 70
+    states = "zero and sensitivity over the supply voltage: ratiometric error, or rejection of the supply"
+    source = "IEEE Std 1293, input-voltage sensitivity; IEEE Std 2700, ratiometricity and power-supply rejection"
+    roles = ("power_supply",)
+    part = RatiometryPart
+    figures = (
         FigureSpec(
             SENSITIVITY,
             "%",
@@ -135,43 +121,34 @@ class Ratiometry(SetsEquipment, Evaluated):
         """Sets the supply; returns the ratio to its nominal voltage, which the monitor of the slots expects then."""
         return {"supply_ratio": equipment.set_voltage(step.setting["supply_V"])}
 
-    def reduce(self, part: RatiometryPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: RatiometryPart, records: Records, device: Device) -> pd.DataFrame:
         """Mean of the axis on each face at each voltage, in the unit of the output, with the measured supply."""
         rows: list[dict[str, Any]] = []
-        for k, record in enumerate(records):
-            axis = int(record.step.setting["axis"])
-            for unit, reading, own in record.by_unit():
-                output = own.output[:, axis]
-                noise = short_noise(output, own.rate_hz)
-                rows.append(
-                    {
-                        "unit": unit, "axis": AXES[axis], "series": "face", "point": k,
-                        "setting": record.step.setting["supply_V"], "value": float(output.mean()),
-                        "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": record.step.setting["side"],
-                        "window_s": output.size / own.rate_hz,
-                        "time_s": float(own.time.mean()),
-                        "measured_V": float(reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
-                    }
-                    | noise_columns(noise)
-                )  # fmt: skip
+        for one in taken(records):
+            setting, rate = one.record.step.setting, one.own.rate_hz
+            axis = int(setting["axis"])
+            output = one.own.output[:, axis]
+            rows.append(
+                {
+                    "unit": one.unit, "axis": AXES[axis], "series": "face", "point": one.number,
+                    "setting": setting["supply_V"], "value": float(output.mean()),
+                    "uncertainty": float(output.std(ddof=1) / np.sqrt(output.size)), "side": setting["side"],
+                    "window_s": output.size / rate, "time_s": float(one.own.time.mean()),
+                    "measured_V": float(one.reading["supply_V"]), "constant": float(np.ptp(output) == 0.0),
+                }
+                | noise_columns(short_noise(output, rate))
+            )  # fmt: skip
         return point_table(rows)
 
-    def evaluate(self, part: RatiometryPart, points: pd.DataFrame, device: Device) -> Outcome:
-        """The figures of every unit: the worst axis."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            name = str(unit)
-            if bool((rows["constant"] > 0.0).any()):
-                note = "the output is constant; check cable and supply"
-                figures[name] = [FigureValue.not_determined(f.name, "*", note) for f in self.figures]
-                continue
-            by_axis = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
-            figures[name] = [
-                worst([_figure(spec.name, axis, one, device) for axis, one in by_axis.items()]) for spec in self.figures
-            ]
-            findings += [Finding(name, f"axis {axis}", _text(part, one)) for axis, one in by_axis.items()]
-        return Outcome(figures, findings)
+    def of_unit(self, part: RatiometryPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
+        """The figures of the worst axis."""
+        if bool((rows["constant"] > 0.0).any()):
+            raise NotIdentified("the output is constant; check cable and supply")
+        by_axis = {axis: over_supply(part, rows[rows["axis"] == axis]) for axis in part.axes}
+        figures = [
+            worst([_figure(spec.name, axis, one, device) for axis, one in by_axis.items()]) for spec in self.figures
+        ]
+        return figures, [(f"axis {axis}", _text(part, one)) for axis, one in by_axis.items()]
 
     def chart(self, part: RatiometryPart, points: pd.DataFrame) -> Chart:
         """Departures of sensitivity and zero over the supply voltage."""

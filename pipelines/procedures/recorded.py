@@ -1,21 +1,131 @@
-"""Records of a procedure read from tables of samples and readings."""
+"""What a procedure plans and gets: steps, the records of units read from tables, and the units before the procedure."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from pipelines.procedures.base import Array, Device, ProcedureRecord, ProcedureStep, UnitRecord
+from schemas.poses import Pose
 from schemas.units import AXES
+
+if TYPE_CHECKING:
+    from inertial.dynamics.wandering_means import IdentifiedNoise
+
+Array = NDArray[np.float64]
+REFERENCE = "@reference"
+"""The name of the reference sensor in the tables of samples; no serial begins with it."""
+StepKind = Literal["dwell", "verification", "allan", "procedure"]
+
+
+@dataclass(frozen=True)
+class ProcedureStep:
+    """One record of a procedure.
+
+    Attributes
+    ----------
+    name : shown while it is measured
+    lasting_s, rate_hz : of the record; None for those of the recipe
+    wait_s : after the move; None for the recipe's
+    off_s : without power before the move, s
+    soak : number of the soak within the procedure, from 0
+    role : equipment of the station that performs it; empty for a record on the tilt table
+    on_table : the equipment of the role is set first, then the record is taken on the tilt table
+    setting : what the equipment is set to, by name with unit
+    """
+
+    name: str
+    pose: Pose
+    temperature_C: float
+    kind: StepKind = "procedure"
+    lasting_s: float | None = None
+    rate_hz: float | None = None
+    wait_s: float | None = None
+    off_s: float = 0.0
+    soak: int = 0
+    settled: bool = True
+    role: str = ""
+    on_table: bool = False
+    setting: Mapping[str, float] = field(default_factory=dict[str, float])
+
+
+def at_rest(name: str) -> Pose:
+    """The pose of records that turn nothing: both axes of the table at 0°."""
+    return Pose(name=name, outer_deg=0.0, inner_deg=0.0)
+
+
+@dataclass(frozen=True)
+class UnitRecord:
+    """The samples of one unit, or of the reference, in one record.
+
+    time : (n,), s on the station's clock; output : (n, 3), unit of the output, or g for the reference
+    """
+
+    time: Array
+    output: Array
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal rate of the samples, Hz."""
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+
+
+@dataclass(frozen=True)
+class ProcedureRecord:
+    """One record of a procedure as it was measured: its step, the readings (a row for each unit), and samples by unit."""
+
+    number: int
+    step: ProcedureStep
+    readings: pd.DataFrame
+    samples: Mapping[str, UnitRecord]
+
+
+Records = Sequence[ProcedureRecord]
+
+
+class Taken(NamedTuple):
+    """What one record holds of one unit; ``number`` is that of the record within the procedure, from 0."""
+
+    number: int
+    record: ProcedureRecord
+    unit: str
+    reading: Mapping[str, Any]
+    own: UnitRecord
+
+
+def taken(records: Records) -> Iterator[Taken]:
+    """Every unit that was recorded, in every record."""
+    for number, record in enumerate(records):
+        for reading in record.readings.to_dict("records"):
+            unit = str(reading["unit"])
+            if unit in record.samples:
+                yield Taken(number, record, unit, {str(k): v for k, v in reading.items()}, record.samples[unit])
+
+
+@dataclass(frozen=True)
+class Device:
+    """The units before the procedure: nominal scale from the full scale, and their calibration if there is one.
+
+    scale : (3,) output per g of each axis, by unit; full_scale, out_unit : of the lot
+    scale_error : (3,) standard uncertainty of the scale as a share
+    noise : that the static record of the run shows, µg, by unit and axis; none where it has no such record
+    """
+
+    scale: Mapping[str, Array]
+    scale_error: Mapping[str, Array]
+    full_scale: float
+    out_unit: str
+    noise: Mapping[tuple[str, str], IdentifiedNoise] = field(default_factory=dict[tuple[str, str], "IdentifiedNoise"])
 
 
 def procedure_record(
     number: int, step: ProcedureStep, samples: Iterable[pd.DataFrame], readings: pd.DataFrame
 ) -> ProcedureRecord:
     """One record: samples by unit from its tables, one or several of a long record."""
-    import numpy as np
-
     parts: dict[str, list[tuple[Array, Array]]] = {}
     for table in samples:
         output, time = table[list(AXES)].to_numpy(dtype=float), table["time_s"].to_numpy(dtype=float)

@@ -3,41 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal, cast
+from contextlib import suppress
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from inertial.dynamics.pulses import Pulse, measured_pulse, velocity_change
+from inertial.dynamics.pulses import measured_pulse, velocity_change
 from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 from pipelines.procedures import shock_waves
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    FromWaveforms,
-    InG,
-    NominalScale,
-    OnEquipment,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    UnitRecord,
-    refuse_unknown_effects,
-    scale_of,
-)
-from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
+from pipelines.procedures.columns import numbers, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest, taken
 from pipelines.procedures.shock_bias import STUCK, bias_points, bias_shift
 from schemas.bounds import NotNegative, Positive, Wait
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.units import AXES
 
@@ -73,16 +58,16 @@ class ShockPart(NominalScale):
 class ShockTest(InG, OnEquipment, FromWaveforms):
     """Half-sine shocks with the bias before and after."""
 
-    name: ClassVar[str] = "shock"
-    title: ClassVar[str] = "Half-sine shock"
-    order: ClassVar[int] = 120
-    states: ClassVar[str] = (
+    name = "shock"
+    title = "Half-sine shock"
+    order = 120
+    states = (
         "sensitivity by comparison, undershoot after the pulse, bias shift, survival; spectrum of reference and unit"
     )
-    source: ClassVar[str] = "ISO 16063-22 (comparison), IEC 60068-2-27 (pulse), ISO 18431-4 (shock response spectrum)"
-    roles: ClassVar[tuple[str, ...]] = ("shock_machine",)
-    part: ClassVar[type[Part]] = ShockPart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    source = "ISO 16063-22 (comparison), IEC 60068-2-27 (pulse), ISO 18431-4 (shock response spectrum)"
+    roles = ("shock_machine",)
+    part = ShockPart
+    figures = (
         FigureSpec(
             "shock_sensitivity_percent",
             "%",
@@ -100,8 +85,8 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
 
     def steps(self, part: ShockPart, recipe: Recipe) -> list[ProcedureStep]:
         """The bias, the shocks, the bias again."""
-        still = Pose(name="bias", outer_deg=0.0, inner_deg=0.0)
-        machine = Pose(name="shock", outer_deg=0.0, inner_deg=0.0)
+        still = at_rest("bias")
+        machine = at_rest("shock")
         signs = (1.0, -1.0) if part.both_directions else (1.0,)
 
         def bias(name: str) -> ProcedureStep:
@@ -140,58 +125,46 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         duration = 1e-3 * part.duration_ms
         return {"peak_g": abs(peak), "duration_s": duration, "direction": float(np.sign(peak)), "axis": float(axis)}
 
-    def reduce(self, part: ShockPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: ShockPart, records: Records, device: Device) -> pd.DataFrame:
         """Peaks of reference and unit, waveforms and spectra of the first shock, and the bias before and after."""
         rows: list[dict[str, Any]] = []
         axis, duration = AXES.index(part.axis), 1e-3 * part.duration_ms
         first = next((k for k, record in enumerate(records) if record.step.role), -1)
-        for k, record in enumerate(records):
-            for unit, _, own in record.by_unit():
-                scale = scale_of(part, device, unit)
-                if not record.step.role:
-                    rows += bias_points(unit, k, record, own, scale)
-                else:
-                    pair = shock_waves.filtered_pair(record.samples[REFERENCE], own, axis, scale[axis], duration)
-                    entries = _pulse(k, record, own.output[:, axis], pair, device)
-                    rows += [one | {"unit": unit, "axis": part.axis} for one in entries]
-                    noise = shock_waves.noise_before(pair, BEFORE_S)
-                    entries = shock_waves.waves(k, pair, record.step.setting["direction"], settings_of(part), noise)
-                    rows += [one | {"unit": unit, "axis": part.axis} for one in entries]
-                    if k == first:
-                        entries = shock_waves.curves(pair, duration, BEFORE_S)
-                        rows += [one | {"unit": unit, "axis": part.axis} for one in entries]
+        for one in taken(records):
+            scale = scale_of(part, device, one.unit)
+            if not one.record.step.role:
+                rows += bias_points(one, scale)
+                continue
+            pair = shock_waves.filtered_pair(one.record.samples[REFERENCE], one.own, axis, scale[axis], duration)
+            direction = one.record.step.setting["direction"]
+            noise = shock_waves.noise_before(pair, BEFORE_S)
+            of_shock = [
+                *_pulse(one.number, direction, one.own.output[:, axis], pair, device.full_scale),
+                *shock_waves.waves(one.number, pair, direction, settings_of(part), noise),
+                *(shock_waves.curves(pair, duration, BEFORE_S) if one.number == first else ()),
+            ]
+            rows += [row | {"unit": one.unit, "axis": part.axis} for row in of_shock]
         return point_table(rows)
 
-    def evaluate(self, part: ShockPart, points: pd.DataFrame, device: Device) -> Outcome:
-        """Figures of every unit, and whether it has survived."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            name = str(unit)
-            ratio = rows[rows["series"] == "ratio"]
-            good = ratio[np.isfinite(ratio["value"])]
-            figures[name] = [*_ratio_figures(part, ratio, good), bias_shift(rows)]
-            bias = rows[rows["series"] == "bias"]
-            if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
-                findings.append(
-                    Finding(name, "survival", "the output is constant after the shocks: the unit has not survived")
-                )
-            reference = rows[rows["series"] == "reference"]
-            if len(reference):
-                peak, lasting = float(reference["value"].abs().mean()), float(reference["duration_s"].mean())
-                ideal = velocity_change(peak, lasting)
-                text = (
-                    f"reference {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change "
-                    f"{float(reference['velocity_m_s'].abs().mean()):.3g} m/s "
-                    f"(half sine: {ideal:.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
-                )
-                findings.append(Finding(name, "pulse", text))
-            if len(good):
-                findings += [
-                    Finding(name, subject, text)
-                    for subject, text in shock_waves.diagnosis_text(rows, settings_of(part), part.effects)
-                ]
-        return Outcome(figures, findings)
+    def of_unit(self, part: ShockPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
+        """Figures of a unit, and whether it has survived."""
+        texts: list[tuple[str, str]] = []
+        ratio, bias, reference = (rows[rows["series"] == name] for name in ("ratio", "bias", "reference"))
+        good = ratio[np.isfinite(ratio["value"])]
+        if len(bias) and bool((bias.loc[bias["setting"] > 0.0, "uncertainty"] <= STUCK).any()):
+            texts.append(("survival", "the output is constant after the shocks: the unit has not survived"))
+        if len(reference):
+            peak, lasting = float(reference["value"].abs().mean()), float(reference["duration_s"].mean())
+            ideal = velocity_change(peak, lasting)
+            text = (
+                f"reference {peak:.4g} g, {1e3 * lasting:.3g} ms, velocity change "
+                f"{float(reference['velocity_m_s'].abs().mean()):.3g} m/s "
+                f"(half sine: {ideal:.3g} m/s; IEC 60068-2-27 allows ± 15 %)"
+            )
+            texts.append(("pulse", text))
+        if len(good):
+            texts += shock_waves.diagnosis_text(rows, settings_of(part), part.effects)
+        return [*_ratio_figures(part, ratio, good), bias_shift(bias)], texts
 
     def chart(self, part: ShockPart, points: pd.DataFrame) -> Chart:
         """First shock of reference and unit, and their shock response spectra."""
@@ -199,8 +172,8 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
         for series, factor in (("wave", 1e3), ("spectrum", 1.0)):
             for name, role, width in (("reference", "before", 3.2), ("unit", "after", 1.1)):
                 own = points[points["series"] == f"{series}_{name}"]
-                x, y = factor * own["setting"].to_numpy(dtype=float), own["value"].to_numpy(dtype=float)
-                shown[series].append(Trace(name, x, y, "line", cast("Role", role), width=width))
+                x, y = numbers(own, "setting", "value")
+                shown[series].append(Trace(name, factor * x, y, "line", cast("Role", role), width=width))
         left = Plot("", PlotAxis("time / ms"), PlotAxis(f"acceleration on {part.axis} / g"), tuple(shown["wave"]))
         axes = PlotAxis("natural frequency / Hz", log=True), PlotAxis("maximax response, Q = 10 / g")
         return Chart(self.title, (left, Plot("", *axes, tuple(shown["spectrum"]))), 2)
@@ -212,42 +185,34 @@ def settings_of(part: ShockPart) -> shock_waves.WaveSettings:
 
 
 def _pulse(
-    number: int, record: ProcedureRecord, raw: np.ndarray, pair: shock_waves.Pair, device: Device
+    number: int, direction: float, raw: np.ndarray, pair: shock_waves.Pair, limit: float
 ) -> list[dict[str, Any]]:
     """Reference pulse and the unit's ratio to it; no value where a pulse is not found or the unit clips.
 
     Parameters
     ----------
-    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
+    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass; limit : of the output
     """
     (reference, rate), (unit, unit_rate) = pair
     drive = measured_pulse(reference, rate, before_s=BEFORE_S)
     rows = [
         {
-            "series": "reference", "point": number, "setting": record.step.setting["direction"], "value": drive.peak,
+            "series": "reference", "point": number, "setting": direction, "value": drive.peak,
             "uncertainty": drive.peak_error, "duration_s": drive.duration_s, "velocity_m_s": drive.velocity * 9.80665,
         }
     ]  # fmt: skip
-    answer: Pulse | None = None
-    limit = device.full_scale
-    clipped = bool(
-        np.max(np.abs(raw - np.median(raw[: int(BEFORE_S * unit_rate)]))) >= limit or np.max(np.abs(raw)) >= limit
-    )
-    if not clipped:
-        try:
+    still = np.median(raw[: int(BEFORE_S * unit_rate)])
+    clipped = bool(np.max(np.abs(raw - still)) >= limit or np.max(np.abs(raw)) >= limit)
+    ratio = error = under = noise = np.nan
+    with suppress(NotIdentified):
+        if not clipped:
             answer = measured_pulse(unit, unit_rate, before_s=BEFORE_S)
-        except NotIdentified:
-            answer = None
-    ratio = np.nan if answer is None else answer.peak / drive.peak
-    error = (
-        np.nan
-        if answer is None
-        else abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
-    )
-    under = np.nan if answer is None else 100.0 * (answer.undershoot - drive.undershoot)
+            ratio, noise = answer.peak / drive.peak, answer.noise
+            error = abs(ratio) * float(np.hypot(answer.peak_error / answer.peak, drive.peak_error / drive.peak))
+            under = 100.0 * (answer.undershoot - drive.undershoot)
     row = {
-        "series": "ratio", "point": number, "setting": record.step.setting["direction"], "value": ratio, "uncertainty": error,
-        "undershoot_percent": under, "clipped": float(clipped), "noise_g": np.nan if answer is None else answer.noise,
+        "series": "ratio", "point": number, "setting": direction, "value": ratio, "uncertainty": error,
+        "undershoot_percent": under, "clipped": float(clipped), "noise_g": noise,
     }  # fmt: skip
     return [*rows, row]
 
@@ -263,26 +228,18 @@ def _ratio_figures(part: ShockPart, ratio: pd.DataFrame, good: pd.DataFrame) -> 
         )
         note = f"{why}; lower the peak, or choose a wider range" if clipped else f"{why}; check cable and mounting"
         return [FigureValue.not_determined(name, part.axis, note) for name in names]
-    value, each = good["value"].to_numpy(dtype=float), good["uncertainty"].to_numpy(dtype=float)
+    _, value, each = numbers(good)
     scatter = float(value.std(ddof=1) / np.sqrt(value.size)) if value.size > 2 else 0.0
     spread = max(scatter, float(np.sqrt(np.mean(each**2)) / np.sqrt(value.size)))
     under = good["undershoot_percent"].to_numpy(dtype=float)
     floor = 100.0 * float(good["noise_g"].mean()) / part.peak_g / np.sqrt(under.size)
     # shocks differ in duration, and so in undershoot: of a few, their scatter is itself uncertain
     scatter = float(under.std(ddof=1) / np.sqrt(under.size)) if under.size > 1 else 0.0
+    error = float(np.hypot(100.0 * spread, part.reference_percent))
+    under_error = stated_error(floor**2 + scatter**2, 1.0, scatter**2 * np.sqrt(2.0 / max(1, under.size - 1)))
     return [
-        FigureValue(
-            names[0],
-            part.axis,
-            float(100.0 * (value.mean() - 1.0)),
-            float(np.hypot(100.0 * spread, part.reference_percent)),
-        ),
-        FigureValue(
-            names[1],
-            part.axis,
-            float(under.mean()),
-            stated_error(floor**2 + scatter**2, 1.0, scatter**2 * np.sqrt(2.0 / max(1, under.size - 1))),
-        ),
+        FigureValue(names[0], part.axis, float(100.0 * (value.mean() - 1.0)), error),
+        FigureValue(names[1], part.axis, float(under.mean()), under_error),
     ]
 
 

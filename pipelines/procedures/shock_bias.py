@@ -8,36 +8,36 @@ import numpy as np
 import pandas as pd
 
 from inertial.dynamics.stability import difference_error, error_of_mean, short_noise
-from pipelines.procedures.base import FigureValue, ProcedureRecord, UnitRecord
+from pipelines.procedures.columns import point_rows
+from pipelines.procedures.figures import FigureValue, worst
 from pipelines.procedures.noise_columns import noise_columns, pooled_noise
-from pipelines.procedures.worst import worst
+from pipelines.procedures.recorded import Taken
 from schemas.units import AXES, MICRO
 
 STUCK = 1e-9
 
 
-def bias_points(
-    unit: str, number: int, record: ProcedureRecord, own: UnitRecord, scale: np.ndarray
-) -> list[dict[str, Any]]:
+def bias_points(one: Taken, scale: np.ndarray) -> list[dict[str, Any]]:
     """Mean of every axis in µg, its uncertainty from the scatter of ten parts; ``setting`` is 0 before, 1 after."""
-    output = own.output / scale * MICRO
-    error = error_of_mean(output)
-    noise = [short_noise(output[:, i], own.rate_hz) for i in range(3)]
-    after = 0.0 if record.step.name == "before" else 1.0
-    return [
-        {
-            "unit": unit, "axis": axis, "series": "bias", "point": number, "setting": after, "value": float(output[:, i].mean()),
-            "uncertainty": float(error[i]), "window_s": len(output) / own.rate_hz, "time_s": float(own.time.mean()),
-        }
-        | noise_columns(noise[i])
-        for i, axis in enumerate(AXES)
-    ]  # fmt: skip
+    output, rate = one.own.output / scale * MICRO, one.own.rate_hz
+    noise = [noise_columns(short_noise(output[:, i], rate)) for i in range(3)]
+    return point_rows(
+        unit=one.unit,
+        axis=AXES,
+        series="bias",
+        point=one.number,
+        setting=0.0 if one.record.step.name == "before" else 1.0,
+        value=[output[:, i].mean() for i in range(3)],
+        uncertainty=error_of_mean(output),
+        window_s=len(output) / rate,
+        time_s=float(one.own.time.mean()),
+        **{name: [each[name] for each in noise] for name in noise[0]},
+    )
 
 
-def bias_shift(rows: pd.DataFrame) -> FigureValue:
+def bias_shift(bias: pd.DataFrame) -> FigureValue:
     """Bias after minus before of the axis with the largest shift; the uncertainty holds white noise and flicker."""
     shifts: list[FigureValue] = []
-    bias = rows[rows["series"] == "bias"]
     pooled = _pooled_error(bias) if len(bias) else 0.0
     for axis, own in bias.groupby("axis", sort=False):
         before, after = own[own["setting"] == 0.0], own[own["setting"] > 0.0]

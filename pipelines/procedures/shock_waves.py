@@ -16,7 +16,8 @@ from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockRecord, Waves
 from inertial.dynamics.shock_spectrum import octave_frequencies, shock_spectrum
 from inertial.errors import NotIdentified
-from pipelines.procedures.base import UnitRecord
+from pipelines.procedures.columns import numbers, point_rows
+from pipelines.procedures.recorded import UnitRecord
 from pipelines.procedures.wording import improvement, not_separated, probability, with_uncertainty
 
 CUT = 6.0  # corner of the equal low-pass of both channels, over 1/D
@@ -72,14 +73,16 @@ def waves(number: int, pair: Pair, direction: float, settings: WaveSettings, noi
     at = np.arange(first, last, duration / PER_PULSE)
     top = float(np.max(np.abs(reference(at))))
     error = float(np.hypot(noise_g, 1e-2 * settings.floor_percent * top))
-    return [
-        {
-            "series": "compared", "point": MOST_SAMPLES * number + k,
-            "setting": float(t - peak + 0.5 * duration), "value": float(b), "uncertainty": error,
-            "reference_g": float(a), "direction": direction, "shock": float(number),
-        }
-        for k, (t, a, b) in enumerate(zip(at, reference(at), unit(at), strict=True))
-    ]  # fmt: skip
+    return point_rows(
+        series="compared",
+        point=MOST_SAMPLES * number + np.arange(at.size),
+        setting=at - peak + 0.5 * duration,
+        value=unit(at),
+        uncertainty=error,
+        reference_g=reference(at),
+        direction=direction,
+        shock=float(number),
+    )
 
 
 def judged(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -> ShockDiagnosis | None:
@@ -89,7 +92,7 @@ def judged(rows: pd.DataFrame, settings: WaveSettings, effects: Sequence[str]) -
     before, rate = 0.0, PER_PULSE / settings.duration_s
     for _, one in kept.groupby("direction", sort=False):
         own = one[one["shock"] == one["shock"].iloc[0]]
-        reference, unit, error = (own[name].to_numpy(dtype=float) for name in ("reference_g", "value", "uncertainty"))
+        reference, unit, error = numbers(own, "reference_g", "value", "uncertainty")
         shocks.append(Waves(reference, unit, error))
         before = -float(own["setting"].iloc[0])
     return diagnose_shock(ShockRecord(rate, settings.duration_s, before, tuple(shocks)), effects) if shocks else None
@@ -145,13 +148,11 @@ def curves(pair: Pair, duration: float, before_s: float) -> list[dict[str, Any]]
         inside = slice(max(0, middle - int(2.0 * duration * rate)), middle + int(3.0 * duration * rate))
         t = (np.arange(y.size) / rate)[inside]
         step = max(1, t.size // DRAWN)
-        rows += [
-            {"series": f"wave_{name}", "point": k, "setting": float(a - t[0]), "value": float(b), "uncertainty": np.nan}
-            for k, (a, b) in enumerate(zip(t[::step], y[inside][::step], strict=True))
-        ]
         f = octave_frequencies(0.1 / duration, min(10.0 / duration, 0.08 * rate))
-        rows += [
-            {"series": f"spectrum_{name}", "point": k, "setting": float(a), "value": float(b), "uncertainty": np.nan}
-            for k, (a, b) in enumerate(zip(f, shock_spectrum(y, rate, f), strict=True))
-        ]
+        for series, x, value in (
+            ("wave", t[::step] - t[0], y[inside][::step]),
+            ("spectrum", f, shock_spectrum(y, rate, f)),
+        ):
+            point = np.arange(x.size)
+            rows += point_rows(series=f"{series}_{name}", point=point, setting=x, value=value, uncertainty=np.nan)
     return rows

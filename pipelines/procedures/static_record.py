@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
-from pipelines.procedures.base import Part, Procedure, ProcedureStep
+from pipelines.procedures.base import Part, Procedure
+from pipelines.procedures.recorded import ProcedureStep
 from schemas.errors import RecipeInvalid
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
@@ -19,12 +20,12 @@ class StaticRecordPart(Part):
 class StaticRecord(Procedure):
     """One long record in one pose."""
 
-    name: ClassVar[str] = "static_record"
-    title: ClassVar[str] = "Static record"
-    order: ClassVar[int] = 20
-    states: ClassVar[str] = "noise terms by the Allan deviation: Q, N, B, K, R"
-    source: ClassVar[str] = "IEEE Std 952, IEEE Std 1293"
-    part: ClassVar[type[Part]] = StaticRecordPart
+    name = "static_record"
+    title = "Static record"
+    order = 20
+    states = "noise terms by the Allan deviation: Q, N, B, K, R"
+    source = "IEEE Std 952, IEEE Std 1293"
+    part = StaticRecordPart
 
     def steps(self, part: Any, recipe: Recipe) -> list[ProcedureStep]:
         """One record."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -12,24 +12,11 @@ from pydantic import Field
 from inertial.dynamics.step_record import RISE_POINTS, StepFigures, aligned, step_figures
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    FromWaveforms,
-    OnEquipment,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    UnitRecord,
-)
-from pipelines.procedures.columns import points as point_table
-from pipelines.procedures.worst import worst
+from pipelines.procedures.base import FromWaveforms, OnEquipment, Part
+from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest
 from schemas.bounds import Positive
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.units import AXES
 
@@ -57,17 +44,15 @@ class StepPart(Part):
 class StepResponse(OnEquipment, FromWaveforms):
     """Steps of force by the self-test of the devices."""
 
-    name: ClassVar[str] = "step_response"
-    title: ClassVar[str] = "Step response"
-    order: ClassVar[int] = 116
-    states: ClassVar[str] = "settling time into a band, overshoot, rise time, of the worst axis"
-    source: ClassVar[str] = (
-        "IEEE Std 1293, response to a step; electrostatic or magnetic self-test as the source of the step"
-    )
-    roles: ClassVar[tuple[str, ...]] = ("step_generator",)
-    part: ClassVar[type[Part]] = StepPart
-    reference_unit: ClassVar[str] = "V"
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    name = "step_response"
+    title = "Step response"
+    order = 116
+    states = "settling time into a band, overshoot, rise time, of the worst axis"
+    source = "IEEE Std 1293, response to a step; electrostatic or magnetic self-test as the source of the step"
+    roles = ("step_generator",)
+    part = StepPart
+    reference_unit = "V"
+    figures = (
         FigureSpec(
             SETTLING, "ms", "time from the edge of the drive until the response stays within band_percent of the step"
         ),
@@ -77,7 +62,7 @@ class StepResponse(OnEquipment, FromWaveforms):
 
     def steps(self, part: StepPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record for each step."""
-        pose = Pose(name="step", outer_deg=0.0, inner_deg=0.0)
+        pose = at_rest("step")
         hold = 1e-3 * part.hold_ms
         return [
             ProcedureStep(
@@ -101,7 +86,7 @@ class StepResponse(OnEquipment, FromWaveforms):
         hold = 1e-3 * part.hold_ms
         return {"volts": float(np.ptp(reference.output[:, 0])), "hold_s": hold, "before_s": BEFORE_SHARE * hold}
 
-    def reduce(self, part: StepPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: StepPart, records: Records, device: Device) -> pd.DataFrame:
         """The averaged response of every axis as a share of the step, over the time from the edge of the drive."""
         rows: list[dict[str, Any]] = []
         edges = [_edge(record.samples[REFERENCE]) for record in records]
@@ -115,26 +100,21 @@ class StepResponse(OnEquipment, FromWaveforms):
                 rows += [one | {"unit": unit, "axis": axis} for one in _averaged(part, own, i, device)]
         return point_table(rows)
 
-    def evaluate(self, part: StepPart, points: pd.DataFrame, device: Device) -> Outcome:
-        """The figures of the worst axis of every unit."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            by_figure: dict[str, list[FigureValue]] = {spec.name: [] for spec in self.figures}
-            for axis, own in rows.groupby("axis", sort=False):
-                try:
-                    one = axis_figures(part, own)
-                except NotIdentified as problem:
-                    note = f"axis {axis}: {problem}"
-                    for name, values in by_figure.items():
-                        values.append(FigureValue.not_determined(name, str(axis), note))
-                    continue
-                for value in _values(part, str(axis), one):
-                    by_figure[value.figure].append(value)
-                text = f"{1e3 * one.delay_s:.4g} ms from the edge of the drive to 50 % of the step"
-                findings.append(Finding(str(unit), f"delay of axis {axis}", text))
-            figures[str(unit)] = [worst(values) for values in by_figure.values()]
-        return Outcome(figures, findings)
+    def of_unit(self, part: StepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
+        """The figures of the worst axis."""
+        values: list[list[FigureValue]] = []
+        texts: list[tuple[str, str]] = []
+        for axis, own in rows.groupby("axis", sort=False):
+            try:
+                one = axis_figures(part, own)
+            except NotIdentified as problem:
+                values.append(self.nothing(part, f"axis {axis}: {problem}", str(axis)))
+                continue
+            values.append(_values(part, str(axis), one))
+            texts.append(
+                (f"delay of axis {axis}", f"{1e3 * one.delay_s:.4g} ms from the edge of the drive to 50 % of the step")
+            )
+        return [worst(of_figure) for of_figure in zip(*values, strict=True)], texts
 
     def chart(self, part: StepPart, points: pd.DataFrame) -> Chart:
         """The response of every axis, and its last part about the final value with the band and the settling times."""
@@ -175,7 +155,7 @@ def axis_figures(part: StepPart, rows: pd.DataFrame) -> StepFigures:
     if bool((rows["fault"] > 0.0).any()):
         raise NotIdentified(FAULTS[int(rows["fault"].iloc[0])])
     kept = rows.sort_values("setting")
-    time, value, error = (kept[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+    time, value, error = numbers(kept)
     rate = float(kept["rate_hz"].iloc[0])
     figures = step_figures(
         time,
@@ -243,15 +223,17 @@ def _averaged(
     count = np.bincount(place)
     there = count > 0
     middle, value = (np.bincount(place, weights=one)[there] / count[there] for one in (time, share))
-    edge_error = 1.0 / rate / np.sqrt(12.0 * len(own))
-    return [
-        {
-            "series": "response", "point": k, "setting": float(t), "value": float(v),
-            "uncertainty": max(noise / abs(step) / float(np.sqrt(n)), 1e-12), "edge_error_s": edge_error, "rate_hz": rate,
-            "fault": float(fault), "step": step,
-        }
-        for k, (t, v, n) in enumerate(zip(middle, value, count[there], strict=True))
-    ]  # fmt: skip
+    return point_rows(
+        series="response",
+        point=np.arange(middle.size),
+        setting=middle,
+        value=value,
+        uncertainty=np.maximum(noise / abs(step) / np.sqrt(count[there]), 1e-12),
+        edge_error_s=1.0 / rate / np.sqrt(12.0 * len(own)),
+        rate_hz=rate,
+        fault=float(fault),
+        step=step,
+    )
 
 
 def _values(part: StepPart, axis: str, one: StepFigures) -> list[FigureValue]:

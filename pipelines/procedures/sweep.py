@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,27 +12,15 @@ from inertial.dynamics.sine_fit import fit_tone_and_frequency
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis, diagnose_transfer
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart
-from pipelines.procedures.base import (
-    REFERENCE,
-    Device,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    FromWaveforms,
-    OnEquipment,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    UnitRecord,
-)
-from pipelines.procedures.columns import points as point_table
+from pipelines.procedures.base import FromWaveforms, OnEquipment
+from pipelines.procedures.columns import point_table
+from pipelines.procedures.figures import FigureSpec, UnitOutcome
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureStep, Records, UnitRecord, at_rest, taken
 from pipelines.procedures.sweep_plan import FEWEST_POINTS, SweepPart
-from pipelines.procedures.sweep_points import clocks_of, condition_findings, response_point, transfer_points
+from pipelines.procedures.sweep_points import clocks_of, condition_texts, response_point, transfer_points
 from pipelines.procedures.transfer_chart import bode_chart
 from pipelines.procedures.transfer_figures import diagnosis_text, figures_of_transfer, sampling_text
 from schemas.errors import RecipeInvalid
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.station import StationConfig
 from schemas.units import AXES
@@ -43,17 +31,16 @@ MOST_KEPT = 64
 class Sweep(OnEquipment, FromWaveforms):
     """Stepped sine against a reference sensor."""
 
-    name: ClassVar[str] = "sweep"
-    title: ClassVar[str] = "Sine comparison"
-    order: ClassVar[int] = 110
-    states: ClassVar[str] = (
+    name = "sweep"
+    title = "Sine comparison"
+    order = 110
+    states = (
         "transfer function with uncertainty, natural frequency, damping, −3 dB bandwidth, flatness, missing effects"
     )
-    source: ClassVar[str] = "ISO 16063-21 (comparison), ISO 16063-11 method 3 and IEEE Std 1057 (sine fit)"
-    roles: ClassVar[tuple[str, ...]] = ("exciter",)
-    part: ClassVar[type[Part]] = SweepPart
-    rows: ClassVar[int] = 2
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    source = "ISO 16063-21 (comparison), ISO 16063-11 method 3 and IEEE Std 1057 (sine fit)"
+    roles = ("exciter",)
+    part = SweepPart
+    figures = (
         FigureSpec(
             "sweep_bandwidth_hz", "Hz", "frequency at which the magnitude is 3 dB below that at low frequency", True
         ),
@@ -73,7 +60,7 @@ class Sweep(OnEquipment, FromWaveforms):
 
     def steps(self, part: SweepPart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell for each point."""
-        pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
+        pose = at_rest("exciter")
         return [
             ProcedureStep(
                 f"{frequency:.4g} Hz, {level:.3g} g",
@@ -110,50 +97,39 @@ class Sweep(OnEquipment, FromWaveforms):
         tone = fit_tone_and_frequency(wave, reference.rate_hz, coarse)
         return {"frequency_hz": tone.frequency, "level_g": float(abs(tone.value[0])), "axis": float(axis)}
 
-    def reduce(self, part: SweepPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: SweepPart, records: Records, device: Device) -> pd.DataFrame:
         """Magnitude, phase, and their uncertainty at every point; the device's clock is estimated from all points first."""
         axis = AXES.index(part.axis)
         clocks = clocks_of(records, axis)
         rows: list[dict[str, Any]] = []
-        for k, record in enumerate(records):
-            reference = record.samples[REFERENCE]
-            for unit, reading, own in record.by_unit():
-                clock = clocks.get(unit, (0.0, 0.0))
-                rows.append(
-                    response_point(part, k, record.step.setting, (reference, own), axis, clock, device)
-                    | {"unit": unit, "temperature_C": float(reading["unit_C"])}
-                )
+        for one in taken(records):
+            clock, pair = clocks.get(one.unit, (0.0, 0.0)), (one.record.samples[REFERENCE], one.own)
+            rows.append(
+                response_point(part, one.number, one.record.step.setting, pair, axis, clock, device)
+                | {"unit": one.unit, "temperature_C": float(one.reading["unit_C"])}
+            )
         return point_table(rows)
 
-    def evaluate(self, part: SweepPart, points: pd.DataFrame, device: Device) -> Outcome:
+    def of_unit(self, part: SweepPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The model, judged; figures of the adequate model, or as not determined with the reason."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            name = str(unit)
-            kept = rows[np.isfinite(rows["value"])]
-            lost = len(rows) - len(kept)
-            if lost:
-                text = f"{lost} of {len(rows)} points give no tone, or are clipped: they are left out"
-                findings.append(Finding(name, "points without a value", text))
-            if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
-                note = f"{len(kept)} of {len(rows)} points have a value, four fifths are needed; check cable and range"
-                figures[name] = [FigureValue.not_determined(f.name, part.axis, note) for f in self.figures]
-                continue
-            try:
-                diagnosis = judged(part, kept)
-            except NotIdentified as problem:
-                note = str(problem)
-                figures[name] = [FigureValue.not_determined(f.name, part.axis, note) for f in self.figures]
-                continue
-            figures[name] = figures_of_transfer(part, diagnosis, transfer_points(kept), device.scale.get(name))
-            findings += [Finding(name, subject, text) for subject, text in diagnosis_text(diagnosis)]
-            findings += condition_findings(name, kept)
-            band = next(one for one in figures[name] if one.figure == "sweep_bandwidth_hz")
-            if band.identified:
-                text = sampling_text(float(kept["rate_hz"].max()), band.value, part.bandwidth_order)
-                findings.append(Finding(name, "sampling", text))
-        return Outcome(figures, findings)
+        kept = rows[np.isfinite(rows["value"])]
+        texts: list[tuple[str, str]] = []
+        if len(kept) < len(rows):
+            text = f"{len(rows) - len(kept)} of {len(rows)} points give no tone, or are clipped: they are left out"
+            texts.append(("points without a value", text))
+        if len(kept) < max(FEWEST_POINTS, 0.8 * len(rows)):
+            note = f"{len(kept)} of {len(rows)} points have a value, four fifths are needed; check cable and range"
+            return self.nothing(part, note), texts
+        try:
+            diagnosis = judged(part, kept)
+        except NotIdentified as problem:
+            return self.nothing(part, str(problem)), texts
+        figures = figures_of_transfer(part, diagnosis, transfer_points(kept), device.scale.get(unit))
+        texts += [*diagnosis_text(diagnosis), *condition_texts(kept)]
+        band = next(one for one in figures if one.figure == "sweep_bandwidth_hz")
+        if band.identified:
+            texts.append(("sampling", sampling_text(float(kept["rate_hz"].max()), band.value, part.bandwidth_order)))
+        return figures, texts
 
     def chart(self, part: SweepPart, points: pd.DataFrame) -> Chart | None:
         """Magnitude with uncertainty, phase, coherence, and the residual of the model."""

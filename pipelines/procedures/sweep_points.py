@@ -11,7 +11,7 @@ import pandas as pd
 from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequency, harmonic_distortion
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points
-from pipelines.procedures.base import REFERENCE, Array, Device, Finding, ProcedureRecord, UnitRecord
+from pipelines.procedures.recorded import REFERENCE, Array, Device, ProcedureRecord, UnitRecord
 from pipelines.procedures.sweep_plan import SweepPart
 
 SILENT = 8.0  # standard uncertainties that a tone must stand out of the noise
@@ -92,22 +92,22 @@ def response_point(
     }
 
 
-def condition_findings(unit: str, rows: pd.DataFrame) -> list[Finding]:
+def condition_texts(rows: pd.DataFrame) -> list[tuple[str, str]]:
     """Own clock, distortion and transverse motion against what is usually held."""
-    findings: list[Finding] = []
+    texts: list[tuple[str, str]] = []
     clock, error = float(rows["clock_ppm"].iloc[0]), float(rows["clock_uncertainty_ppm"].iloc[0])
     if abs(clock) > max(5.0 * error, 5.0):
         text = f"{clock:+.0f} ± {2.0 * error:.1g} ppm (k = 2) against the reference; the sine fits use it"
-        findings.append(Finding(unit, "clock of the device", text))
+        texts.append(("clock of the device", text))
     distortion, across = float(rows["distortion_percent"].max()), rows["transverse_percent"]
     limit = np.where(rows["setting"] <= 1000.0, 10.0, 30.0)
     if distortion > 5.0:
-        findings.append(Finding(unit, "distortion of the exciter", f"{distortion:.1f} %, at most 5 % is usually held"))
+        texts.append(("distortion of the exciter", f"{distortion:.1f} %, at most 5 % is usually held"))
     if bool((across > limit).any()):
         at = float(rows["setting"].to_numpy(dtype=float)[int(np.argmax(across.to_numpy(dtype=float)))])
         text = f"{across.max():.0f} % at {at:.4g} Hz, at most 10 % to 1 kHz and 30 % above is usually held"
-        findings.append(Finding(unit, "transverse motion of the exciter", text))
-    return findings
+        texts.append(("transverse motion of the exciter", text))
+    return texts
 
 
 def transfer_points(rows: pd.DataFrame) -> Points:

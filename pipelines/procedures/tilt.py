@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import pandas as pd
@@ -12,19 +11,10 @@ from scipy.stats import norm
 
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
-from pipelines.procedures.base import (
-    Device,
-    Evaluated,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-)
-from pipelines.procedures.columns import points
-from pipelines.procedures.worst import worst
+from pipelines.procedures.base import Evaluated, Part
+from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, Texts, UnitOutcome, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, taken
 from schemas.bounds import NotNegative, Positive
 from schemas.poses import Pose
 from schemas.recipe import Recipe
@@ -64,15 +54,13 @@ class TiltPart(Part):
 class Tilt(Evaluated):
     """The output of the axes that lie in one plane, over a whole turn."""
 
-    name: ClassVar[str] = "tilt"
-    title: ClassVar[str] = "Single-axis tilt"
-    order: ClassVar[int] = 30
-    states: ClassVar[str] = (
-        "bias, scale, angle of the input axis, K2 and K3 within 1 g, of the axes that lie in the plane"
-    )
-    source: ClassVar[str] = "IEEE Std 1293, tilt about one axis; reference by gravity, ISO 16063-16"
-    part: ClassVar[type[Part]] = TiltPart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    name = "tilt"
+    title = "Single-axis tilt"
+    order = 30
+    states = "bias, scale, angle of the input axis, K2 and K3 within 1 g, of the axes that lie in the plane"
+    source = "IEEE Std 1293, tilt about one axis; reference by gravity, ISO 16063-16"
+    part = TiltPart
+    figures = (
         FigureSpec(
             "tilt_linearity_ug",
             "µg",
@@ -95,50 +83,42 @@ class Tilt(Evaluated):
             )
         return steps
 
-    def reduce(self, part: TiltPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: TiltPart, records: Records, device: Device) -> pd.DataFrame:
         """Mean output of every axis at every angle; the angle is the encoder's."""
         rows: list[dict[str, Any]] = []
-        for k, record in enumerate(records):
-            for unit, reading, own in record.by_unit():
-                mean, sd = own.output.mean(axis=0), own.output.std(axis=0, ddof=1) / np.sqrt(len(own.output))
-                rows += [
-                    {
-                        "unit": unit,
-                        "axis": axis,
-                        "series": "output",
-                        "point": k,
-                        "setting": float(reading["outer_deg"]),
-                        "value": mean[i],
-                        "uncertainty": sd[i],
-                        "time_s": float(own.time.mean()),
-                    }
-                    for i, axis in enumerate(AXES)
-                ]
-        return points(rows)
+        for one in taken(records):
+            output = one.own.output
+            rows += point_rows(
+                unit=one.unit,
+                axis=AXES,
+                series="output",
+                point=one.number,
+                setting=float(one.reading["outer_deg"]),
+                value=output.mean(axis=0),
+                uncertainty=output.std(axis=0, ddof=1) / np.sqrt(len(output)),
+                time_s=float(one.own.time.mean()),
+            )
+        return point_table(rows)
 
-    def evaluate(self, part: TiltPart, points: pd.DataFrame, device: Device) -> Outcome:
-        """Figures of the axes in the plane, and what the plane leaves open."""
-        figures: dict[str, list[FigureValue]] = {}
-        largest: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
-            linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
-            # of the whole model: what K2 and K3 leave in a sine's residual is no wander
-            values = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
-            if part.orders == 3:
-                values.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
-            else:
-                values.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
-            figures[str(unit)] = values
-            largest += [_residual(str(unit), axis, one) for axis, one in linear.items()]
-        inside, turned = " and ".join(_plane(part)), part.about
+    def of_unit(self, part: TiltPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
+        """Figures of the axes in the plane, and their largest residuals."""
+        fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
+        linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
+        # of the whole model: what K2 and K3 leave in a sine's residual is no wander
+        values = [worst([_linearity(axis, one) for axis, one in fits.items()]), _orthogonality(part, fits)]
+        if part.orders == 3:
+            values.append(worst([_second_order(axis, one) for axis, one in fits.items()]))
+        else:
+            values.append(FigureValue.not_determined("tilt_second_order_ug_g2", "*", "orders = 1; set orders = 3"))
+        return values, [_residual(axis, one) for axis, one in linear.items()]
+
+    def of_lot(self, part: TiltPart, points: pd.DataFrame) -> Texts:
+        """What the plane leaves open."""
         open_in, open_out = "; ".join(left_open(in_plane=True)), "; ".join(left_open(in_plane=False))
-        findings = [
-            *largest,
-            Finding("", "not determined by this plane", f"axes {inside}: {open_in}"),
-            Finding("", "not determined by this plane", f"axis {turned}, about which the unit turns: {open_out}"),
+        return [
+            ("not determined by this plane", f"axes {' and '.join(_plane(part))}: {open_in}"),
+            ("not determined by this plane", f"axis {part.about}, about which the unit turns: {open_out}"),
         ]
-        return Outcome(figures, findings)
 
     def chart(self, part: TiltPart, points: pd.DataFrame) -> Chart:
         """Residual from bias and scale over the angle."""
@@ -167,7 +147,7 @@ def _plane(part: TiltPart) -> tuple[str, str]:
 def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltFit:
     """Fit of one axis; the weight holds the share of the table's angle, which is largest near 0 g."""
     angle = np.radians(rows["setting"].to_numpy(dtype=float))
-    output, white = rows["value"].to_numpy(dtype=float), rows["uncertainty"].to_numpy(dtype=float)
+    _, output, white = numbers(rows)
     plain = fit_tilt(angle, output, np.ones_like(output))
     slope = plain.scale[0] * np.abs(np.cos(angle + plain.phase[0]))
     error = np.hypot(white, slope * np.radians(part.angle_uncertainty_deg))
@@ -187,11 +167,11 @@ def _linearity(axis: str, one: TiltFit) -> FigureValue:
     return FigureValue("tilt_linearity_ug", axis, float(abs(residual[k])), spread)
 
 
-def _residual(unit: str, axis: str, one: TiltFit) -> Finding:
+def _residual(axis: str, one: TiltFit) -> tuple[str, str]:
     residual = MICRO * one.residuals / one.scale[0]
     k = int(np.argmax(np.abs(residual)))
     text = f"{residual[k]:+.3g} µg at {np.degrees(one.angle[k]):.4g}°, rms {np.sqrt(np.mean(residual**2)):.3g} µg"
-    return Finding(unit, f"largest residual from bias and scale, axis {axis}", text)
+    return f"largest residual from bias and scale, axis {axis}", text
 
 
 def _orthogonality(part: TiltPart, fits: dict[str, TiltFit]) -> FigureValue:

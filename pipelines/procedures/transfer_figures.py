@@ -13,7 +13,7 @@ from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, factor
-from pipelines.procedures.base import FigureValue
+from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import probability
 
 Array = NDArray[np.float64]

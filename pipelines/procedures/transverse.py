@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -14,27 +14,20 @@ from inertial.dynamics.sine_fit import HARMONICS, fit_tone, fit_tone_and_frequen
 from inertial.dynamics.transverse import Z95, Transverse, fit_transverse, relative_phase
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, level
-from pipelines.procedures.base import (
+from pipelines.procedures.base import Evaluated, InG, NominalScale, OnEquipment, scale_of
+from pipelines.procedures.columns import numbers, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome
+from pipelines.procedures.recorded import (
     REFERENCE,
     Device,
-    Evaluated,
-    FigureSpec,
-    FigureValue,
-    Finding,
-    InG,
-    NominalScale,
-    OnEquipment,
-    Outcome,
-    Part,
     ProcedureRecord,
     ProcedureStep,
+    Records,
     UnitRecord,
-    scale_of,
+    at_rest,
 )
-from pipelines.procedures.columns import points as point_table
 from pipelines.procedures.wording import verdict_of
 from schemas.bounds import NotNegative, Positive
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.units import AXES
 
@@ -75,20 +68,20 @@ class TransversePart(NominalScale):
 class TransverseTest(InG, OnEquipment, Evaluated):
     """The output of the sensitive axis under motion across it, over the angle of the unit about that axis."""
 
-    name: ClassVar[str] = "transverse"
-    title: ClassVar[str] = "Transverse sensitivity"
-    order: ClassVar[int] = 114
-    states: ClassVar[str] = "largest transverse sensitivity in % of the sensitivity, and its direction"
-    source: ClassVar[str] = "ISO 16063-31 (transverse vibration sensitivity), 8 angles or more, fit of a sine"
-    roles: ClassVar[tuple[str, ...]] = ("exciter",)
-    part: ClassVar[type[Part]] = TransversePart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    name = "transverse"
+    title = "Transverse sensitivity"
+    order = 114
+    states = "largest transverse sensitivity in % of the sensitivity, and its direction"
+    source = "ISO 16063-31 (transverse vibration sensitivity), 8 angles or more, fit of a sine"
+    roles = ("exciter",)
+    part = TransversePart
+    figures = (
         FigureSpec(FIGURE, "%", "largest transverse sensitivity over the angle, of the sensitivity on the axis"),
     )
 
     def steps(self, part: TransversePart, recipe: Recipe) -> list[ProcedureStep]:
         """One dwell at each angle."""
-        pose = Pose(name="exciter", outer_deg=0.0, inner_deg=0.0)
+        pose = at_rest("exciter")
         return [
             ProcedureStep(
                 f"across {part.axis}, {k * part.step_deg:g}°",
@@ -112,7 +105,7 @@ class TransverseTest(InG, OnEquipment, Evaluated):
         level, angle, seconds = one["level_g"], one["angle_deg"], step.lasting_s or 0.0
         return equipment.sine_across(one["frequency_hz"], level, int(one["axis"]), angle, seconds, slots)
 
-    def reduce(self, part: TransversePart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: TransversePart, records: Records, device: Device) -> pd.DataFrame:
         """In-phase output of the axis over the driven acceleration, in %, at every angle."""
         rows: list[dict[str, Any]] = []
         units = list(dict.fromkeys(str(unit) for record in records for unit in record.readings["unit"]))
@@ -124,33 +117,22 @@ class TransverseTest(InG, OnEquipment, Evaluated):
                 rows.append(_point(part, k, record, (drive, answer, noise), turn, whole=whole) | {"unit": unit})
         return point_table(rows)
 
-    def evaluate(self, part: TransversePart, points: pd.DataFrame, device: Device) -> Outcome:
-        """The maximum and its direction for every unit."""
-        figures: dict[str, list[FigureValue]] = {}
-        findings: list[Finding] = []
-        for unit, rows in points.groupby("unit", sort=False):
-            name = str(unit)
-            try:
-                fit = fitted(rows)
-            except NotIdentified as problem:
-                figures[name] = [FigureValue.not_determined(FIGURE, part.axis, str(problem))]
-                continue
-            value = 100.0 * fit.value
-            known = device.scale_error.get(name)
-            scale = part.scale_percent if known is None else 100.0 * float(known[AXES.index(part.axis)])
-            share = 1e-2 * float(np.hypot(part.reference_percent, scale)) * value
-            error = float(np.hypot(100.0 * fit.error, share))
-            low, high = value - Z95 * error, value + Z95 * error
-            figures[name] = [
-                FigureValue(FIGURE, part.axis, value, error, max(0.0, low) if fit.low > 0.0 else 0.0, high)
-            ]
-            findings += [Finding(name, subject, text) for subject, text in _texts(part, fit)]
-        return Outcome(figures, findings)
+    def of_unit(self, part: TransversePart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
+        """The maximum and its direction."""
+        fit = fitted(rows)
+        value = 100.0 * fit.value
+        known = device.scale_error.get(unit)
+        scale = part.scale_percent if known is None else 100.0 * float(known[AXES.index(part.axis)])
+        share = 1e-2 * float(np.hypot(part.reference_percent, scale)) * value
+        error = float(np.hypot(100.0 * fit.error, share))
+        low, high = value - Z95 * error, value + Z95 * error
+        figure = FigureValue(FIGURE, part.axis, value, error, max(0.0, low) if fit.low > 0.0 else 0.0, high)
+        return [figure], _texts(part, fit)
 
     def chart(self, part: TransversePart, points: pd.DataFrame) -> Chart:
         """Output over the angle with its uncertainty, the fitted sine, and the direction of the maximum."""
         kept = points[np.isfinite(points["value"])]
-        setting, value, error = (kept[name].to_numpy(dtype=float) for name in ("setting", "value", "uncertainty"))
+        setting, value, error = numbers(kept)
         traces = [Trace("measured, U (k = 2)", setting, value, error=2.0 * error)]
         if len(kept) >= FEWEST_ANGLES:
             fit = fitted(points)
@@ -171,9 +153,7 @@ def fitted(rows: pd.DataFrame) -> Transverse:
     if len(kept) < max(FEWEST_ANGLES, 0.8 * len(rows)):
         msg = f"{len(kept)} of {len(rows)} angles have a value, four fifths are needed; check cable and range"
         raise NotIdentified(msg)
-    first, second, value, error = (
-        kept[name].to_numpy(dtype=float) for name in ("first", "second", "value", "uncertainty")
-    )
+    first, second, value, error = numbers(kept, "first", "second", "value", "uncertainty")
     return fit_transverse(first, second, 1e-2 * value, 1e-2 * error)
 
 

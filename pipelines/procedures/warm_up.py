@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -14,23 +13,11 @@ from inertial.dynamics.stability import block_means, settled_error, short_noise
 from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Trace, between
-from pipelines.procedures.base import (
-    Device,
-    Evaluated,
-    FigureSpec,
-    FigureValue,
-    InG,
-    NominalScale,
-    Outcome,
-    Part,
-    ProcedureRecord,
-    ProcedureStep,
-    scale_of,
-)
-from pipelines.procedures.columns import points
-from pipelines.procedures.worst import worst
+from pipelines.procedures.base import Evaluated, InG, NominalScale, scale_of
+from pipelines.procedures.columns import numbers, point_rows, point_table
+from pipelines.procedures.figures import FigureSpec, FigureValue, UnitOutcome, worst
+from pipelines.procedures.recorded import Device, ProcedureStep, Records, at_rest, taken
 from schemas.bounds import Positive
-from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.units import AXES, MICRO
 
@@ -50,19 +37,19 @@ class WarmUpPart(NominalScale):
 class WarmUp(InG, Evaluated):
     """A record from power-on."""
 
-    name: ClassVar[str] = "warm_up"
-    title: ClassVar[str] = "Warm-up time"
-    order: ClassVar[int] = 50
-    states: ClassVar[str] = "time from power-on until the smoothed output stays within its band"
-    source: ClassVar[str] = "IEEE Std 528, warm-up time; not the time to the first usable output"
-    part: ClassVar[type[Part]] = WarmUpPart
-    figures: ClassVar[tuple[FigureSpec, ...]] = (
+    name = "warm_up"
+    title = "Warm-up time"
+    order = 50
+    states = "time from power-on until the smoothed output stays within its band"
+    source = "IEEE Std 528, warm-up time; not the time to the first usable output"
+    part = WarmUpPart
+    figures = (
         FigureSpec("warm_up_s", "s", "time from power-on until the smoothed output stays within its band, worst axis"),
     )
 
     def steps(self, part: WarmUpPart, recipe: Recipe) -> list[ProcedureStep]:
         """One record directly after power-on."""
-        pose = Pose(name="warm-up", outer_deg=0.0, inner_deg=0.0)
+        pose = at_rest("warm-up")
         step = ProcedureStep(
             pose.name,
             pose,
@@ -74,34 +61,26 @@ class WarmUp(InG, Evaluated):
         )
         return [step]
 
-    def reduce(self, part: WarmUpPart, records: Sequence[ProcedureRecord], device: Device) -> pd.DataFrame:
+    def reduce(self, part: WarmUpPart, records: Records, device: Device) -> pd.DataFrame:
         """Means of 1 s in µg over the time since power-on."""
         rows: list[dict[str, Any]] = []
-        for record in records:
-            for unit, reading, own in record.by_unit():
-                scale = scale_of(part, device, unit)
-                begun = float(reading["since_power_s"]) - 0.5 * float(reading["duration_s"])
-                size = round(part.rate_hz)
-                for i, axis in enumerate(AXES):
-                    second = block_means(own.output[:, i], size) / scale[i] * MICRO
-                    noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
-                    rows += [
-                        {
-                            "unit": unit, "axis": axis, "series": "mean_1s", "point": k,
-                            "setting": begun + (k + 0.5) * size / part.rate_hz, "value": value, "uncertainty": noise,
-                        }
-                        for k, value in enumerate(second)
-                    ]  # fmt: skip
-        return points(rows)
+        size = round(part.rate_hz)
+        for one in taken(records):
+            scale = scale_of(part, device, one.unit)
+            begun = float(one.reading["since_power_s"]) - 0.5 * float(one.reading["duration_s"])
+            for i, axis in enumerate(AXES):
+                second = block_means(one.own.output[:, i], size) / scale[i] * MICRO
+                noise = float(np.std(np.diff(second), ddof=1) / np.sqrt(2.0)) if second.size > 2 else np.nan
+                k = np.arange(second.size)
+                time = begun + (k + 0.5) * size / part.rate_hz
+                rows += point_rows(
+                    unit=one.unit, axis=axis, series="mean_1s", point=k, setting=time, value=second, uncertainty=noise
+                )
+        return point_table(rows)
 
-    def evaluate(self, part: WarmUpPart, points: pd.DataFrame, device: Device) -> Outcome:
+    def of_unit(self, part: WarmUpPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """The time of the slowest axis; not determined where the record ends too soon, or noise alone exceeds the band."""
-        figures: dict[str, list[FigureValue]] = {}
-        for unit, rows in points.groupby("unit", sort=False):
-            figures[str(unit)] = [
-                worst([_figure(part, str(axis), own) for axis, own in rows.groupby("axis", sort=False)])
-            ]
-        return Outcome(figures)
+        return [worst([_figure(part, str(axis), own) for axis, own in rows.groupby("axis", sort=False)])], []
 
     def chart(self, part: WarmUpPart, points: pd.DataFrame) -> Chart:
         """Output about its final value over the time since power-on, with the band."""
@@ -109,18 +88,16 @@ class WarmUp(InG, Evaluated):
         traces = [between(time, -part.band_ug, part.band_ug, f"band ± {part.band_ug:g} µg")]
         for axis in AXES:
             own = points[points["axis"] == axis]
-            value = own["value"].to_numpy(dtype=float)
+            since, value = numbers(own, "setting", "value")
             final = value[int(0.8 * value.size) :].mean()
-            traces.append(
-                Trace(f"axis {axis}", own["setting"].to_numpy(dtype=float), value - final, "line", axis, width=0.8)
-            )
+            traces.append(Trace(f"axis {axis}", since, value - final, "line", axis, width=0.8))
         axes = PlotAxis("time since power-on / s"), PlotAxis("output minus final value / µg")
         return Chart(self.title, (Plot("", *axes, tuple(traces)),))
 
 
 def _figure(part: WarmUpPart, axis: str, rows: pd.DataFrame) -> FigureValue:
     """Warm-up time of one axis; its uncertainty is that of the noise over the slope at the entry, and of the means of 1 s."""
-    time, value = rows["setting"].to_numpy(dtype=float), rows["value"].to_numpy(dtype=float)
+    time, value = numbers(rows, "setting", "value")
     lasting = float(np.ptp(time)) + 1.0
     of_half = short_noise(value[value.size // 2 :], 1.0, trend=1)
     noise = settled_error(of_half.white, of_half.flicker, max(part.window_s, 1.0), 0.2 * lasting, 0.5 * lasting)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
-from inertial.quantities import BY_ATTRIBUTE, BY_COLUMN, Quantity
+from inertial.quantities import BY_COLUMN, LEFT_ALONE, Quantity
 from inertial.state import History, State
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import Activity, schedule, temperatures
@@ -66,7 +67,8 @@ def state_of(
         np.where(settled, [s.step.temperature for s in dwells], on_the_way) for on_the_way in (chamber, unit)
     )
     waits = np.array([recipe.settle_s if s.step.wait_s is None else s.step.wait_s for s in dwells])
-    wander = np.random.default_rng(0).normal(size=(2, time.size))
+    wander = np.random.default_rng(0).normal(size=(len(LEFT_ALONE), time.size))
+    left: dict[str, Any] = {row.attribute: row.about(w) for row, w in zip(reversed(LEFT_ALONE), wander, strict=True)}
     gravity = recipe.local_gravity_m_s2 / STANDARD_GRAVITY_M_S2
     return State(
         force=gravity * force_from_angles(outer, inner),
@@ -76,13 +78,12 @@ def state_of(
         since_power=_since_power(stretches, time),
         power_off=off if (off := np.array([s.step.off_s for s in dwells])).any() else None,
         since_move=(waits + 0.5 * recipe.dwell_s) * (1.0 + 0.01 * wander[0]),
-        supply=BY_ATTRIBUTE["supply"].about(wander[1]),
-        vibration=BY_ATTRIBUTE["vibration"].about(np.abs(wander[0])),
         outer=outer,
         inner=inner,
         slot=np.zeros(()),
         covariates=_recorded(recorded_columns(station.devices.reader) if recorded is None else recorded, time.size),
         history=_history(stretches, station) if history else None,
+        **left,
     )
 
 

@@ -12,9 +12,10 @@ import pandas as pd
 from inertial.dynamics.wandering_means import IdentifiedNoise
 from inertial.errors import InertialError
 from pipelines.procedures import PROCEDURES, parts_of, steps_of
-from pipelines.procedures.base import Device, Evaluated, FigureValue, Outcome, Part, ProcedureRecord
-from pipelines.procedures.columns import figure_table, finding_table, gathered_points
-from pipelines.procedures.recorded import nominal_device, procedure_record
+from pipelines.procedures.base import Evaluated, Part
+from pipelines.procedures.columns import figure_table, finding_table, gathered_points, point_table
+from pipelines.procedures.figures import FigureValue, Outcome
+from pipelines.procedures.recorded import Device, ProcedureRecord, nominal_device, procedure_record
 from pipelines.tables.calibration import read_calibration
 from schemas.recipe import Recipe
 
@@ -89,9 +90,7 @@ def analysed(
         outcome = procedure.evaluate(part, table, device)
         why = "its records give no value"
     except InertialError as problem:
-        from pipelines.procedures.columns import points
-
-        table, outcome, why = points([]), Outcome({}), str(problem)
+        table, outcome, why = point_table([]), Outcome({}), str(problem)
     whole: dict[str, list[FigureValue]] = {}
     for unit in units:
         values = list(outcome.figures.get(unit, []))

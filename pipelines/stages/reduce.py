@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from inertial.frames import force_from_angles
-from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE
+from inertial.quantities import ANGLE_COLUMNS, BY_ATTRIBUTE, READINGS
 from pipelines.tables.dwell_table import covariates
 from pipelines.tables.samples import PROCEDURE, STATIC
 from pipelines.tables.summaries import MEANS, SPREADS, summarised
@@ -20,8 +20,7 @@ from schemas.units import AXES, STANDARD_GRAVITY_M_S2
 KEPT = (
     *("unit", "slot", "record", "kind", "pose", "soak", "duration_s"),
     *ANGLE_COLUMNS,
-    *(BY_ATTRIBUTE[name].column for name in ("chamber", "temperature", "supply", "vibration")),
-    *(BY_ATTRIBUTE[name].column for name in ("since_move", "since_power")),
+    *READINGS,
     "out_unit",
 )
 WHERE_THERE = (BY_ATTRIBUTE["power_off"].column,)

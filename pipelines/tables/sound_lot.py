@@ -10,7 +10,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from inertial.counts import number_of
-from inertial.data_errors.faults import Fault, find_faults, missing_dwells
+from inertial.data_errors.faults import Fault, find_faults, missing_dwells, names_of_missing
 from inertial.decisions import ADEQUATE_ABOVE
 from inertial.errors import InertialError
 from inertial.estimation.problem import Lot
@@ -18,9 +18,6 @@ from pipelines.tables.condense import condense
 from pipelines.tables.dwells import Measured, lot_of, measured
 from schemas.errors import DataRejected
 from schemas.units import MICRO
-
-MISSING = frozenset({"dropped_samples", "truncated_file"})
-"""Names of the faults of a unit without dwells that other units have."""
 
 SMALL_MISFIT = "the misfit is smaller than the noise, but significant"
 _SMALL = 1.1
@@ -90,7 +87,7 @@ def sound_lot(
 def _on_purpose(measurement: Measured, fault: Fault, left_out: Collection[str]) -> bool:
     """Whether a fault is only that dwells were left out."""
     named = {f"{measurement.units[fault.unit]}:{int(measurement.dwells[k])}" for k in fault.dwells}
-    return fault.name in MISSING and bool(named) and named <= set(left_out)
+    return fault.name in names_of_missing() and bool(named) and named <= set(left_out)
 
 
 def gaps(measurement: Measured, faults: Sequence[Fault], left_out: Collection[str] = ()) -> list[str]:

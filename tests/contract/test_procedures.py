@@ -104,7 +104,7 @@ class One({bases}):
 {methods}
 PROCEDURE = One()
 """
-METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "evaluate", "chart", "measure"))
+METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "of_unit", "chart", "measure"))
 
 
 @pytest.mark.parametrize(
@@ -128,6 +128,17 @@ def test_a_procedure_that_declares_what_it_cannot_do_is_refused(
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(IncompleteProcedure, match=rf"{name}\.one: .*{refused}"):
         find_procedures(name, [str(tmp_path / name)])
+
+
+def test_a_procedure_that_its_module_does_not_offer_is_refused(tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "forgotten").mkdir()
+    text = HALF.format(bases="Procedure", name="one", roles="()", figures="", methods=METHODS)
+    (tmp_path / "forgotten" / "one.py").write_text(text.replace("PROCEDURE = One()", ""))
+    (tmp_path / "forgotten" / "shared.py").write_text("FEWEST = 3\n")
+    (tmp_path / "forgotten" / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(IncompleteProcedure, match=r"forgotten\.one: no PROCEDURE of this name"):
+        find_procedures("forgotten", [str(tmp_path / "forgotten")])
 
 
 @each([Evaluated, OnEquipment, SetsEquipment, FromWaveforms])

@@ -10,9 +10,10 @@ from each import each
 
 from inertial.criticism.drivers import quantities
 from inertial.expressions import QUANTITIES
-from inertial.quantities import BOOKKEEPING, BY_COLUMN, DERIVED, KNOWN_COLUMNS, RECORDED, column_of
+from inertial.planning.remedies import REMEDIES
+from inertial.planning.sequences import SequenceStep, extended
+from inertial.quantities import BOOKKEEPING, BY_COLUMN, DERIVED, KNOWN_COLUMNS, LEFT_ALONE, RECORDED, column_of
 from inertial.state import State
-from pipelines.capture.record import INSTRUMENTS
 from pipelines.importers import exchange, mapping
 from pipelines.report.residuals import LABELS
 from pipelines.schedule.planned_state import planned_state
@@ -60,7 +61,6 @@ def test_every_station_reads_what_the_rows_say_and_dwells_keep_it():
     }
     assert required == {row.column for row in RECORDED if row.reading}
     assert required <= set(KEPT)
-    assert set(INSTRUMENTS) <= required
     assert set(WHERE_THERE) == {row.column for row in RECORDED if row.joined == "max"}
 
 
@@ -77,6 +77,26 @@ def test_a_plan_has_every_quantity_and_every_driver(tmp_path):
     assert list(state.covariates) == columns
     drivers = {row.column for row in RECORDED if row.driver} | {row.name for row in DERIVED if row.driver}
     assert {name for name, _, _ in quantities(state)} == drivers
+
+
+def test_steps_that_are_added_to_a_plan_go_on_with_every_quantity(tmp_path):
+    state = planned_state(small_job(tmp_path).recipe)
+    longer = extended(state, [SequenceStep(0.1, 0.2, 25.0)])
+    count = state.time.size + 1
+    assert [
+        row.column
+        for row in RECORDED
+        if row.attribute and not row.once and getattr(state, row.attribute) is not None
+        if getattr(longer, row.attribute).shape != (count,)
+    ] == []
+
+
+def test_what_steps_leave_alone_has_a_remedy_that_varies_it(tmp_path):
+    state = planned_state(small_job(tmp_path).recipe)
+    for row in LEFT_ALONE:
+        (remedy,) = (r for r in REMEDIES if r.driver == row.attribute)
+        assert (remedy.feature(state), remedy.cure(state)) == (row.varied.feature, row.varied.cure)
+        assert remedy.feature(remedy.apply(state)) == ""
 
 
 def test_what_a_reader_records_besides_has_a_row():

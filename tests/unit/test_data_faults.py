@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from each import each
 
-from inertial.data_errors.faults.outputs import lattice_step
+from inertial.data_errors.faults.quantised import lattice_step
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.examination import examination
 

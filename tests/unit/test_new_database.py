@@ -1,65 +1,171 @@
-"""A new database of the orchestrator is the one that Prefect's migrations make, and is made only where it would be new."""
+"""A new database of the orchestrator is a copy of the one that Prefect's migrations made once on this machine."""
 
+import os
 import sqlite3
 import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from pipelines.orchestrator import new_database
-from pipelines.orchestrator.new_database import NAME, SCHEMA, make_database, migrated, schema_of
+from pipelines.orchestrator.new_database import NAME, make_database
 from pipelines.orchestrator.settings import DATABASE
 
 
 @pytest.fixture(autouse=True)
-def no_address(monkeypatch: pytest.MonkeyPatch) -> None:
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.delenv(DATABASE, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "tumbleline"
 
 
-def test_the_schema_is_what_the_migrations_of_the_installed_prefect_make(tmp_path: Path) -> None:
-    _, _, kept = SCHEMA.read_text(encoding="utf-8").partition("\n")
-    assert parts(kept) == parts(schema_of(migrated(tmp_path))), (
-        "write it anew: python -m pipelines.orchestrator.new_database"
-    )
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    (tmp_path / "home").mkdir()
+    return tmp_path / "home"
 
 
-def parts(schema: str) -> list[list[str]]:
-    """Lines of each statement in order: the migrations write the constraints of a table in any order."""
-    return sorted(sorted(line.rstrip(",").strip() for line in text.splitlines()) for text in schema.split(";\n"))
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Where Prefect was called upon; a small database stands for what it makes."""
+    calls: list[Path] = []
+
+    def migrate(path: Path) -> None:
+        with closing(sqlite3.connect(path)) as database:
+            database.execute(f"create table made (number_{len(calls)} integer)")
+        calls.append(path)
+
+    monkeypatch.setattr(new_database, "_migrate", migrate)
+    return calls
 
 
-def test_a_database_is_made_once_with_the_revision_and_in_write_ahead_mode(tmp_path: Path) -> None:
-    assert make_database(tmp_path)
-    assert not make_database(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == [NAME]
-    with closing(sqlite3.connect(tmp_path / NAME)) as database:
-        assert len(database.execute("select version_num from alembic_version").fetchall()) == 1
-        assert database.execute("select count(*) from flow_run").fetchone() == (0,)
+def test_prefect_itself_makes_an_empty_database_which_is_copied(cache: Path, home: Path, tmp_path: Path) -> None:
+    assert make_database(home)
+    assert [path.name for path in home.iterdir()] == [NAME]
+    assert stat.S_IMODE((home / NAME).stat().st_mode) == 0o600
+    with closing(sqlite3.connect(home / NAME)) as database:
+        tables = [name for (name,) in database.execute("select name from sqlite_master where type = 'table'")]
+        entries = {name: database.execute(f'select count(*) from "{name}"').fetchone()[0] for name in tables}
+        assert {name for name, count in entries.items() if count} == {"alembic_version"}
+        assert "flow_run" in tables
         assert database.execute("pragma journal_mode").fetchone() == ("wal",)
-    assert stat.S_ISREG((tmp_path / NAME).stat().st_mode)
+    (stored,) = cache.iterdir()
+    assert stat.S_IMODE(stored.stat().st_mode) == 0o600
+    another = tmp_path / "another"
+    another.mkdir()
+    command = [sys.executable, "-m", "prefect", "server", "database", "upgrade", "-y"]
+    assert make_database(another)
+    before = (another / NAME).read_bytes()
+    assert before == stored.read_bytes()
+    subprocess.run(command, env={**os.environ, "PREFECT_HOME": str(another)}, check=True, capture_output=True)
+    assert (another / NAME).read_bytes() == before, "Prefect finds nothing left to migrate"
 
 
-@pytest.mark.parametrize("why", ["another version", "an address", "a database"])
-def test_none_is_made_where_prefect_makes_its_own(why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if why == "another version":
+def test_a_second_server_copies_what_is_stored(cache: Path, home: Path, tmp_path: Path, made: list[Path]) -> None:
+    assert make_database(home)
+    assert not make_database(home)
+    assert make_database(_folder(tmp_path / "second"))
+    assert len(made) == len(list(cache.iterdir())) == 1
+
+
+@pytest.mark.parametrize("why", ["cut off", "changed", "empty", "writable by others", "a folder"])
+def test_what_is_not_as_it_was_stored_is_made_again(
+    why: str, cache: Path, home: Path, tmp_path: Path, made: list[Path]
+) -> None:
+    make_database(home)
+    (stored,) = cache.iterdir()
+    content = stored.read_bytes()
+    match why:
+        case "cut off":
+            stored.write_bytes(content[:-1])
+        case "changed":
+            stored.write_bytes(b"x" + content[1:])
+        case "empty":
+            stored.write_bytes(b"")
+        case "writable by others":
+            stored.chmod(0o666)
+        case _:
+            stored.unlink()
+            stored.mkdir()
+    second = _folder(tmp_path / "second")
+    assert make_database(second)
+    assert len(made) == 2
+    with closing(sqlite3.connect(second / NAME)) as database:
+        assert database.execute("select number_1 from made").fetchall() == []
+    assert make_database(_folder(tmp_path / "third"))
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize("what", ["version", "migrations"])
+def test_another_prefect_has_a_database_of_its_own(
+    what: str, cache: Path, home: Path, tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_database(home)
+    if what == "version":
         monkeypatch.setattr(new_database, "version", lambda _: "3.8.9")
-    elif why == "an address":
-        monkeypatch.setenv(DATABASE, "postgresql+asyncpg://line@db/prefect")
     else:
-        (tmp_path / NAME).write_bytes(b"of the user")
-    assert not make_database(tmp_path)
-    assert [path.read_bytes() for path in tmp_path.iterdir()] == ([b"of the user"] if why == "a database" else [])
+        monkeypatch.setattr(new_database, "_MIGRATIONS", "server/database/_migrations/versions/postgresql")
+    assert make_database(_folder(tmp_path / "second"))
+    assert len(made) == len(list(cache.iterdir())) == 2
 
 
-def test_entries_that_migrations_would_make_are_no_schema(tmp_path: Path) -> None:
-    make_database(tmp_path)
-    with closing(sqlite3.connect(tmp_path / NAME)) as database:
-        database.execute("insert into configuration (key, value) values ('own', '1')")
-        database.commit()
-    with pytest.raises(ValueError, match="make entries"):
-        schema_of(tmp_path / NAME)
+def test_servers_that_start_at_once_each_have_a_whole_one(tmp_path: Path, cache: Path, made: list[Path]) -> None:
+    homes = [_folder(tmp_path / f"home-{n}") for n in range(8)]
+    with ThreadPoolExecutor(len(homes)) as pool:
+        assert all(pool.map(make_database, homes))
+    for folder in homes:
+        with closing(sqlite3.connect(folder / NAME)) as database:
+            assert database.execute("pragma integrity_check").fetchone() == ("ok",)
+    assert all(path.suffix == ".db" for path in cache.iterdir())
+    before = len(made)
+    assert make_database(_folder(tmp_path / "later"))
+    assert len(made) == before
 
 
-def test_a_folder_that_cannot_be_written_is_left_to_prefect(tmp_path: Path) -> None:
-    assert not make_database(tmp_path / "missing")
+@pytest.mark.parametrize("why", ["an address", "a database", "no cache", "no home", "prefect fails", "no folder"])
+def test_prefect_makes_its_own_where_none_can_be_made(
+    why: str, cache: Path, home: Path, tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    match why:
+        case "an address":
+            monkeypatch.setenv(DATABASE, "postgresql+asyncpg://line@db/prefect")
+        case "a database":
+            (home / NAME).write_bytes(b"of the user")
+        case "no cache":
+            (tmp_path / "cache").write_bytes(b"no folder can be made below it")
+        case "no home":
+            monkeypatch.setattr(new_database, "cache_folder", _no_home)
+        case "prefect fails":
+            monkeypatch.setattr(new_database, "_migrate", _fails)
+        case _:
+            home = home / "missing"
+    assert not make_database(home)
+    left = [path.read_bytes() for path in home.iterdir()] if home.exists() else []
+    assert left == ([b"of the user"] if why == "a database" else [])
+    assert [path for path in cache.glob("*") if path.is_dir()] == []
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_is_written_into_the_environment() -> Iterator[None]:
+    package = Path(new_database.__file__).parent
+    before = {path.name for path in package.iterdir()}
+    yield
+    assert {path.name for path in package.iterdir()} - before <= {"__pycache__"}
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir()
+    return path
+
+
+def _no_home() -> Path:
+    raise RuntimeError("Could not determine home directory.")
+
+
+def _fails(_: Path) -> None:
+    raise subprocess.CalledProcessError(1, ["prefect"])

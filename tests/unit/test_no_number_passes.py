@@ -14,8 +14,7 @@ from inertial.noise.terms import fit_terms
 from inertial.population.change_points import change_points
 from inertial.population.comparison import holm
 from pipelines.audit.exchanged_serials import _within
-from pipelines.procedures.base import FigureValue
-from pipelines.procedures.worst import worst
+from pipelines.procedures.figures import FigureValue, worst
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures
 from pipelines.stages.noise import limits_where_unexplained

@@ -15,7 +15,9 @@ from pipelines.chain.certify import certify
 from pipelines.chain.runner import Runner
 from pipelines.integrity import verify
 from pipelines.jobs.job import job_of_run
+from pipelines.jobs.model_change import ModelChange
 from pipelines.lineage import lineage
+from pipelines.rerun.rerun import again
 from schemas import upgrades, version
 from schemas.errors import ArchiveUnusable, WrongUse
 
@@ -85,6 +87,14 @@ def test_it_is_fitted_anew_without_measuring_again(run: Run) -> None:
         WrongUse, match="noise only"
     ):  # run again by a version that knows the budget, but without a statement
         certify(Ledger(run.archive), runner.run, start=measured_on(runner.run))
+
+
+def test_it_is_run_again_since_its_keys_are_of_other_code_and_then_no_more(run: Run) -> None:
+    first = again(run.archive, run.id, ModelChange())
+    assert {cause["what"] for cause in first.because} == {"code"}
+    assert {name for name, done in first.stages.items() if done != "computed"} == {"capture"}
+    assert again(run.archive, first.new, ModelChange()).because == []
+    assert verify(run.archive, keys={}).checked.findings == []
 
 
 def test_a_table_is_brought_up_version_by_version(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -12,8 +12,7 @@ from inertial.population.capability import cpk, shape_of
 from inertial.population.gauge import gauge_study
 from inertial.uncertainty.deviation_law import DeviationLaw, dof_of_upper
 from inertial.uncertainty.risk import global_risk, lot_risk
-from pipelines.procedures.base import FigureValue
-from pipelines.procedures.worst import worst
+from pipelines.procedures.figures import FigureValue, worst
 from pipelines.stages.bias_stability import bias_stability
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures

@@ -1,40 +1,36 @@
-"""Data faults, which must be corrected before effects are diagnosed. The first test that finds one decides for a unit."""
+"""Data faults, one kind per file, which must be corrected before effects are diagnosed; every file of the package takes part."""
 
-from inertial.data_errors.faults.exchanges import changed_units, swapped_units, wrong_poses
-from inertial.data_errors.faults.fault import Fault, Look
-from inertial.data_errors.faults.outputs import noisy, outliers, quantised, stuck
-from inertial.data_errors.faults.records import clock, dropped, missing_dwells, truncated
-from inertial.data_errors.faults.responses import dead, flipped, scale_units
-from inertial.data_errors.faults.temperatures import stale, temperature_units
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from inertial.data_errors.faults.fault import Fault, Look, missing_dwells
 from inertial.data_errors.readings import Readings
 
-LOOKS: tuple[Look, ...] = (
-    truncated,
-    clock,
-    temperature_units,
-    stuck,
-    changed_units,
-    dead,
-    scale_units,
-    flipped,
-    swapped_units,
-    wrong_poses,
-    noisy,
-    outliers,
-    stale,
-    quantised,
-    dropped,
-)
 
-STILL_LOOKS: tuple[Look, ...] = (truncated, clock, temperature_units, stale, noisy, quantised, dropped)
-"""Tests for a record in one pose: its response is unknown, and its output may repeat."""
+@cache
+def looks() -> tuple[Look, ...]:
+    """Every test of this package, in the order in which they decide."""
+    modules = (import_module(f"{__name__}.{info.name}") for info in iter_modules(__path__))
+    return tuple(sorted((m.LOOK for m in modules if hasattr(m, "LOOK")), key=lambda look: look.order))
+
+
+def looks_in_one_pose() -> tuple[Look, ...]:
+    """The tests for a record in one pose, in their order."""
+    ordered = [(look.order_in_one_pose, look) for look in looks() if look.order_in_one_pose is not None]
+    return tuple(look for _, look in sorted(ordered, key=lambda each: each[0]))
+
+
+def names_of_missing() -> frozenset[str]:
+    """Names of the faults of a unit without dwells that other units have."""
+    return frozenset(name for look in looks() if look.of_missing for name in look.names)
 
 
 def find_faults(readings: Readings) -> list[Fault]:
-    """Data faults of a lot, at most one kind per unit; a unit without one can be diagnosed."""
+    """Data faults of a lot, at most one kind per unit, of the first test that finds one; a unit without one can be diagnosed."""
     faults: dict[int, Fault] = {}
-    for look in LOOKS if readings.turned else STILL_LOOKS:
-        for fault in look(readings):
+    for look in looks() if readings.turned else looks_in_one_pose():
+        for fault in look.find(readings):
             faults.setdefault(fault.unit, fault)
     return [faults[u] for u in sorted(faults)]
 

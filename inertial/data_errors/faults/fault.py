@@ -19,9 +19,29 @@ class Fault:
     evidence: str
 
 
-Look = Callable[[Readings], Iterator[Fault]]
+@dataclass(frozen=True)
+class Look:
+    """A test for one kind of data fault, the ``LOOK`` of its file.
+
+    find : the faults in the readings of a lot
+    names : of the faults that it finds
+    order : of two tests that find one in a unit the lower decides
+    order_in_one_pose : the same for a record in one pose, whose response is unknown and whose output may repeat; None: no test
+    of_missing : whether what it finds may be the dwells alone that a unit lacks
+    """
+
+    find: Callable[[Readings], Iterator[Fault]]
+    names: tuple[str, ...]
+    order: int
+    order_in_one_pose: int | None = None
+    of_missing: bool = False
 
 
 def places_of(places: NDArray[np.intp]) -> tuple[int, ...]:
     """Places of dwells, as listed in a fault."""
     return tuple(int(place) for place in places)
+
+
+def missing_dwells(readings: Readings, unit: int) -> tuple[int, ...]:
+    """Places of the dwells that a unit lacks and other units have."""
+    return places_of(np.flatnonzero(~readings.there[unit]))

@@ -28,6 +28,7 @@ class BiasJump(Handling):
     fewest_units: ClassVar[int] = 1
     in_part: ClassVar[bool] = False
     of_one_axis: ClassVar[bool] = True
+    several: ClassVar[bool] = True
 
     def places(self, lot: "Lot") -> list[dict[str, float]]:
         """Every axis of every unit at every place in time; none where only a norm is known."""

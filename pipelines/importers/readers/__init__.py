@@ -6,11 +6,14 @@ it needs, or empty), ``ORDER`` (order in which readers are tried), ``recognised`
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Protocol, cast
 
 from pipelines.importers.content import Content
+
+NEEDED = ("NAME", "TITLE", "EXTRA", "ORDER", "recognised", "read")
 
 
 class FileReader(Protocol):
@@ -36,12 +39,36 @@ class FileReader(Protocol):
         ...
 
 
-def _readers_by_name() -> dict[str, FileReader]:
-    modules = [cast("FileReader", import_module(f"{__name__}.{info.name}")) for info in iter_modules(__path__)]
-    return {module.NAME: module for module in sorted(modules, key=lambda one: one.ORDER)}
+class IncompleteReader(Exception):
+    """A module that is half a reader, or has the name or the order of another: its author must correct it."""
 
 
-READERS: dict[str, FileReader] = _readers_by_name()
+def find_readers(package: str, path: Iterable[str]) -> dict[str, FileReader]:
+    """The readers that the modules of a package define, by name in the order in which they are tried.
+
+    Raises
+    ------
+    IncompleteReader
+        Modules lack something of :class:`FileReader`, or two have one name or order; all that is missing is listed.
+    """
+    missing: list[str] = []
+    readers: list[FileReader] = []
+    for info in iter_modules(path):
+        module = import_module(f"{package}.{info.name}")
+        lacking = [name for name in NEEDED if not hasattr(module, name)]
+        if lacking:
+            missing.append(f"{info.name}: no {', '.join(lacking)}")
+            continue
+        one = cast("FileReader", module)
+        if any(one.NAME == other.NAME or one.ORDER == other.ORDER for other in readers):
+            missing.append(f"{info.name}: NAME '{one.NAME}' or ORDER {one.ORDER} is that of another reader")
+        readers.append(one)
+    if missing:
+        raise IncompleteReader(f"{package}: {'; '.join(missing)}")
+    return {one.NAME: one for one in sorted(readers, key=lambda one: one.ORDER)}
+
+
+READERS: dict[str, FileReader] = find_readers(__name__, __path__)
 """By name, in the order in which they are tried."""
 
 

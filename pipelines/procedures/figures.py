@@ -1,18 +1,83 @@
-"""The deciding axis of a figure, and the interval of the largest of several axes."""
+"""Figures of procedures and findings; the deciding axis of a figure, and the interval of the largest of several axes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inertial.distributions import normal_upper
 from inertial.uncertainty.deviation_law import DeviationLaw
-from pipelines.procedures.base import FigureValue
 
 TAIL = 0.025
 REACH_95 = float(normal_upper(TAIL))
+
+
+@dataclass(frozen=True)
+class FigureSpec:
+    """A figure that limits may name: its key, unit, and meaning in one line.
+
+    one_axis : the figure is that of a single axis, so that a limit may be a least value; of others the largest axis is kept
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    one_axis: bool = False
+
+
+@dataclass(frozen=True)
+class FigureValue:
+    """A figure of one unit and axis.
+
+    ``low`` and ``high`` are the ends of a 95 % interval. Where ``identified`` is False the value passes no limit, and ``note``
+    states why, and a measurement that determines it. A standard deviation has ``dof`` degrees of freedom, nan for other figures,
+    and ``removed`` is the known part that was taken out of it; see :class:`inertial.uncertainty.deviation_law.DeviationLaw`.
+    """
+
+    figure: str
+    axis: str
+    value: float
+    uncertainty: float
+    low: float = float("nan")
+    high: float = float("nan")
+    identified: bool = True
+    note: str = ""
+    dof: float = float("nan")
+    removed: float = 0.0
+
+    @classmethod
+    def not_determined(
+        cls, figure: str, axis: str, note: str, low: float = float("nan"), high: float = float("nan")
+    ) -> FigureValue:
+        """A figure without a value, with the reason."""
+        return cls(figure, axis, float("nan"), float("nan"), low, high, identified=False, note=note)
+
+
+Texts = Sequence[tuple[str, str]]
+"""Statements: subject and text."""
+
+
+UnitOutcome = tuple[list[FigureValue], Texts]
+"""The figures of one unit, and the statements on it."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A statement on one unit, or the lot (empty unit): its subject and the text."""
+
+    unit: str
+    subject: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The results of a procedure for the units of a lot."""
+
+    figures: Mapping[str, list[FigureValue]]
+    findings: Sequence[Finding] = ()
 
 
 def worst(values: Sequence[FigureValue]) -> FigureValue:

@@ -1,10 +1,10 @@
-"""Gaps of a unit's record: missing dwells, missing samples, wrong order of time."""
+"""A record that ends before the lot's, or that lacks most dwells."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.faults.fault import Fault, Look, places_of
 from inertial.data_errors.readings import Readings
 
 ENDS_EARLY = 3
@@ -46,11 +46,6 @@ def truncated(readings: Readings) -> Iterator[Fault]:
             )
 
 
-def missing_dwells(readings: Readings, unit: int) -> tuple[int, ...]:
-    """Places of the dwells that a unit lacks and other units have."""
-    return places_of(np.flatnonzero(~readings.there[unit]))
-
-
 def _after_end(readings: Readings, unit: int) -> float:
     """How many dwells the lot has after the end of a unit's record: by their numbers, and by the times of the other units.
 
@@ -78,47 +73,4 @@ def _cut_off(readings: Readings) -> bool:
     return bool(counts.max() == counts.min() + 1 and counts.min() >= 2)
 
 
-def clock(readings: Readings) -> Iterator[Fault]:
-    """Time that runs backwards from one dwell to the next."""
-    for unit, time in enumerate(readings.time):
-        row = readings.there[unit]
-        back = np.flatnonzero(np.diff(time[row]) < 0.0)
-        if back.size:
-            places = np.flatnonzero(row)[back + 1]
-            step = float(np.diff(time[row])[back[0]])
-            yield Fault(
-                "clock_jitter", unit, places_of(places), f"time steps back by {-step:.1f} s at dwell {places[0]}"
-            )
-
-
-def dropped(readings: Readings) -> Iterator[Fault]:
-    """Dwells with fewer samples than the lot has there, or than their duration holds."""
-    if readings.count is None:
-        return
-    if len(readings.count) > 2 and not _of_own_lengths(readings):
-        expected = np.nanmedian(readings.count, axis=0, keepdims=True)
-    elif readings.duration is not None:
-        rate = np.nanmedian(readings.count / np.maximum(readings.duration, 1e-9), axis=1, keepdims=True)
-        expected = rate * readings.duration
-    else:
-        expected = np.nanmedian(readings.count, axis=1, keepdims=True)
-        if np.nanmean(np.abs(readings.count / expected - 1.0) > 0.1) > 0.4:
-            return  # dwells of planned different length
-    for unit, row in enumerate(readings.count / np.maximum(expected, 1e-9)):
-        places = np.flatnonzero(row < 0.85)
-        if places.size:
-            worst = float(np.nanmin(row))
-            yield Fault(
-                "dropped_samples",
-                unit,
-                places_of(places),
-                f"{places.size} dwells hold as little as {worst:.0%} of the samples",
-            )
-
-
-def _of_own_lengths(readings: Readings) -> bool:
-    """Whether dwells of one number last differently long in different units, as where a unit's dwells were numbered again."""
-    if readings.duration is None:
-        return False
-    usual = np.nanmedian(readings.duration, axis=0, keepdims=True)
-    return bool(np.nanmean(np.abs(readings.duration / np.maximum(usual, 1e-9) - 1.0) > 0.1) > 0.1)
+LOOK = Look(truncated, ("truncated_file", "dropped_samples"), order=10, order_in_one_pose=10, of_missing=True)

@@ -1,4 +1,4 @@
-"""Faults of the outputs of single dwells: repeats, spikes, torn words, coarse steps."""
+"""Outputs in steps that are coarser than the noise."""
 
 from collections.abc import Iterator
 
@@ -6,72 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import decisions
-from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.faults.fault import Fault, Look
 from inertial.data_errors.readings import Array, Readings
 
+_DEGREE = 4
+"""Degree of the polynomial of a driver that the scatter of dwells may follow."""
 
-def stuck(readings: Readings) -> Iterator[Fault]:
-    """The same output, to the last digit, in dwells of different poses; or samples of a dwell that are all the same."""
-    for unit, out in enumerate(readings.output):
-        still = _still(readings, unit)
-        if still.size:
-            evidence = f"an axis is constant in {still.size} dwells: it has no scatter, unlike in the others"
-            yield Fault("stuck_output", unit, places_of(still), evidence)
-            continue
-        moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
-        same = (np.diff(out, axis=0) == 0.0).any(axis=-1) & moved
-        if np.count_nonzero(same) >= 2:
-            places = np.flatnonzero(same) + 1
-            yield Fault(
-                "stuck_output", unit, places_of(places), f"output repeats exactly in {places.size} dwells of new poses"
-            )
+_DWELLS_EACH = 8
+"""Dwells for each column of these."""
 
-
-def _still(readings: Readings, unit: int) -> NDArray[np.intp]:
-    """Dwells in which an axis has no scatter although it has in most: the means of equal samples differ by rounding."""
-    if readings.spread is None or readings.count is None:
-        return np.zeros(0, dtype=np.intp)
-    spread = np.where((readings.count[unit] > 2.0)[:, None], readings.spread[unit], np.nan)
-    usual = np.nan_to_num(np.nanmedian(spread, axis=0)) if np.isfinite(spread).any(axis=0).all() else np.zeros(3)
-    return np.flatnonzero(np.any((spread < 1e-6 * usual) & (usual > 0.0), axis=-1))
-
-
-def noisy(readings: Readings) -> Iterator[Fault]:
-    """Dwells whose scatter is far above the unit's own and the lot's: spikes on an axis, torn words on all."""
-    if readings.spread is None:
-        return
-    typical = np.nanmedian(readings.spread, axis=1, keepdims=True)
-    ratio = readings.spread / np.where(typical > 0.0, typical, np.inf)
-    common = np.nanmedian(ratio, axis=0, keepdims=True) if len(ratio) > 2 else np.ones((1, *ratio.shape[1:]))
-    loud: NDArray[np.bool_] = np.logical_and(ratio > 5.0, ratio > 3.0 * common)
-    few = np.count_nonzero(loud.any(axis=-1), axis=1) < 3
-    loud &= ~(few[:, None, None] & (ratio < 10.0))  # one noisy dwell is a transient, not a fault of the reading
-    if readings.vibration is not None:
-        level = np.nanmedian(readings.vibration, axis=1, keepdims=True)
-        loud &= ~(readings.vibration > 2.0 * np.maximum(level, 1e-12))[..., None]
-    for unit, row in enumerate(np.asarray(loud)):
-        places = np.flatnonzero(row.any(axis=-1))
-        if not places.size:
-            continue
-        together = float(np.mean(row[places].sum(axis=-1)))
-        name = "torn_words" if together > 2.0 and places.size >= 3 else "spikes"
-        worst = float(np.nanmax(np.where(row, ratio[unit], 0.0)))
-        yield Fault(
-            name, unit, places_of(places), f"scatter up to {worst:.0f} times the unit's own in {places.size} dwells"
-        )
-
-
-def outliers(readings: Readings) -> Iterator[Fault]:
-    """Single dwells far off on one axis alone, where no scatter was recorded to show spikes."""
-    if readings.spread is not None:
-        return
-    size = np.abs(readings.misfit)
-    typical = np.nanmedian(size, axis=1, keepdims=True)
-    out = np.any(size > np.maximum(0.005, 40.0 * typical), axis=-1)
-    for unit, row in enumerate(np.asarray(out)):
-        places = np.flatnonzero(row)
-        if 0 < places.size <= 0.1 * row.size:
-            yield Fault("spikes", unit, places_of(places), f"{places.size} dwells far from the others")
+_MOST_STEPS = 20_000
+"""Steps over the range of the means beyond which the step cannot be estimated from these dwells."""
 
 
 def quantised(readings: Readings) -> Iterator[Fault]:
@@ -150,16 +95,6 @@ def _without_drivers(readings: Readings, unit: int, there: NDArray[np.bool_], va
     return left
 
 
-_DEGREE = 4
-"""Degree of the polynomial of a driver that the scatter of dwells may follow."""
-
-_DWELLS_EACH = 8
-"""Dwells for each column of these."""
-
-_MOST_STEPS = 20_000
-"""Steps over the range of the means beyond which the step cannot be estimated from these dwells."""
-
-
 def _white(readings: Readings, unit: int, axis: int) -> float | None:
     """Standard error of a dwell mean from its scatter, output unit; None where it was not recorded."""
     if readings.spread is None or readings.count is None:
@@ -185,3 +120,6 @@ def lattice_step(values: Array) -> float | None:
         if step < 30.0 * tolerance:
             return None
     return step
+
+
+LOOK = Look(quantised, ("quantised",), order=140, order_in_one_pose=60)

@@ -1,19 +1,11 @@
-"""Faults of thermometers: a unit other than °C, and constant readings."""
+"""A thermometer that repeats itself."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from inertial.data_errors.faults.fault import Fault, places_of
+from inertial.data_errors.faults.fault import Fault, Look, places_of
 from inertial.data_errors.readings import Array, Readings
-
-
-def temperature_units(readings: Readings) -> Iterator[Fault]:
-    """Temperatures that cannot be °C."""
-    for unit, row in enumerate(readings.temperature if readings.temperature is not None else ()):
-        typical = float(np.nanmedian(row))
-        if typical > 200.0 or typical < -100.0:
-            yield Fault("wrong_units", unit, (), f"temperature about {typical:.0f}, not °C")
 
 
 def stale(readings: Readings) -> Iterator[Fault]:
@@ -60,3 +52,6 @@ def _longest_repeat(row: Array) -> tuple[int, int]:
                 best = (start, place - start)
             start = place
     return best
+
+
+LOOK = Look(stale, ("stale_temperature",), order=130, order_in_one_pose=40)

@@ -1,0 +1,24 @@
+"""Single dwells far off on one axis, where no scatter was recorded."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.readings import Readings
+
+
+def outliers(readings: Readings) -> Iterator[Fault]:
+    """Single dwells far off on one axis alone, where no scatter was recorded to show spikes."""
+    if readings.spread is not None:
+        return
+    size = np.abs(readings.misfit)
+    typical = np.nanmedian(size, axis=1, keepdims=True)
+    out = np.any(size > np.maximum(0.005, 40.0 * typical), axis=-1)
+    for unit, row in enumerate(np.asarray(out)):
+        places = np.flatnonzero(row)
+        if 0 < places.size <= 0.1 * row.size:
+            yield Fault("spikes", unit, places_of(places), f"{places.size} dwells far from the others")
+
+
+LOOK = Look(outliers, ("spikes",), order=120)

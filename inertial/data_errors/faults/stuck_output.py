@@ -1,0 +1,38 @@
+"""An output that repeats itself in new poses, or has no scatter."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.readings import Readings
+
+
+def stuck(readings: Readings) -> Iterator[Fault]:
+    """The same output, to the last digit, in dwells of different poses; or samples of a dwell that are all the same."""
+    for unit, out in enumerate(readings.output):
+        still = _still(readings, unit)
+        if still.size:
+            evidence = f"an axis is constant in {still.size} dwells: it has no scatter, unlike in the others"
+            yield Fault("stuck_output", unit, places_of(still), evidence)
+            continue
+        moved = np.linalg.norm(np.diff(readings.force[unit], axis=0), axis=-1) > 0.05
+        same = (np.diff(out, axis=0) == 0.0).any(axis=-1) & moved
+        if np.count_nonzero(same) >= 2:
+            places = np.flatnonzero(same) + 1
+            yield Fault(
+                "stuck_output", unit, places_of(places), f"output repeats exactly in {places.size} dwells of new poses"
+            )
+
+
+def _still(readings: Readings, unit: int) -> NDArray[np.intp]:
+    """Dwells in which an axis has no scatter although it has in most: the means of equal samples differ by rounding."""
+    if readings.spread is None or readings.count is None:
+        return np.zeros(0, dtype=np.intp)
+    spread = np.where((readings.count[unit] > 2.0)[:, None], readings.spread[unit], np.nan)
+    usual = np.nan_to_num(np.nanmedian(spread, axis=0)) if np.isfinite(spread).any(axis=0).all() else np.zeros(3)
+    return np.flatnonzero(np.any((spread < 1e-6 * usual) & (usual > 0.0), axis=-1))
+
+
+LOOK = Look(stuck, ("stuck_output",), order=40)

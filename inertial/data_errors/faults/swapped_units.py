@@ -1,0 +1,47 @@
+"""Single dwells that two units have of each other."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from inertial.data_errors.faults.fault import Fault, Look
+from inertial.data_errors.readings import Readings
+
+_AWAY = 0.005
+"""Distance, g, from its own calibration above which the output of a unit may be that of another."""
+
+
+def swapped_units(readings: Readings) -> Iterator[Fault]:
+    """Dwells that two units' fingerprints say were exchanged between them."""
+    units, n = readings.there.shape
+    if units < 2:
+        return
+    exchanged: dict[tuple[int, int], list[int]] = {}
+    # who is at home in its own calibration was not exchanged
+    away = np.any(np.linalg.norm(readings.misfit, axis=-1) > _AWAY, axis=0)
+    for place in np.flatnonzero(away).tolist():
+        for pair in _exchanges(readings, place):
+            exchanged.setdefault(pair, []).append(place)
+    for (one, other), places in exchanged.items():
+        if len(places) >= max(3, n // 20):
+            for unit, partner in ((one, other), (other, one)):
+                evidence = f"{len(places)} dwells have the bias and scale of unit {partner}"
+                yield Fault("units_swapped", unit, tuple(places), evidence)
+
+
+def _exchanges(readings: Readings, place: int) -> Iterator[tuple[int, int]]:
+    """Pairs of units whose outputs at one dwell fit each other's calibration far better than their own."""
+    there = np.flatnonzero(readings.there[:, place])
+    design = np.concatenate([np.ones((there.size, 1)), readings.force[there, place]], axis=-1)
+    predicted = np.einsum("vip,up->uvi", readings.fits[there], design)
+    scale = readings.scale[there]
+    distance = np.linalg.norm((readings.output[there, place][:, None] - predicted) / scale[:, None, None], axis=-1)
+    own = np.diag(distance)
+    best = np.argmin(distance, axis=1)
+    for i, j in enumerate(best):
+        mutual = j > i and best[j] == i
+        if mutual and distance[i, j] < 0.2 * own[i] and distance[j, i] < 0.2 * own[j] and own[i] > _AWAY:
+            yield int(there[i]), int(there[j])
+
+
+LOOK = Look(swapped_units, ("units_swapped",), order=90)

@@ -1,0 +1,66 @@
+"""Dwells in another pose than the one commanded."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inertial.data_errors.exchanged import PlainFit
+from inertial.data_errors.faults.fault import Fault, Look, places_of
+from inertial.data_errors.readings import Array, Readings
+
+_COMMON = 5.0
+"""Multiple of the usual misfit that half of the units exceed in a dwell whose pose is wrong for all."""
+
+
+def wrong_poses(readings: Readings) -> Iterator[Fault]:
+    """Dwells whose output belongs to another direction of gravity than the one commanded."""
+    size = np.linalg.norm(readings.misfit, axis=-1)
+    typical = np.nanmedian(size, axis=1, keepdims=True)
+    out = size > np.maximum(0.02, 15.0 * typical)
+    if len(out) > 2:
+        # an error of most units belongs to the plan or the table: the search for effects reports it
+        ratio = np.nanmedian(size / np.where(typical > 0.0, typical, np.inf), axis=0, keepdims=True)
+        out &= ratio < _COMMON
+    # of two units that were exchanged the search for effects reports it, too
+    swapped = set(_exchanged_from_a_dwell_on(readings)) if out.any() else set[int]()
+    for unit, row in enumerate(out):
+        places = np.flatnonzero(row)
+        if not places.size or places.size > 0.4 * row.size or unit in swapped:
+            continue
+        felt = _felt(readings, unit, places)
+        turned = np.abs(np.linalg.norm(felt, axis=-1) - 1.0) < 0.02
+        if not turned.any():
+            continue
+        name, text = _which_pose(readings.force[unit], places[turned], felt[turned])
+        yield Fault(name, unit, places_of(places[turned]), text)
+
+
+def _exchanged_from_a_dwell_on(readings: Readings) -> Iterator[int]:
+    """Units that have the readings of another one from a dwell on."""
+    warm = readings.temperature if readings.temperature is not None else readings.chamber
+    theta = None if warm is None or not np.isfinite(warm[readings.there]).all() else warm
+    output = readings.output
+    fit = PlainFit(output, readings.force, theta, readings.there, lambda one, other: output[[other, one]])
+    for pair in fit.pairs():
+        if fit.instants(*pair):
+            yield from pair
+
+
+def _felt(readings: Readings, unit: int, places: NDArray[np.intp]) -> Array:
+    """Specific force that the outputs at some dwells stand for, (k, 3), g."""
+    fit = readings.fits[unit]
+    return np.linalg.solve(fit[:, 1:], (readings.output[unit, places] - fit[:, 0]).T).T
+
+
+def _which_pose(force: Array, places: NDArray[np.intp], felt: Array) -> tuple[str, str]:
+    for i, a in enumerate(places):
+        for j in range(i + 1, len(places)):
+            b = places[j]
+            if np.linalg.norm(felt[i] - force[b]) < 0.05 and np.linalg.norm(felt[j] - force[a]) < 0.05:
+                return "swapped_dwells", f"dwells {a} and {b} have exchanged poses"
+    angle = np.degrees(np.arccos(np.clip(np.sum(felt[0] * force[places[0]]), -1.0, 1.0)))
+    return "wrong_pose", f"dwell {places[0]} was measured {angle:.1f}° from the commanded pose"
+
+
+LOOK = Look(wrong_poses, ("swapped_dwells", "wrong_pose"), order=100)
