@@ -47,7 +47,7 @@ test-slow: $(VENV)/.dev $(CRATE)/.done debian  ## suites that take minutes
 test-pythons:  ## set up, main job and tests in a fresh clone, for each Python that is found; or PYTHONS="python3.12 …", TESTS=tests/unit
 	@$(PYTHON) -m deploy.pythons
 
-bench: $(VENV)/.bench  ## figures of docs/reference/measured.md in a short form
+bench: $(VENV)/.bench  ## benchmarks of docs/reference/measured.md in a short form
 	$(BIN)/python -m benchmarks
 
 release: $(VENV)/.dev  ## wheel, source distribution, bill of materials and hashes, into dist/

@@ -1,54 +1,94 @@
-"""Every figure of docs/reference/measured.md in a short form: `python -m benchmarks`; `--full` as published."""
+"""Every benchmark of docs/reference/measured.md in a short form: `python -m benchmarks`; `--full` as published there."""
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
+import shlex
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs/reference/measured.md"
+COMMAND = re.compile(r"`python (?:benchmarks/(\w+)(?:\.py)?|-m benchmarks\.(\w+))((?: [^`]*)?)`")
+FOLDER = "FOLDER"  # stands in the page for a folder of the reader's own; without it a benchmark takes a temporary one
 
-# benchmark, arguments of the short form, arguments of the published form
-BENCHMARKS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
-    ("main_job.py", ("--way", "direct"), ()),
-    ("station.py", ("--short", "--only", "lots", "--only", "soaks", "--only", "noise"), ()),
-    ("fits.py", ("--units", "200", "--rounds", "3"), ()),
-    ("allan.py", ("--channels", "6", "--minutes", "10"), ()),
-    ("budget.py", ("--units", "40"), ("--units", "304")),
-    ("exceedance.py", ("--units", "48"), ()),
-    ("recovery.py", ("--units", "50"), ("--units", "200")),
-    ("throughput.py", ("--rounds", "5"), ("--rounds", "25")),
-    ("plans.py", ("--units", "50", "--device", "adxl355"), ()),
-    ("archive.py", ("--lots", "50", "--lots", "200"), ("--lots", "100", "--lots", "1000", "--lots", "10000")),
-    ("compaction.py", ("--lots", "50"), ("--lots", "1000")),
-    ("refit.py", ("--units", "200"), ("--units", "1000", "--units", "10000")),
-    ("diagnosis.py", (), ("--lot", "null_8", "--lot", "cubic_8", "--lot", "hysteresis_8", "--lot", "null_60",
-                          "--lot", "null_200")),
-    ("investigate.py", ("--scene", "cubic on 18", "--scene", "pendulum on faces"), ("--seeds", "3", "--first", "31")),
-    ("blind.py", ("--runs", "40"), ("--runs", "400", "--method", "tumbleline", "--method", "bic", "--method", "bonferroni",
-                                    "--method", "stlsq", "--method", "lasso")),
-)  # fmt: skip
+# benchmark, arguments of its short form
+SHORT: dict[str, str] = {
+    "main_job": "--way direct",
+    "station": "--short --only lots --only soaks --only noise",
+    "fits": "--units 200 --rounds 3",
+    "allan": "--channels 6 --minutes 10",
+    "budget": "--units 40",
+    "exceedance": "--units 48",
+    "contradiction": "--lots 2 --size 1 --size 4",
+    "recovery": "--units 50",
+    "throughput": "--rounds 5",
+    "plans": "--units 50 --device adxl355",
+    "archive": "--lots 50 --lots 200",
+    "compaction": "--lots 50",
+    "refit": "--units 200",
+    "workbench": "--units 20 --dwells 72 --calibrations 200",
+    "diagnosis": "--lot null_8",
+    "decision_rates": "--runs 2",
+    "noise_verdicts": "verification --records 4",
+    "bias_tracking": "--runs 2",
+    "recordings": "--runs 4",
+    "recording_intervals": "--runs 2",
+    "record_faults": "--runs 8",
+    "worlds": "nulls faults --runs 1",
+    "blind": "--runs 40",
+    "investigate": "--scene 'cubic on 18' --scene 'pendulum on faces'",
+    "procedure_arrays": "20",
+    "procedure_pulls": "shock turn_on --units 4",
+    "procedure_equipment": "--units 4",
+    "procedures": "naming 10",
+    "shock_and_spin": "centrifuge 9",
+}
+
+
+def published() -> dict[str, list[list[str]]]:
+    """The arguments of every command of the page, by benchmark, in the order of the page."""
+    found: dict[str, list[list[str]]] = {}
+    for script, module, arguments in COMMAND.findall(PAGE.read_text(encoding="utf-8")):
+        words = shlex.split(arguments)
+        if FOLDER in words:
+            place = words.index(FOLDER)
+            del words[place - 1 : place + 1]
+        commands = found.setdefault(script or module, [])
+        if words not in commands:
+            commands.append(words)
+    return found
+
+
+def call(name: str) -> list[str]:
+    """What follows `python` for a benchmark: its file, its folder, or its module where it imports from its package."""
+    if f"-m benchmarks.{name}`" in (page := PAGE.read_text(encoding="utf-8")) or f"-m benchmarks.{name} " in page:
+        return ["-m", f"benchmarks.{name}"]
+    return [f"benchmarks/{name}" if (ROOT / "benchmarks" / name).is_dir() else f"benchmarks/{name}.py"]
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--full", action="store_true", help="as published: many minutes")
-    parser.add_argument("--only", action="append", choices=[name.removesuffix(".py") for name, _, _ in BENCHMARKS])
+    parser.add_argument("--full", action="store_true", help="as published: many hours")
+    parser.add_argument("--only", action="append", choices=list(SHORT))
     options = parser.parse_args()
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     failed: list[str] = []
-    for name, short, full in BENCHMARKS:
-        if options.only and name.removesuffix(".py") not in options.only:
+    full = published()
+    for name, short in SHORT.items():
+        if options.only and name not in options.only:
             continue
-        arguments = full if options.full else short
-        print(f"== python benchmarks/{' '.join([name, *arguments])}", flush=True)
-        start = time.perf_counter()
-        done = subprocess.run([sys.executable, str(HERE / name), *arguments], check=False, env=environment)
-        print(f"-- {time.perf_counter() - start:.0f} s\n", flush=True)
-        failed += [name] if done.returncode else []
+        for arguments in full[name] if options.full else [shlex.split(short)]:
+            command = [*call(name), *arguments]
+            print(f"== python {shlex.join(command)}", flush=True)
+            start = time.perf_counter()
+            done = subprocess.run([sys.executable, *command], check=False, env=environment, cwd=ROOT)
+            print(f"-- {time.perf_counter() - start:.0f} s\n", flush=True)
+            failed += [name] if done.returncode else []
     if failed:
         print(f"benchmarks: {', '.join(failed)} ended with an error; run it alone to see why", file=sys.stderr)
     return 1 if failed else 0

@@ -4,6 +4,7 @@ import math
 from contextlib import contextmanager
 
 import pytest
+from each import each
 from other_devices import station_with
 from small_station import lot_of
 
@@ -31,7 +32,7 @@ def test_the_drives_and_chambers_of_the_catalogue_are_there():
     assert chambers <= set(CONTROLLERS)
 
 
-@pytest.mark.parametrize("name", [name for name in profile_names() if load_profile(name).maker != "Tumbleline"])
+@each([name for name in profile_names() if load_profile(name).maker != "Tumbleline"])
 def test_profiles_of_real_devices_say_where_everything_comes_from(name):
     profile = load_profile(name)
     assert not profile.verified  # until somebody holds one against the device
@@ -42,7 +43,7 @@ def test_profiles_of_real_devices_say_where_everything_comes_from(name):
             assert (entry.minimum, entry.maximum) != (None, None), entry.name
 
 
-@pytest.mark.parametrize("name", DRIVES)
+@each(DRIVES)
 def test_an_axis_goes_where_it_is_told_and_reads_back(name):
     with opened(axis=name) as (station, plant):
         for outer, inner in ((70.0, -30.0), (70.0, 12.5), (-180.0, 0.0)):
@@ -54,7 +55,7 @@ def test_an_axis_goes_where_it_is_told_and_reads_back(name):
         assert plant.outer.move.acceleration == pytest.approx(30.0, rel=0.05)
 
 
-@pytest.mark.parametrize("name", DRIVES)
+@each(DRIVES)
 def test_an_axis_stops_where_it_is_and_moves_again(name):
     with opened(axis=name) as (station, _):
         axis = station.table.axes["outer"]
@@ -69,7 +70,7 @@ def test_an_axis_stops_where_it_is_and_moves_again(name):
         assert axis.position() == pytest.approx(20.0, abs=0.01)
 
 
-@pytest.mark.parametrize("name", DRIVES)
+@each(DRIVES)
 def test_an_axis_refuses_what_it_may_not_do_and_nothing_moves(name):
     with opened(axis=name) as (station, plant):
         axis = station.table.axes["outer"]
@@ -85,7 +86,7 @@ def test_an_axis_refuses_what_it_may_not_do_and_nothing_moves(name):
         assert axis.position() == pytest.approx(40.0, abs=0.01)
 
 
-@pytest.mark.parametrize("name", ["smc_lecp6", "iai_robo_cylinder"])
+@each(["smc_lecp6", "iai_robo_cylinder"])
 def test_an_emergency_stop_at_the_drive_needs_a_person(name):
     with opened(axis=name) as (station, plant):
         plant.emergency_stop = True
@@ -93,7 +94,7 @@ def test_an_emergency_stop_at_the_drive_needs_a_person(name):
             station.table.move(10.0, 0.0)
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@each(CONTROLLERS)
 def test_a_chamber_takes_a_set_point_tells_it_back_and_gets_there(name):
     with opened(chamber=name) as (station, plant):
         station.chamber.set_temperature(-12.3)
@@ -104,7 +105,7 @@ def test_a_chamber_takes_a_set_point_tells_it_back_and_gets_there(name):
         assert station.chamber.temperature() == pytest.approx(-12.3, abs=0.2)
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@each(CONTROLLERS)
 def test_a_chamber_refuses_what_the_station_does_not_allow(name):
     with opened(chamber=name) as (station, plant):
         before = plant.fixture.chamber.set_point
@@ -114,7 +115,7 @@ def test_a_chamber_refuses_what_the_station_does_not_allow(name):
         assert plant.fixture.chamber.set_point == before
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
+@each(CONTROLLERS)
 def test_a_chamber_switches_off_and_on_or_says_that_it_cannot(name):
     with opened(chamber=name) as (station, plant):
         if not load_profile(name).has("mode") or not load_profile(name).entry("mode").writable:
@@ -154,7 +155,7 @@ def test_a_program_or_alarm_of_the_controller_needs_a_person(name, register, sta
         assert plant.fixture.chamber.set_point == 23.0
 
 
-@pytest.mark.parametrize("name", ["watlow_f4t", "watlow_f4s"])
+@each(["watlow_f4t", "watlow_f4s"])
 def test_a_controller_in_fahrenheit_is_refused(name):
     with opened(chamber=name) as (station, plant):
         plant.banks[3]._sources["temperature_unit"] = lambda: "fahrenheit"
@@ -251,7 +252,7 @@ def test_an_smc_drive_gets_its_start_alone_and_last():
 
 
 @pytest.mark.parametrize("lost", [StationTimeout, LinkLost])
-@pytest.mark.parametrize("name", DRIVES)
+@each(DRIVES)
 def test_an_order_whose_answer_is_lost_is_read_back_and_not_given_again(name, lost):
     with opened(axis=name) as (station, plant):
         station.table.move(5.0, 5.0)
@@ -282,7 +283,7 @@ def with_order(config, order):
     return config.model_copy(update={"devices": devices.model_copy(update=turned)})
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@each(ORDERS)
 def test_a_drive_may_be_set_to_any_of_four_word_orders(order):
     config, lot = with_order(station_with(), order), lot_of(1)
     plant = make_plant(config, lot)
@@ -291,7 +292,7 @@ def test_a_drive_may_be_set_to_any_of_four_word_orders(order):
     assert plant.outer.move.target == pytest.approx(70.0)
 
 
-@pytest.mark.parametrize("order", ORDERS[1:])
+@each(ORDERS[1:])
 def test_a_drive_set_to_another_word_order_than_the_file_says_does_not_move(order):
     lot = lot_of(1)
     plant = make_plant(station_with(), lot)

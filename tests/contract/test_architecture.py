@@ -1,5 +1,7 @@
 """The page of the architecture is that of the layer contracts, and every stop of its tour exists."""
 
+import re
+
 from docs.architecture_page import PAGE, PICTURE, STOPS, contracts, missing, page, picture, rows
 
 
@@ -18,3 +20,11 @@ def test_the_page_is_up_to_date_but_for_its_numbers_of_lines() -> None:
     head = page().partition("## The largest rooms")[0]
     assert PAGE.read_text(encoding="utf-8").startswith(head), "write it again with 'python -m docs.architecture_page'"
     assert page().partition("## Words")[2] == PAGE.read_text(encoding="utf-8").partition("## Words")[2]
+
+
+def test_every_module_that_the_guides_of_the_code_name_is_there() -> None:
+    root = PAGE.parents[2]
+    named = re.compile(r"`((?:inertial|pipelines|stations|schemas|tests|deploy|docs)/[\w./-]*)`")
+    guides = [root / "CONTRIBUTING.md", PAGE.parent / "how-a-diagnosis-works.md"]
+    wrong = [name for guide in guides for name in named.findall(guide.read_text("utf-8")) if not (root / name).exists()]
+    assert wrong == []

@@ -8,7 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-import pytest
+from each import each
 
 from pipelines.audit.finding import WHO
 
@@ -79,7 +79,7 @@ def test_every_kind_of_finding_has_a_row_in_the_guide_and_every_row_a_finding() 
     assert sorted(DOCUMENTED) == KINDS
 
 
-@pytest.mark.parametrize("one", MADE, ids=lambda one: one.where)
+@each(MADE, lambda one: one.where)
 def test_a_finding_says_who_must_act_and_shows_its_evidence(one: Yielded) -> None:
     assert one.kinds
     assert set(one.who) <= set(WHO)

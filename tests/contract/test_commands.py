@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from each import each
 from typer.core import TyperCommand
 from typer.main import get_command
 from typer.testing import CliRunner
@@ -30,7 +31,7 @@ def leaves(command: object) -> Iterator[TyperCommand]:
         yield from leaves(one)
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@each(COMMANDS)
 def test_a_command_is_in_the_help_with_a_sentence(name: str) -> None:
     text = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"}).stdout
     summary = COMMANDS[name].summary
@@ -39,7 +40,7 @@ def test_a_command_is_in_the_help_with_a_sentence(name: str) -> None:
     assert len(summary) <= 90
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@each(COMMANDS)
 def test_a_command_explains_itself_and_every_option(name: str) -> None:
     module = import_module(f"pipelines.cli.{COMMANDS[name].module}")
     assert (module.__doc__ or "").startswith(f"``tumbleline {name}``: ")
@@ -48,7 +49,7 @@ def test_a_command_explains_itself_and_every_option(name: str) -> None:
         assert [p.name for p in leaf.params if not getattr(p, "help", None)] == [], leaf.name
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@each(COMMANDS)
 def test_the_help_of_a_command_shows_two_examples_with_options_that_exist(name: str) -> None:
     examples = import_module(f"pipelines.cli.{COMMANDS[name].module}").EXAMPLES
     assert len(set(examples)) == 2
@@ -63,7 +64,7 @@ def test_the_help_of_a_command_shows_two_examples_with_options_that_exist(name: 
         command.make_context(name, rest)  # parses: every argument and value is of its kind
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@each(COMMANDS)
 def test_the_help_of_a_subcommand_shows_two_examples_of_its_own(name: str) -> None:
     group = get_command(app).get_command(None, name)._load()
     for own, leaf in getattr(group, "commands", {}).items():
@@ -101,7 +102,7 @@ def meant(command: object, rest: list[str]) -> tuple[TyperCommand, list[str]]:
     return below[command.usual], rest
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@each(COMMANDS)
 def test_a_command_is_named_in_the_documents(name: str) -> None:
     assert name in NAMED
 

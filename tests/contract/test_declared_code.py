@@ -4,7 +4,7 @@ import ast
 from functools import cache
 from pathlib import Path
 
-import pytest
+from each import each
 
 from pipelines.archive.code import CODE
 from pipelines.archive.keys import sources
@@ -89,12 +89,12 @@ def needed(starts: str) -> set[str]:
     return {name for name in found if not _without_code(name)}
 
 
-@pytest.mark.parametrize("result", CODE)
+@each(CODE)
 def test_a_key_takes_in_every_module_that_its_result_runs(result: str) -> None:
     assert sorted(needed(STARTS[result]) - set(sources(CODE[result]))) == []
 
 
-@pytest.mark.parametrize("result", CODE)
+@each(CODE)
 def test_a_key_takes_in_no_room_that_its_result_does_not_use(result: str) -> None:
     run = needed(STARTS[result])
     assert [name for name in CODE[result] if not run & set(sources([name]))] == []

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from each import each
 from other_devices import station_with
 from small_station import lot_of
 
@@ -126,7 +127,7 @@ def test_every_family_has_an_adapter_a_simulation_and_a_profile():
     assert set(adapters()) == set(family_names()) == of_profiles
 
 
-@pytest.mark.parametrize("name", OF_FAMILIES)
+@each(OF_FAMILIES)
 def test_every_profile_has_its_adapter_its_simulated_device_and_its_entry_in_the_reference(name):
     profile = load_profile(name)
     if profile.kind == "axis":

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from each import each
 
 from docs.effects_page import page
 from inertial import effects, poses
@@ -92,7 +93,7 @@ def least_left(columns: np.ndarray, base: np.ndarray) -> float:
     return float(np.linalg.svd(left, compute_uv=False)[-1])
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_columns_have_a_name_each_and_are_finite(name: str) -> None:
     effect = effects.get(name)
     columns = all_columns(effect, RICH, values_of(effect, RICH))
@@ -102,7 +103,7 @@ def test_columns_have_a_name_each_and_are_finite(name: str) -> None:
     assert columns.shape[:-1] == (3, *RICH.time.shape)
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_units_are_given_for_every_column_where_they_are_given(name: str) -> None:
     effect = effects.get(name)
     if effect.per:
@@ -110,7 +111,7 @@ def test_units_are_given_for_every_column_where_they_are_given(name: str) -> Non
         assert {len(effect.per)} == {len(effect.names(axis)) for axis in range(3)}
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_start_columns_are_finite_and_fit_the_dwells(name: str) -> None:
     effect = effects.get(name)
     values = values_of(effect, RICH)
@@ -123,7 +124,7 @@ def test_start_columns_are_finite_and_fit_the_dwells(name: str) -> None:
     assert np.isfinite(start).all()
 
 
-@pytest.mark.parametrize("name", [name for name in EVERY if isinstance(effects.get(name), SensorEffect)])
+@each([name for name in EVERY if isinstance(effects.get(name), SensorEffect)])
 def test_says_rightly_whether_its_columns_are_the_same_on_all_axes(name: str) -> None:
     effect = effects.get(name)
     assert isinstance(effect, SensorEffect)
@@ -135,7 +136,7 @@ def test_says_rightly_whether_its_columns_are_the_same_on_all_axes(name: str) ->
     assert effect.same_on_axes == all(np.array_equal(each, axes[0]) for axes in made for each in axes)
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_says_nothing_where_nothing_changes(name: str) -> None:
     """The same pose, temperature, supply and instant again and again: whatever a column says then is a bias."""
     n = RICH.time.shape[-1]
@@ -160,7 +161,7 @@ def test_says_nothing_where_nothing_changes(name: str) -> None:
     assert np.ptp(columns, axis=-2).max(initial=0.0) < 1e-9
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_every_nonlinear_parameter_changes_the_columns(name: str) -> None:
     effect = effects.get(name)
     for parameter in effect.parameters(RICH):
@@ -172,7 +173,7 @@ def test_every_nonlinear_parameter_changes_the_columns(name: str) -> None:
         assert not np.allclose(seen[0], seen[1], rtol=1e-6, atol=1e-12), parameter.name
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_a_document_says_what_it_is(name: str) -> None:
     effect = effects.get(name)
     assert (inspect.getdoc(effect) or "").strip().endswith(".") or "." in (inspect.getdoc(effect) or "")
@@ -189,11 +190,11 @@ def test_a_document_says_what_it_is(name: str) -> None:
     assert f"### {name}\n" in page()
 
 
-@pytest.mark.parametrize("name", EVERY)
-@pytest.mark.parametrize("missing", ["symbol", "equation", "source", "typical_ug", "breaker"])
-def test_an_effect_declares_every_attribute_in_its_own_file(name: str, missing: str) -> None:
+@each(EVERY)
+def test_an_effect_declares_every_attribute_in_its_own_file(name: str) -> None:
     kind = type(effects.get(name))
-    assert missing in vars(kind), f"{kind.__module__}: {kind.__name__} has no {missing}; declare it in the class"
+    missing = {"symbol", "equation", "source", "typical_ug", "breaker"} - set(vars(kind))
+    assert not missing, f"{kind.__module__}: {kind.__name__} has no {missing}; declare it in the class"
 
 
 def test_every_module_of_the_package_holds_an_effect_or_is_a_base() -> None:
@@ -215,7 +216,7 @@ def model_columns(names: list[str], state: State, axis: int) -> np.ndarray:
     return np.concatenate([effects.get(n).columns(state, axis)[0] for n in names], axis=-1)
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_is_recovered_where_the_plan_sees_it_and_refused_where_not(name: str, rng: np.random.Generator) -> None:
     effect = effects.get(name)
     base = [n for n in BASE if n != name]
@@ -269,7 +270,7 @@ def diagnosis_of_six_faces() -> dict:
     return diagnose(six_faces(), effects=list(BASE))
 
 
-@pytest.mark.parametrize("name", [n for n in EVERY if n not in BASE])
+@each([n for n in EVERY if n not in BASE])
 def test_is_reported_unseen_on_six_faces_exactly_where_it_cannot_show(name: str, diagnosis_of_six_faces: dict) -> None:
     from inertial.errors import MissingInput
     from pipelines.tables.dwells import lot_of, measured
@@ -301,7 +302,7 @@ def test_what_six_faces_hide_is_what_was_published(diagnosis_of_six_faces: dict)
     assert not {"second_order", "scale_asymmetry"} & set(diagnosis_of_six_faces["unseen"])
 
 
-@pytest.mark.parametrize("name", EVERY)
+@each(EVERY)
 def test_export_holds_it_or_says_that_it_does_not(name: str) -> None:
     """Effects beyond polynomials in temperature are told of in what is exported, never dropped silently."""
     from types import SimpleNamespace

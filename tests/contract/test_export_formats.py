@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 from typer.testing import CliRunner
 
 from pipelines.cli import app
@@ -33,7 +34,7 @@ def written(name: str, units: list[UnitCalibration]) -> dict[str, bytes]:
     return export_files(name, units, "run-1", SETTINGS)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@each(FORMATS)
 def test_a_format_names_every_unit_and_ends_its_last_line(name: str) -> None:
     files = written(name, [calibration("SN1"), calibration("SN2")])
     for unit in ("SN1", "SN2"):
@@ -44,12 +45,12 @@ def test_a_format_names_every_unit_and_ends_its_last_line(name: str) -> None:
     assert all(content.endswith(b"\n") for file, content in files.items() if not file.endswith(".mat"))
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@each(FORMATS)
 def test_a_format_has_the_same_bytes_each_time(name: str) -> None:
     assert written(name, [calibration("SN1")]) == written(name, [calibration("SN1")])
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@each(FORMATS)
 def test_an_effect_without_a_place_is_named_or_refused(name: str) -> None:
     units = [calibration("SN1", ("third_order",))]
     if getattr(FORMATS[name], "COMPLETE", False):
@@ -59,7 +60,7 @@ def test_an_effect_without_a_place_is_named_or_refused(name: str) -> None:
             written(name, units)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@each(FORMATS)
 def test_a_format_is_in_the_help_and_in_the_guide(name: str) -> None:
     shown = " ".join(CliRunner().invoke(app, ["export", "--help"], env={"COLUMNS": "160"}).stdout.split())
     own = FORMATS[name].__doc__

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from each import each
 
 from deploy.release import unpack
 from docs.figures_page import PAGE, page
@@ -48,7 +49,7 @@ def yielded(kept) -> list[str]:
     return [name for name, kind in FIGURES.items() if not kind.missing(recipe)]
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@each(FIGURES)
 def test_a_figure_is_in_the_table_with_its_unit_and_decision(name: str, kept, table) -> None:
     rows = table[table["figure"] == name]
     if name not in yielded(kept):
@@ -67,7 +68,7 @@ def test_the_table_has_the_figures_in_their_order(kept, table) -> None:
     assert len(first) > 10
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@each(FIGURES)
 def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
     missing = FIGURES[name].missing(SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True))
     effects = [missing.split()[1]] if missing else []
@@ -83,7 +84,7 @@ def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
             refuse_limits_without_figures(limits, bare)
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@each(FIGURES)
 def test_a_figure_is_named_in_parts_that_agree(name: str) -> None:
     kind = FIGURES[name]
     module = sys.modules[f"pipelines.stages.figures.{name.lower()}"]

@@ -5,6 +5,7 @@ import tomllib
 from importlib.resources import files
 
 import pytest
+from each import each
 from typer.testing import CliRunner
 
 from docs.keys_page import PAGE, page
@@ -15,7 +16,7 @@ from schemas.key_list import FILES, keys_of
 from stations.plant.faults.catalogue import figures, kinds
 
 
-@pytest.mark.parametrize("name", FILES)
+@each(FILES)
 def test_every_key_has_a_meaning_that_is_a_sentence(name: str) -> None:
     keys = keys_of(FILES[name])
     assert len(keys) > 8
@@ -52,7 +53,7 @@ def test_every_hidden_effect_of_the_demo_is_listed() -> None:
     assert {row["hidden effect"] for row in SUBJECTS["demo"][1]()} == {scene.kind for scene in SCENES}
 
 
-@pytest.mark.parametrize("subject", ["", *SUBJECTS])
+@each(["", *SUBJECTS])
 def test_the_command_prints_a_list_within_80_columns(subject: str) -> None:
     arguments = ["keys", *([subject] if subject else [])]
     document = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)

@@ -12,6 +12,7 @@ from functools import cache
 from importlib import metadata
 
 import pytest
+from each import each
 from packaging.markers import Marker
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -104,7 +105,7 @@ def resolve(lock: str, python: str, lines: tuple[str, ...]) -> tuple[list[str], 
 
 
 @pytest.mark.parametrize("python", PATCHES)
-@pytest.mark.parametrize("lock", sorted(LOCKS))
+@each(sorted(LOCKS))
 def test_a_lock_holds_what_is_needed_on_each_python(lock: str, python: str) -> None:
     wrong, reached, unknown = resolve(lock, python, made_from(lock))
     assert wrong == []
@@ -115,7 +116,7 @@ def test_a_lock_holds_what_is_needed_on_each_python(lock: str, python: str) -> N
         assert not here - reached or unknown, "the lock has what nothing needs"
 
 
-@pytest.mark.parametrize("lock", sorted(LOCKS))
+@each(sorted(LOCKS))
 def test_a_lock_has_a_version_and_hashes_for_everything_and_no_address(lock: str) -> None:
     text = LOCKS[lock]
     assert "://" not in text
@@ -171,7 +172,7 @@ def test_the_versions_that_are_tested_accepted_and_locked_agree() -> None:
     assert set(tested) <= set(PYTHONS)
 
 
-@pytest.mark.parametrize("version", [(2, 7), (3, 10), (3, 15), *(tuple(map(int, p.split("."))) for p in PYTHONS)])
+@each([(2, 7), (3, 10), (3, 15), *(tuple(map(int, p.split("."))) for p in PYTHONS)])
 def test_make_refuses_another_python_in_one_line(version: tuple[int, int]) -> None:
     (check,) = re.findall(r"^SUPPORTED := (.*)$", MAKEFILE, re.MULTILINE)
     code = f"import sys; sys.version_info = {version!r}; " + check.removeprefix("import sys; ")

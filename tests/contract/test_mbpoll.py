@@ -4,6 +4,7 @@ import shutil
 import subprocess
 
 import pytest
+from each import each
 from other_devices import station_with
 from small_station import lot_of, plant_of
 
@@ -44,7 +45,7 @@ def served_with(name):
     return plant, {"axis": 1, "chamber": 3}[kind]
 
 
-@pytest.mark.parametrize("name", REAL)
+@each(REAL)
 def test_mbpoll_reads_what_the_profile_says(name, program):
     plant, device_id = served_with(name)
     bank = plant.banks[device_id]
@@ -68,7 +69,7 @@ def test_mbpoll_reads_what_the_profile_says(name, program):
     assert seen == {register.space for register in bank.profile.registers}
 
 
-@pytest.mark.parametrize("name", [n for n in REAL if load_profile(n).kind == "chamber"])
+@each([n for n in REAL if load_profile(n).kind == "chamber"])
 def test_mbpoll_decodes_the_air_temperature_by_type_and_word_order_alone(name, program):
     plant, device_id = served_with(name)
     profile = load_profile(name)
@@ -81,7 +82,7 @@ def test_mbpoll_decodes_the_air_temperature_by_type_and_word_order_alone(name, p
     assert float(text) * (0.1 if air.scaled_by else 1.0) == pytest.approx(23.0, abs=0.2)
 
 
-@pytest.mark.parametrize("name", REAL)
+@each(REAL)
 def test_mbpoll_finds_nothing_in_spaces_that_the_profile_does_not_have(name, program):
     plant, device_id = served_with(name)
     profile = load_profile(name)

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from each import each
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ("inertial", "schemas", "stations", "pipelines")
@@ -110,7 +111,7 @@ def anchors(path: Path) -> set[str]:
     }
 
 
-@pytest.mark.parametrize("path", tracked("*.md"), ids=lambda p: str(p.relative_to(ROOT)))
+@each(tracked("*.md"))
 def test_every_link_of_a_page_leads_somewhere(path: Path) -> None:
     text = re.sub(r"^```.*?^```$", "", text_of(path), flags=re.DOTALL | re.MULTILINE)
     for target in LINK.findall(text):

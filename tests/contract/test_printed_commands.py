@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
+from each import each
 from typed_commands import unknown_options
 
 from pipelines.cli import COMMANDS
@@ -64,7 +64,7 @@ def test_messages_name_commands() -> None:
     assert len(FOUND) > 80
 
 
-@pytest.mark.parametrize("path", sorted({path for path, _ in (*FOUND, *OF_PAGES)}))
+@each(sorted({path for path, _ in (*FOUND, *OF_PAGES)}))
 def test_a_command_in_a_message_exists_with_its_options(path: str) -> None:
     for line in (line for place, line in (*FOUND, *OF_PAGES) if place == path):
         closed = line if line.count('"') % 2 == 0 else line.replace('"', "")

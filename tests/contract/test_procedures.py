@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 from scipy import signal
 from stopped_capture import Stopped, Stopping
 
@@ -140,14 +141,14 @@ def test_a_procedure_that_its_module_does_not_offer_is_refused(tmp_path: Path, m
         find_procedures("forgotten", [str(tmp_path / "forgotten")])
 
 
-@pytest.mark.parametrize("ability", [Evaluated, OnEquipment, SetsEquipment, FromWaveforms])
+@each([Evaluated, OnEquipment, SetsEquipment, FromWaveforms])
 def test_every_ability_has_methods_without_which_a_procedure_cannot_be_made(ability) -> None:
     bare = type("Bare", (ability,), {"steps": lambda *_: []})
     with pytest.raises(TypeError, match="abstract method"):
         bare()
 
 
-@pytest.mark.parametrize("name", PROCEDURES)
+@each(PROCEDURES)
 def test_a_procedure_can_do_what_its_steps_ask_for(name: str, tmp_path: Path) -> None:
     procedure = PROCEDURES[name]
     own = load_steps(tmp_path, name) if name in PARTS else []
@@ -158,7 +159,7 @@ def test_a_procedure_can_do_what_its_steps_ask_for(name: str, tmp_path: Path) ->
     assert any(one.on_table for one in orders) == isinstance(procedure, SetsEquipment)
 
 
-@pytest.mark.parametrize("name", PROCEDURES)
+@each(PROCEDURES)
 def test_a_procedure_is_documented(name: str) -> None:
     one = PROCEDURES[name]
     assert all((one.states, one.source, one.title, type(one).__doc__, one.part.__doc__))
@@ -173,7 +174,7 @@ def test_the_reference_is_up_to_date() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", FIGURES)
+@each(FIGURES)
 def test_a_figure_of_a_procedure_may_have_a_limit_and_is_decided(name: str, run) -> None:
     assert UNITS[name] == FIGURES[name].unit
     rows = run.table("procedure_figures")
@@ -187,7 +188,7 @@ def test_a_figure_of_a_procedure_may_have_a_limit_and_is_decided(name: str, run)
         assert f"{name}: not determined" in reasons
 
 
-@pytest.mark.parametrize("name", [name for name, one in PROCEDURES.items() if one.roles])
+@each([name for name, one in PROCEDURES.items() if one.roles])
 def test_a_station_without_the_equipment_is_refused(name: str, tmp_path: Path) -> None:
     from pipelines.procedures import refuse_unusable
 
@@ -209,7 +210,7 @@ def test_a_capture_that_stops_goes_on_bit_for_bit(name: str, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", OWN)
+@each(OWN)
 def test_a_procedure_is_drawn(name: str, run) -> None:
     points = run.table("procedure_points")
     own = points[(points["procedure"] == name) & (points["unit"] == "P2")]

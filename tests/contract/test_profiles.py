@@ -5,6 +5,7 @@ import struct
 from contextlib import contextmanager
 
 import pytest
+from each import each
 from small_station import lot_of, plant_of
 
 from schemas.errors import RecipeInvalid, StationRefused
@@ -175,7 +176,7 @@ def test_unknown_profile_is_refused_with_what_looks_like_it():
         load_profile("watlow_f4")
 
 
-@pytest.mark.parametrize("name", preset_names())
+@each(preset_names())
 def test_every_preset_can_be_built_and_read(name):
     plant = plant_of(load_station(), lot_of(2, name.lower()))
     plant.advance(1_000_000)

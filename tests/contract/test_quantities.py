@@ -5,8 +5,8 @@ from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
 
-import pytest
 from capture_double import small_job
+from each import each
 
 from inertial.criticism.drivers import quantities
 from inertial.expressions import QUANTITIES
@@ -40,7 +40,7 @@ HERE = {
 """Where columns may be written out."""
 
 
-@pytest.mark.parametrize("row", RECORDED, ids=lambda row: row.column)
+@each(RECORDED, lambda row: row.column)
 def test_a_row_is_whole(row, tmp_path):
     assert row.label
     assert (row.column in KNOWN_COLUMNS) == bool(row.attribute)

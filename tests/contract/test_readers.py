@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from each import each
 from scipy.io import savemat, wavfile
 
 from pipelines.importers import files
@@ -92,7 +93,7 @@ SAMPLES = {"parquet": parquet, "matlab": matlab, "text": text, "hdf5": hdf5, "uf
            "wav": wav, "lvm": lvm}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", READERS)
+@each(READERS)
 def test_a_reader_says_what_it_is_and_is_in_the_guide(name: str) -> None:
     reader = READERS[name]
     assert name == reader.NAME
@@ -113,7 +114,7 @@ def test_every_optional_format_is_in_the_extra_that_has_them_all() -> None:
     assert EXTRAS["recordings"] == [f"tumbleline[{','.join(sorted(wanted))}]"]
 
 
-@pytest.mark.parametrize("name", READERS)
+@each(READERS)
 def test_a_reader_reads_its_sample_and_no_other_claims_it(name: str, tmp_path: Path, request) -> None:
     path = tmp_path / "no-ending"
     group = ""
@@ -155,7 +156,7 @@ def check(name: str, content) -> None:
         assert content.interval_s == pytest.approx(0.01)
 
 
-@pytest.mark.parametrize("name", [name for name, reader in READERS.items() if reader.EXTRA])
+@each([name for name, reader in READERS.items() if reader.EXTRA])
 def test_a_missing_library_is_named_with_its_installation(name: str, monkeypatch) -> None:
     def missing(module: str):
         raise ImportError(module)
@@ -196,7 +197,7 @@ def test_a_matlab_file_with_a_bad_checksum_is_refused_with_a_remedy(tmp_path: Pa
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", [*SAMPLES, *FROM_ELSEWHERE])
+@each([*SAMPLES, *FROM_ELSEWHERE])
 def test_a_file_that_ends_too_early_is_refused_in_one_line_or_read_as_far_as_it_goes(
     name: str, tmp_path: Path, request
 ) -> None:

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from each import each
 
 from deploy.release import unpack
 from pipelines.archive import Archive
@@ -34,21 +35,21 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> ReportContext:
     return ReportContext(Archive(folder).run("latest"), {})
 
 
-@pytest.mark.parametrize("one", FOUND, ids=lambda module: module.__name__)
+@each(FOUND, lambda module: module.__name__)
 def test_a_panel_explains_itself_and_is_in_the_guide(one) -> None:
     assert one.__doc__
     assert one.render.__doc__
     assert not one.TITLE or f"**{one.TITLE}.**" in GUIDE
 
 
-@pytest.mark.parametrize("one", panels(PANELS), ids=lambda module: module.__name__)
+@each(panels(PANELS), lambda module: module.__name__)
 def test_a_panel_of_the_run_is_whole_html(one, report: ReportContext) -> None:
     html = one.render(report)
     assert html or one.__name__ in NOT_OF_OLD_RUNS
     assert closed(html or "")
 
 
-@pytest.mark.parametrize("one", panels(UNIT_PANELS), ids=lambda module: module.__name__)
+@each(panels(UNIT_PANELS), lambda module: module.__name__)
 def test_a_panel_of_a_unit_is_whole_html(one, report: ReportContext) -> None:
     for unit in report.calibrated:
         html = one.render(unit)

@@ -5,7 +5,7 @@ import re
 import sys
 from pathlib import Path
 
-import pytest
+from each import each
 
 from inertial import decisions
 
@@ -36,7 +36,7 @@ def test_the_numbers_are_all_found() -> None:
     assert set(how()) == set(STATED)
 
 
-@pytest.mark.parametrize("name", sorted(STATED))
+@each(sorted(STATED))
 def test_every_number_has_a_derivation_or_a_characteristic_with_its_command(name: str) -> None:
     text = " ".join(STATED[name].split())
     derived = re.search(r"Derived: .{30,}", text)
@@ -54,7 +54,7 @@ def test_a_command_of_its_own_is_the_one_that_the_number_states() -> None:
         assert f"benchmarks/{command}" in " ".join(STATED[name].split()), name
 
 
-@pytest.mark.parametrize("name", ["COMMON", "CLASS_WIDTH", "ADEQUATE_ABOVE", "CONFIRMED", "PRIOR_DOF"])
+@each(["COMMON", "CLASS_WIDTH", "ADEQUATE_ABOVE", "CONFIRMED", "PRIOR_DOF"])
 def test_simulations_of_a_decision_alone_run(name: str) -> None:
     lines = list(DERIVED[name](1, 7))
     assert lines

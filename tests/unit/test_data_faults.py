@@ -3,6 +3,7 @@
 import lots
 import numpy as np
 import pytest
+from each import each
 
 from inertial.data_errors.faults.quantised import lattice_step
 from pipelines.diagnosis.diagnose import diagnose
@@ -150,7 +151,7 @@ def test_no_notice_is_given_of_dwells_left_out_on_purpose(rng):
     assert not any("missing" in text for text in examination(table, None, BASE, ["U001:5"]).document["warnings"])
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@each(FAULTS)
 def test_a_fault_is_found_where_units_lack_dwells(name, rng):
     table = lots.lot(rng)
     rows = table.index[table["unit"] == "U000"].to_numpy()
@@ -168,7 +169,7 @@ def test_the_other_units_are_diagnosed(rng):
     assert diagnosis["recommended"] == ["third_order"]
 
 
-@pytest.mark.parametrize("seed", range(8))
+@each(range(8))
 def test_clean_lots_raise_no_alarm(seed):
     rng = np.random.default_rng(seed)
     assert diagnose(lots.lot(rng, plan="six" if seed % 2 else "fibonacci", units=1 + seed % 3))["blocked_by"] == []

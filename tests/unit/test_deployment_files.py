@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from each import each
 from typer.main import get_command
 
 from pipelines.cli import app
@@ -53,7 +54,7 @@ def unit(name: str) -> dict[str, dict[str, list[str]]]:
     return sections
 
 
-@pytest.mark.parametrize("name", UNITS)
+@each(UNITS)
 def test_a_service_may_do_little(name: str) -> None:
     service = unit(name)["Service"]
     for wanted in SEALED.split():
@@ -64,7 +65,7 @@ def test_a_service_may_do_little(name: str) -> None:
     assert service["IPAddressAllow"][0] == "localhost"
 
 
-@pytest.mark.parametrize("name", SERVING)
+@each(SERVING)
 def test_a_service_that_ended_is_started_again_but_not_for_ever(name: str) -> None:
     service = unit(name)["Service"]
     assert (service["Type"], service["Restart"], service["RestartSec"]) == (["exec"], ["always"], ["10"])
@@ -81,12 +82,12 @@ def test_the_backup_is_made_every_night_and_may_write_to_its_own_folder_only() -
     assert "Persistent=true" in timer
 
 
-@pytest.mark.parametrize("name", ["tumbleline-server", WORKER, "tumbleline-monitor"])
+@each(["tumbleline-server", WORKER, "tumbleline-monitor"])
 def test_a_service_that_speaks_with_the_orchestrator_gets_the_key_as_a_credential(name: str) -> None:
     assert "prefect-auth:/etc/tumbleline/prefect-auth" in unit(name)["Service"]["LoadCredential"]
 
 
-@pytest.mark.parametrize("name", UNITS)
+@each(UNITS)
 def test_a_service_holds_no_key_and_writes_below_its_own_folders_only(name: str) -> None:
     service = unit(name)["Service"]
     assert "AUTH_STRING" not in str(service)
@@ -106,7 +107,7 @@ def test_the_worker_is_asked_to_stop_and_its_watchdog_has_time() -> None:
     assert service["OOMPolicy"] == ["continue"]
 
 
-@pytest.mark.parametrize("name", ["server", "workbench", "monitor"])
+@each(["server", "workbench", "monitor"])
 def test_a_server_has_more_files_than_connections(name: str) -> None:
     assert int(unit(f"tumbleline-{name}")["Service"]["LimitNOFILE"][0]) >= 4 * MOST
 
@@ -135,7 +136,7 @@ def test_systemd_has_nothing_against_a_service(name: str, tmp_path: Path) -> Non
     assert float(level[1]) <= MOST_EXPOSED
 
 
-@pytest.mark.parametrize("name", [*SERVICES, "database"])
+@each([*SERVICES, "database"])
 def test_a_container_may_do_little(name: str) -> None:
     service = SERVICES.get(name) or PLANT["services"][name]
     assert service["init"] is True
@@ -150,7 +151,7 @@ def test_a_container_may_do_little(name: str) -> None:
     assert name in ENDING or service["stop_grace_period"]
 
 
-@pytest.mark.parametrize("name", SERVICES)
+@each(SERVICES)
 def test_a_container_gets_the_key_as_a_secret_and_runs_as_a_user(name: str) -> None:
     service = SERVICES[name]
     assert "user" not in service  # that of the image
@@ -257,7 +258,7 @@ def test_every_command_of_the_product_is_one_that_is_there() -> None:
         leaf.make_context(name, rest)
 
 
-@pytest.mark.parametrize("page", PAGES)
+@each(PAGES)
 def test_what_the_commands_of_a_page_name_is_there(page: str) -> None:
     text = PAGES[page]
     given = "\n".join(line for line in text.splitlines() if line.startswith("$ "))
@@ -274,7 +275,7 @@ def test_what_the_commands_of_a_page_name_is_there(page: str) -> None:
         assert profile in SERVICES
 
 
-@pytest.mark.parametrize("name", ["server.conf", "worker.conf"])
+@each(["server.conf", "worker.conf"])
 def test_a_drop_in_of_a_plant_changes_its_unit_without_a_remark_of_systemd(name: str, tmp_path: Path) -> None:
     base = {"server.conf": "tumbleline-server", "worker.conf": WORKER}[name]
     text = (DEPLOY / "plant" / name).read_text(encoding="utf-8")

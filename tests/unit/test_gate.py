@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from each import each
 from hypothesis import given
 from hypothesis import strategies as st
 from other_devices import station_with
@@ -43,7 +44,7 @@ class Nowhere:
     ask = tell
 
 
-@pytest.mark.parametrize("name", WITH_REGISTERS)
+@each(WITH_REGISTERS)
 def test_only_whole_writable_registers_pass(name):
     profile, nowhere = load_profile(name), Nowhere()
     gated = GatedLink(nowhere, "here", {7: profile})
@@ -163,7 +164,7 @@ def test_a_simulated_station_has_no_serial_line():
         links.registers("outer")
 
 
-@pytest.mark.parametrize("value", ["inf", "nan", "1_0", " 20.0", "0x14", "20.0;STOP"])
+@each(["inf", "nan", "1_0", " 20.0", "0x14", "20.0;STOP"])
 def test_a_value_that_is_no_plain_number_is_refused(value: str) -> None:
     gated = GatedLines(Nowhere(), "here", load_profile("espec_p300"))
     with pytest.raises(StationRefused, match="no such command"):
@@ -177,7 +178,7 @@ def test_a_command_without_one_place_for_its_value_is_refused_in_the_profile() -
     assert not Command(name="state", ask="STAT?").writable
 
 
-@pytest.mark.parametrize("register", ["memory_state", "erases_a", "endurance"])
+@each(["memory_state", "erases_a", "endurance"])
 def test_a_memory_whose_status_is_no_number_is_refused_by_the_name_of_the_register(register: str) -> None:
     values = dict.fromkeys(("memory_state", "erases_a", "erases_b", "endurance"), 1.0) | {register: math.nan}
     state = SimpleNamespace(enumeration={"ready": 1})

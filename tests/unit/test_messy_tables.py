@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import recordings
+from each import each
 
 from inertial.errors import NotIdentified
 from pipelines.importers import files
@@ -73,7 +74,7 @@ def test_three_decimals_are_no_thousands(rows: list[list[float]], decimal: str, 
     assert not any("thousands" in one for one in remarks)
 
 
-@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+@each(["utf-16-le", "utf-16-be"])
 def test_utf_16_without_its_mark_is_read(encoding: str, tmp_path: Path) -> None:
     table, remarks = read(tmp_path, sheet("d", ",", COUNTS), encoding)
     assert table["ax"].tolist()[:3] == [16005, -12, 7]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 
 from inertial import effects as catalogue
 from inertial import operators
@@ -95,7 +96,7 @@ def test_draws_worked_on_together_are_those_drawn_one_after_the_other() -> None:
     np.testing.assert_allclose(kept.worst(looks, 7)[0], apart[1], rtol=1e-9)
 
 
-@pytest.mark.parametrize("rows", [1, 3, 8, 9, 30])
+@each([1, 3, 8, 9, 30])
 def test_a_recursion_of_few_signals_is_that_of_many(rows: int, rng: np.random.Generator) -> None:
     keep, drive, start = rng.random(40), rng.normal(size=(rows, 40)), rng.normal(size=rows)
     expected = [start]

@@ -1,10 +1,11 @@
-"""Physics that the catalogue lacks is told unexplained: no effect, and no sudden change of handling, stands in its place."""
+"""Physics that the catalogue lacks: what else is told of it, and the curves that it is compared with."""
 
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 
 from inertial import effects
 from inertial.criticism.curves import fit_curve
@@ -19,8 +20,6 @@ from pipelines.tables.dwells import lot_of, measured
 _ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(_ROOT / "benchmarks" / "worlds"), str(_ROOT / "tests" / "blind")]
 
-from physics import OUTSIDE
-from tables import FAULTS
 from truth import case
 from world import World, make
 
@@ -30,41 +29,12 @@ BASE = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature"
 SEED = 6_400_000
 
 
-def said(world: World, seed: int) -> dict:
-    made = make(world, SEED + seed)
-    return diagnose(made.dwells, made.history)
-
-
 def run_of(world: World, seed: int) -> ExaminedRun:
     made = make(world, SEED + seed)
     return ExaminedRun(lot_of(measured(made.dwells, made.history), square=False), BASE)
 
 
-@pytest.mark.parametrize("name", OUTSIDE)
-def test_what_is_of_no_catalogue_is_unexplained(name: str) -> None:
-    world = World(hidden=((name, 2.0),))
-    document = said(world, 1)
-    assert document["adequate"] is False
-    # the noise of the measurement is that beside the dependence
-    assert document["error"]["floor_ug"] < 1.3 * make(world, SEED + 1).floor_ug < document["error"]["rms_ug"]
-    # a dwell in which it is largest may stand out by itself
-    assert [group["effects"] for group in document["classes"] if group["effects"] != ["bad_dwell"]] == []
-    assert document["unexplained"]["driver"] in {"unit_C", "chamber_C", "time_s", "since_power_s"}
-
-
-@pytest.mark.parametrize("name", ["fixture_bends", "axes_bend_with_heat", "cubic_with_heat"])
-def test_no_effect_is_so_large_that_the_model_is_adequate(name: str) -> None:
-    # axes and transfer curves that follow the temperature show in no bias; an excess of them had counted as noise
-    assert said(World(hidden=((name, 8.0),)), 2)["adequate"] is False
-
-
-def test_an_adequate_model_stays_adequate() -> None:
-    documents = [said(World(), seed) for seed in range(10, 16)]
-    assert [d["adequate"] for d in documents].count(True) >= 5
-    assert all(d["classes"] == [] for d in documents)
-
-
-@pytest.mark.parametrize("index", [0, 2])
+@each([0, 2])
 def test_a_recorded_column_is_not_told_as_a_curve_of_time(index: int) -> None:
     # a humidity that wanders slowly, with an effect that saturates: a curve of time follows it nearly as well
     run = case("covariate_curve", index, 8080)
@@ -79,34 +49,6 @@ def test_dwells_in_which_the_supply_sags_are_no_wrong_poses() -> None:
     document = diagnose(run.dwells, run.history)
     assert document["classes"] == []
     assert document["unexplained"]["driver"] == "supply_V"
-
-
-@pytest.mark.parametrize("degrees", [0.1, 2.0, 20.0])
-def test_a_wrong_pose_is_told_however_far_it_is_off(degrees: float) -> None:
-    made = make(World(fault="wrong_pose", amount=degrees), SEED + 70)
-    document = diagnose(made.dwells, made.history)
-    assert [group["effects"][0] for group in document["classes"]] == ["wrong_pose"]
-    assert tuple(document["classes"][0]["dwells"]) == made.faults[0].dwells
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_a_unit_that_moves_after_the_table_slipped_is_told(seed: int) -> None:
-    world = FAULTS["slip_and_moved"]
-    made = make(world, SEED + 20 + seed)
-    document = diagnose(made.dwells, made.history)
-    moved = next(fault for fault in made.faults if "unit_moved" in fault.names)
-    told = {group["effects"][0]: group for group in document["classes"]}
-    assert set(told) == {"table_slip", "unit_moved"}
-    assert told["unit_moved"]["units"] == list(moved.units)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_two_units_that_moved_are_no_drift(seed: int) -> None:
-    made = make(World(fault="unit_moved", amount=0.5, beside=(("unit_moved", 0.5),)), SEED + 30 + seed)
-    document = diagnose(made.dwells, made.history)
-    told = sorted(group["units"] for group in document["classes"] if group["effects"][0] == "unit_moved")
-    assert told == sorted(list(fault.units) for fault in made.faults)
-    assert document["unexplained"] is None
 
 
 def test_a_curve_across_the_axes_has_the_shape_of_the_truth() -> None:
@@ -145,7 +87,7 @@ def test_columns_across_the_axes_are_products_of_forces() -> None:
     assert not np.any(own.reshape(2, 3, problem.n, -1)[np.repeat(before[:, None], 3, axis=1)])
 
 
-@pytest.mark.parametrize("shift", [1500.0, 1780.0, 1800.0, 1830.0, 1860.0, 3000.0])
+@each([1500.0, 1780.0, 1800.0, 1830.0, 1860.0, 3000.0])
 def test_an_effect_that_died_away_long_ago_leaves_the_range_of_numbers_quietly(shift: float) -> None:
     made = make(World(units=4), SEED + 80)
     dwells = made.dwells.assign(since_power_s=made.dwells["since_power_s"] + shift)

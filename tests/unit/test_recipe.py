@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from capture_double import recipe_file, small_job
+from each import each
 
 from inertial.poses import NAMED
 from pipelines.jobs.job import Request
@@ -21,7 +22,7 @@ def refusal(folder: Path, *changes: tuple[str, str]) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("name", sample_names())
+@each(sample_names())
 def test_every_built_in_recipe_makes_a_job(name: str) -> None:
     job = Request(recipe=name).job()
     assert job.recipe.soak_min_s >= 900.0

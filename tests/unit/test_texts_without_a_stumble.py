@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from each import each
 from typer.testing import CliRunner
 
 from inertial.counts import size_text
@@ -115,7 +116,7 @@ def test_a_contribution_of_nothing_is_not_among_the_largest() -> None:
     assert without_nothing("noise of the dwells 80 %, supply 20 %") == "noise of the dwells 80 %, supply 20 %"
 
 
-@pytest.mark.parametrize("name", ["line-six.toml", "line-six", "recipes/line-six.toml"])
+@each(["line-six.toml", "line-six", "recipes/line-six.toml"])
 def test_a_sample_recipe_that_is_not_here_is_named_with_its_path(name: str) -> None:
     with pytest.raises(RecipeInvalid) as end:
         load_recipe(name)
@@ -127,7 +128,7 @@ def test_a_sample_recipe_that_is_not_here_is_named_with_its_path(name: str) -> N
     assert "sample" not in str(end.value)
 
 
-@pytest.mark.parametrize("name", ["simulated-awry", "simulated-awry.toml"])
+@each(["simulated-awry", "simulated-awry.toml"])
 def test_a_sample_station_that_is_not_here_is_named_with_its_path(name: str) -> None:
     with pytest.raises(RecipeInvalid) as end:
         load_station(Path(name))

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from each import each
 
 from pipelines.importers import clocks
 from pipelines.importers.content import Content
@@ -54,7 +55,7 @@ def test_the_unit_of_a_counter_is_recognised_and_said(time, name: str, stated: d
     assert any("time in " in remark and f"{rate:.4g} Hz" in remark for remark in remarks)
 
 
-@pytest.mark.parametrize("step", [1, 2, 1000, 500_000])
+@each([1, 2, 1000, 500_000])
 def test_steps_that_several_units_allow_are_asked_about(step: int) -> None:
     with pytest.raises(WrongUse, match=r"steps of .* Hz in .* Hz in .*add --units time="):
         seconds(STEPS * step)

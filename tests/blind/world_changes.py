@@ -1,0 +1,201 @@
+"""What is done to the dwells of rows of the world table, and what is asked of a verdict besides."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
+
+from world import Made
+
+Check = Callable[[dict, Made], bool]
+
+
+def raised(dwells: pd.DataFrame, unit: int, axis: str, size: float, dwells_from: int = 0, until: int = 999) -> None:
+    """The output of one axis of a unit is ``size`` g higher in a range of dwells."""
+    name = dwells["unit"].unique()[unit]
+    chosen = (dwells["unit"] == name) & (dwells["dwell"] >= dwells_from) & (dwells["dwell"] < until)
+    dwells.loc[chosen, f"out_{axis}"] += size
+
+
+def in_middle_soak(*axes: tuple[int, str, float]) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    """The bias of some axes of some units is another in the second of three soaks."""
+
+    def change(dwells: pd.DataFrame) -> pd.DataFrame:
+        for unit, axis, size in axes:
+            raised(dwells, unit, axis, size, 24, 48)
+        return dwells
+
+    return change
+
+
+def last_unit_jumps(dwells: pd.DataFrame) -> pd.DataFrame:
+    raised(dwells, -1, "z", 400e-6, 40)
+    return dwells
+
+
+def telegraph(dwells: pd.DataFrame) -> pd.DataFrame:
+    """One axis jumps down for good, up for one dwell, and up for good."""
+    for dwell, size in ((1, -300e-6), (32, 250e-6), (33, -250e-6), (42, 320e-6)):
+        raised(dwells, 0, "x", size, dwell)
+    return dwells
+
+
+def drifting_scale(rate: float) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    """The scale factor of every unit drifts by its own share of an exponential of time."""
+
+    def change(dwells: pd.DataFrame) -> pd.DataFrame:
+        drift = 400e-6 * np.exp(-dwells["time_s"].to_numpy() / rate)
+        sizes = dict(zip(dwells["unit"].unique(), (1.0, 1.4, 0.7, 1.2, 0.9, 1.1), strict=True))
+        for axis in "xyz":
+            dwells[f"out_{axis}"] *= 1.0 + drift * dwells["unit"].map(sizes).to_numpy()
+        return dwells
+
+    return change
+
+
+def same_pose(dwells: pd.DataFrame) -> np.ndarray:
+    """Rows of two dwells of one pose."""
+    angles = dwells[["outer_deg", "inner_deg"]].to_numpy()
+    pose = angles[(dwells["dwell"] == 5).to_numpy()]
+    return np.flatnonzero(np.all(np.abs(angles - pose) < 1e-6, axis=1))[:2]
+
+
+def two_dwells_of_a_pose(dwells: pd.DataFrame) -> pd.DataFrame:
+    """They are off in different directions."""
+    for axis, row in zip(("out_x", "out_y"), same_pose(dwells), strict=True):
+        dwells.loc[row, axis] += 1e-3
+    return dwells
+
+
+def half_exchanged(dwells: pd.DataFrame) -> pd.DataFrame:
+    """Half of the difference between two units is exchanged from a dwell on."""
+    one, other = (dwells["unit"] == name for name in ("W001", "W003"))
+    late = dwells["dwell"] >= 30
+    for axis in ("out_x", "out_y", "out_z"):
+        apart = 0.5 * (dwells.loc[one & late, axis].to_numpy() - dwells.loc[other & late, axis].to_numpy())
+        dwells.loc[one & late, axis] -= apart
+        dwells.loc[other & late, axis] += apart
+    return dwells
+
+
+def late_and_with_gaps(dwells: pd.DataFrame) -> pd.DataFrame:
+    dwells.loc[dwells["unit"] == "W002", "time_s"] += 40.0
+    return dwells.drop(index=dwells.index[(dwells["unit"] == "W003") & dwells["dwell"].isin([5, 6, 40])])
+
+
+def walk_is_known(document: dict, _: Made) -> bool:
+    # soaks that only climb hide any hysteresis that is narrower than their steps
+    (dark,) = (row for row in document["unseen_in_part"] if row["effect"] == "thermal_hysteresis")
+    narrow = dark["parameter"] == "half_width" and abs(dark["from"] - 1.0) < 1e-6 and 15.0 < dark["to"] < 35.0
+    return document["error"]["walk_share"] > 100.0 and narrow
+
+
+def small_and_seen(document: dict, _: Made) -> bool:
+    # a fifth of the noise of a dwell about the record's mean, most of which is walk: 20 of 116 µg, p below 1e-10
+    return document["classes"][0]["size_ug"] < 0.2 * document["error"]["floor_ug"]
+
+
+def carried_by_the_dwell(document: dict, _: Made) -> bool:
+    (group,) = document["classes"]
+    return document["influence"][0] == {"unit": group["units"][0], "dwell": group["dwells"][0], "share": 1.0}
+
+
+def three_soaks_are_said(document: dict, _: Made) -> bool:
+    # with three soaks an offset of one is, beside linear terms, an offset of another: all three are said
+    evidence = document["classes"][0]["evidence"]
+    return "0.5" in evidence and evidence.count("K off in soak") == 3
+
+
+def time_constant_is_right(document: dict, _: Made) -> bool:
+    tau = float(document["classes"][0]["evidence"].split("time constant of ")[1].split(" s")[0])
+    return abs(tau - 300.0) <= 30.0 and document["error"]["rms_ug"] < 1.2 * document["error"]["floor_ug"]
+
+
+def both_faults_stand(document: dict, made: Made) -> bool:
+    moved, dwell = made.faults
+    by_name = {group["effects"][0]: group for group in document["classes"]}
+    told, carried = by_name["unit_moved"], {row["unit"] for row in by_name["unit_moved"]["influence"]}
+    stands = told["without_influence"]["p_value"] < 1e-3 and carried == set(moved.units)
+    return stands and by_name["bad_dwell"]["dwells"] == list(dwell.dwells)
+
+
+def verdict_is_carried(document: dict, _: Made) -> bool:
+    group, shares = document["classes"][0], [row["share"] for row in document["influence"]]
+    better = group["heldout_after_ug"] < group["heldout_before_ug"]
+    spread = 0 < len(shares) <= 8 and all(0.0 < share < 0.5 for share in shares)
+    return better and spread and document["without_influence"]["p_value"] < 1e-6
+
+
+def from_one_dwell(document: dict, made: Made) -> bool:
+    (group,), (told,) = document["classes"], made.faults
+    said = f"{told.units[0]} and {told.units[1]}: exchanged before this dwell"
+    return group["dwells"] == [told.dwells[0]] and group["evidence"].startswith(said)
+
+
+def jump_has_place_and_size(document: dict, made: Made) -> bool:
+    (group,) = document["classes"]
+    placed = (group["units"], group["dwells"]) == ([made.dwells["unit"].unique()[-1]], [40])
+    if group["effects"][0] != "bias_jump":
+        return placed
+    return placed and abs(float(group["evidence"].split("changed by ")[1].split(" ")[0]) - 400.0) <= 60.0
+
+
+def unsteady(*units: str) -> Check:
+    """The units whose bias is unsteady are told, each with its sizes from a line over temperature."""
+
+    def check(document: dict, _: Made) -> bool:
+        groups = document["classes"]
+        told = sorted(group["units"][0] for group in groups if "bias_unsteady" in group["effects"])
+        sizes = [abs(float(group["evidence"].split("(")[1].split(" µg")[0].split(", ")[1])) for group in groups]
+        return told == sorted(units) and all(abs(size - 333.0) <= 99.9 for size in sizes)
+
+    return check
+
+
+def some_unsteady(document: dict, _: Made) -> bool:
+    return any({"bias_unsteady", "bias_jump"} & set(group["effects"]) for group in document["classes"])
+
+
+def jumps_are_told(document: dict, _: Made) -> bool:
+    told = {dwell for group in document["classes"] for dwell in group["dwells"]}
+    told |= {row["dwell"] for row in document["removed"]["dwells"]}
+    return bool(told & {0, 1}) and told >= {32, 42}
+
+
+def no_reference_step(document: dict, _: Made) -> bool:
+    return not any("reference_step" in group["effects"] for group in document["classes"])
+
+
+def not_exchanged(document: dict, _: Made) -> bool:
+    return not any("units_swapped" in group["effects"] for group in document["classes"])
+
+
+def of_the_pose(document: dict, made: Made) -> bool:
+    rows = made.dwells.loc[same_pose(made.dwells), "dwell"]
+    return sorted(dwell for group in document["classes"] for dwell in group["dwells"]) == sorted(rows)
+
+
+def noise_beside_the_dependence(document: dict, made: Made) -> bool:
+    # a dwell in which the dependence is largest may stand out by itself
+    named = [group["effects"] for group in document["classes"] if group["effects"] != ["bad_dwell"]]
+    return named == [] and document["error"]["floor_ug"] < 1.3 * made.floor_ug < document["error"]["rms_ug"]
+
+
+def tails_are_listed(document: dict, _: Made) -> bool:
+    return document["removed"] is None or document["removed"]["heavy_tails"] is True
+
+
+def reason_names_every_unit(document: dict, _: Made) -> bool:
+    return "every unit (2)" in document["reason"]
+
+
+def noise_of_the_lot(document: dict, made: Made) -> bool:
+    return abs(document["error"]["rms_ug"] - made.floor_ug) <= 0.4 * made.floor_ug
+
+
+def step_with_hysteresis(document: dict, _: Made) -> bool:
+    return any({"thermal_hysteresis", "step_change"} <= set(group["effects"]) for group in document["classes"])
