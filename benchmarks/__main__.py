@@ -82,7 +82,7 @@ def main() -> int:
     for name, short in SHORT.items():
         if options.only and name not in options.only:
             continue
-        for arguments in full[name] if options.full else [shlex.split(short)]:
+        for arguments in full.get(name, [shlex.split(short)]) if options.full else [shlex.split(short)]:
             command = [*call(name), *arguments]
             print(f"== python {shlex.join(command)}", flush=True)
             start = time.perf_counter()
