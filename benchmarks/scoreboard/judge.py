@@ -19,7 +19,7 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 THERMAL = {"bias_temperature", "scale_temperature"}
-"""What every device of the second generator has, and a plan at one temperature leaves out of the model that is judged by default."""
+"""What every device of the second generator has; a plan at one temperature leaves it out of the model that is judged."""
 ROOT = HERE.parents[1]
 Outcome = Mapping[str, bool | None]
 
