@@ -170,7 +170,7 @@ def test_a_page_fits_a4(browser: Any, pages: dict[str, Path], name: str, tmp_pat
 
 def test_a_run_of_one_soak_has_no_caption_without_a_picture(browser: Any, pages: dict[str, Path]) -> None:
     text = pages["diagnosis"].read_text(encoding="utf-8")
-    assert "Adequate" in text
+    assert "ADEQUATE" in text
     assert "reached heating" not in text
     assert "temperatures_C" in SMALL
 

@@ -1,5 +1,6 @@
 """Processes that die or stand still while they drive: the station is safe soon after, and free for the next."""
 
+import contextlib
 import json
 import os
 import platform
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 from driven_station import FAR, HOT, SLOW, SOON_S, driver, look, safe_within, told
@@ -25,7 +27,13 @@ from stations.safety.leases import Leases, holders, new_holder
 @pytest.fixture(autouse=True)
 def state(tmp_path, monkeypatch):
     monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
-    return tmp_path / "state"
+    yield tmp_path / "state"
+    for process in Path("/proc").glob(
+        "[0-9]*"
+    ):  # a watchdog goes on trying to reach a station that is gone with its test
+        with contextlib.suppress(OSError):
+            if f"TUMBLELINE_STATE={tmp_path / 'state'}".encode() in (process / "environ").read_bytes().split(b"\0"):
+                os.kill(int(process.name), signal.SIGKILL)
 
 
 def test_a_killed_run_leaves_its_station_safe_and_free():
