@@ -62,8 +62,10 @@ class Named:
     def predicts(self) -> bool:
         """Whether the prediction of unfitted dwells is no worse with it: only then it is recommended for a model.
 
-        If dwells left out cannot judge it (NaN), it is not recommended.
+        Where no dwells left out can judge it (NaN), its evidence decides: it was named by it.
         """
+        if np.isnan(self.heldout_before) or np.isnan(self.heldout_after):
+            return True
         return bool(self.heldout_after <= (1.0 + RISES) * self.heldout_before)
 
 

@@ -176,20 +176,22 @@ def left_out(document: dict[str, Any]) -> list[str]:
     return [text for text in (without_single_dwells(document), tails_left_out(document), counted) if text]
 
 
-def why_not_recommended(document: dict[str, Any]) -> list[str]:
-    """Why effects that are named are not recommended for the model."""
+def why_recommended(document: dict[str, Any]) -> list[str]:
+    """Why effects that are named are not recommended for the model, or are by their evidence alone."""
     lines: list[str] = []
     for group in document["classes"]:
-        if group["scope"] == "data" or set(group["effects"]) & set(document["recommended"]):
+        if group["scope"] == "data":
             continue
-        name, before, after = group["effects"][0], group.get("heldout_before_ug"), group["heldout_after_ug"]
+        added = [name for name in group["effects"] if name in document["recommended"]]
+        name, before, after = (added or group["effects"])[0], group.get("heldout_before_ug"), group["heldout_after_ug"]
         if after is None or before is None:
-            why = "no dwells left out can judge it; a fresh run of the same units decides"
-        elif after > before:
-            why = f"the error on dwells left out rises from {short(before)} to {short(after)} µg"
-        else:
-            continue
-        lines.append(f"{name} is not recommended: {why}.")
+            lines.append(
+                f"{name} is recommended by its evidence alone: no dwells left out can judge it; confirm with a fresh run of the "
+                "same units."
+            )
+        elif not added and after > before:
+            rise = f"rises from {short(before)} to {short(after)} µg"
+            lines.append(f"{name} is not recommended: the error on dwells left out {rise}.")
     return lines
 
 
