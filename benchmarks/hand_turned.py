@@ -133,8 +133,11 @@ EFFECTS: dict[str, tuple[Effect, float, float, frozenset[str]]] = {
 
 
 def make(name: str, seed: int, size: float = 10.0) -> pd.DataFrame:
-    """The dwells of a recording; the effect has ``size`` times a dwell's noise (RMS over dwells and axes) that bias, scale and,
-    where the temperature moves, their linear dependence on it leave over."""
+    """The dwells of a recording.
+
+    size : RMS of the effect in the magnitude of the force, in multiples of a dwell's noise, after what bias, sensitivity and,
+    where the temperature moves, their linear dependence on it take up
+    """
     effect, minutes, span, _ = EFFECTS[name]
     hand = Hand(seed, minutes, span)
     added = effect(hand)
