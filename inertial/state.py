@@ -97,13 +97,13 @@ class State:
         """Specific force along the sensor's own axis, (..., n), g; along the fixture's where the misalignment is not known."""
         return (self.force if self.felt is None else self.felt)[..., axis]
 
-    def converted(self, axis: int) -> Array:
+    def converted(self, axis: int, run: float = 1.0) -> Array:
         """What the electronics of an axis has at its input, (..., n), g: the force along it, and the run with temperature.
 
-        The steps of a converter, a limit or a threshold stand elsewhere in a warm unit.
+        The steps of a converter, a limit or a threshold stand elsewhere in a warm unit; those of a mechanism (``run`` 0) do not.
         """
         along = self.along(axis)
-        return along if self.output_run is None else along + self.output_run[..., axis]
+        return along if self.output_run is None else along + run * self.output_run[..., axis]
 
     @cached_property
     def theta(self) -> Array | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from inertial import decisions
 from inertial.criticism.field import Candidates
 from inertial.criticism.whole_dwell import only_tilted
-from inertial.decisions import MATERIAL, NAMED_BELOW, REMAINDER
+from inertial.decisions import JUMPS_RARE, MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.estimation.alternative import Handling, OfOneDwell
 from inertial.estimation.likelihood import Ratio, likelihood_ratio, weighed
 from inertial.estimation.model import Model
@@ -116,9 +116,11 @@ def anything(field: Candidates, model: Model) -> bool:
 
 def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
     """Whether a rival is significant over all tests, exceeds its price, and is large enough to matter."""
-    if rival.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
+    effect = rival.term.effect
+    rare = JUMPS_RARE if isinstance(effect, Handling) and effect.of_one_axis else 0.0
+    if rival.log_p + 0.5 * rare + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
         return False
-    if -rival.cost < np.log(max(field.problem.count, 1)):
+    if -rival.cost - rare < np.log(max(field.problem.count, 1)):
         return False
     return size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
 
