@@ -53,6 +53,7 @@ class State:
         answer to
     output_run : (..., n, 3), g, what bias and scale factor add to the output by their run with temperature, where it is known
     covariates : further recorded quantities by name, (..., n)
+    reference : °C, what ``theta`` counts from
     """
 
     force: Array
@@ -72,6 +73,7 @@ class State:
     output_run: Array | None = None
     covariates: Mapping[str, Array] = field(default_factory=dict[str, Array])
     history: History | None = None
+    reference: float = T_REFERENCE
     memory: dict[tuple[object, ...], Array] = field(
         default_factory=dict[tuple[object, ...], Array], repr=False, compare=False
     )
@@ -107,8 +109,8 @@ class State:
 
     @cached_property
     def theta(self) -> Array | None:
-        """Temperature above 25 °C, (..., n), K."""
-        return None if self.temperature is None else self.temperature - T_REFERENCE
+        """Temperature above the reference, (..., n), K."""
+        return None if self.temperature is None else self.temperature - self.reference
 
     @cached_property
     def temperature_rate(self) -> Array | None:

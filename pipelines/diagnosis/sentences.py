@@ -183,6 +183,11 @@ def why_recommended(document: dict[str, Any]) -> list[str]:
         if group["scope"] == "data":
             continue
         added = [name for name in group["effects"] if name in document["recommended"]]
+        if group["scope"] == "sensor or station":
+            lines.append(
+                f"{' or '.join(group['effects'])} can be of the sensors or of the station (table, fixture, reference): turn the "
+                "units in their seats, or measure them on another station."
+            )
         name, before, after = (added or group["effects"])[0], group.get("heldout_before_ug"), group["heldout_after_ug"]
         if after is None or before is None:
             lines.append(
