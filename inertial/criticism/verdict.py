@@ -58,7 +58,8 @@ class Verdict:
     unexplained : a driver that no effect explains
     removed : single dwells that were left out, those marked that are tails of the noise
     rms : of the residuals of the judged model; floor : of the noise of the measurement, white and wander
-    log_p : natural logarithm of the probability that an adequate model fits as badly somewhere
+    log_p : natural logarithm of the probability that decided: that an adequate model fits as badly somewhere, or that noise
+        explains what was found
     sound : whether the other dwells and the search have nothing against the model
     adequate : None if the data cannot decide, for the reason in ``unjudged``
     """
@@ -126,7 +127,7 @@ def judged(lot: Lot, effects: Sequence[str], rng: Generator) -> Verdict:
         removed=removed,
         rms=rms,
         floor=final.floor() if unexplained is None else min(final.floor(), unexplained.floor),
-        log_p=log_p,
+        log_p=min(log_p, *_decided(searched, unexplained, search.field.looks)),
         sound=sound,
         adequate=_adequate(sound=sound, named_data=named_data, unjudged=unjudged),
         unjudged=unjudged,
@@ -149,6 +150,12 @@ def _about_its_temperature(lot: Lot, effects: Sequence[str]) -> Lot:
     if any("temperature" in drivers_of(state, effect) for effect in catalogue.get_all(effects)):
         return lot
     return replace(lot, state=replace(state, reference=mean, memory={}))
+
+
+def _decided(searched: SearchResult, unexplained: Unexplained | None, looks: int) -> list[float]:
+    """Log probabilities, over all looks, of what is found where the adequacy of the whole does not decide; zero for nothing."""
+    first = [r.log_p + float(np.log(max(looks, 1))) for r in searched.ladder[:1] if searched.added]
+    return [0.0, *first, *([] if unexplained is None else [unexplained.log_p])]
 
 
 def _adequate(*, sound: bool, named_data: bool, unjudged: str) -> bool | None:
