@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inertial import effects as catalogue
+from inertial.criticism.bad_or_effect import bad_beside_effects, candidates_of
 from inertial.criticism.classes import EffectClass, class_of
 from inertial.criticism.drift import Drift, one_drift
-from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
 from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.jumps import jumps_instead
@@ -19,8 +19,6 @@ from inertial.criticism.search import Rival, SearchResult, convincing, judge, se
 from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
 from inertial.data_errors.handling import alternatives
 from inertial.decisions import CLASS_WIDTH, RISES
-from inertial.effects.base import AnyEffect
-from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 from inertial.estimation.alternative import Exchangeable, Handling, Misfit, soaks
 from inertial.estimation.freedom import refuse_without_freedom
 from inertial.estimation.heldout import fit_rms
@@ -138,7 +136,7 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
     """A run without bad dwells and handling errors, and the search for effects in it."""
     run = ExaminedRun(lot, tuple(effects))
     run.listen()
-    run.removed = bad_dwells(run.model())
+    run.removed = bad_beside_effects(run.model(), run.effects)
     searched = mended(run)
     for _ in range(_TURNS):
         if not run.handled and not searched.result.added:
@@ -296,14 +294,6 @@ def _happened(
     evidence = alternative.describe(lot, size, **place)
     evidence += f"; these dwells cannot separate it from {' or '.join(texts)}" if texts else ""
     return evidence, tuple(sorted(dwells))
-
-
-def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
-    """Effects and covariates beyond those that a model holds."""
-    state = base.problem.lot.state
-    effects = [e for e in catalogue.catalogue().values() if e.id not in set(held)]
-    names = [name for name, values in state.covariates.items() if varies(values)]
-    return [*effects, *(Covariate(name) for name in names if f"{COVARIATE_PREFIX}{name}" not in set(held))]
 
 
 def worst(before: LeftOut, after: LeftOut) -> tuple[float, float]:

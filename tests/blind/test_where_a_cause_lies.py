@@ -5,6 +5,8 @@ from truth import case
 
 from benchmarks.hand_turned import EFFECTS
 from benchmarks.hand_turned import make as turned_by_hand
+from benchmarks.made_recordings import Recording
+from benchmarks.made_recordings import make as recorded
 from benchmarks.strangers import make
 from pipelines.diagnosis.diagnose import diagnose
 
@@ -65,3 +67,16 @@ def test_an_effect_of_ten_times_the_noise_is_named_in_one_unit_turned_by_hand(na
     right = EFFECTS[name][3]
     assert [bool(right & set(group["effects"])) for group in document["classes"]] == [True]
     assert right & set(document["recommended"])
+
+
+@pytest.mark.parametrize("seed", [5150006, 5150012])
+def test_the_first_dwells_of_a_warm_up_are_not_bad(seed):
+    warm = Recording(40, "white 280, B 30", warm_up=2000.0)
+    groups = [set(group["effects"]) for group in diagnose(recorded(warm, seed).dwells)["classes"]]
+    assert ["warm_up" in group for group in groups] == [True]
+
+
+def test_a_bad_dwell_is_no_warm_up():
+    spoilt = recorded(Recording(24, "white 25, B 30", bad=1, bad_ug=5000.0), 5150002)
+    (group,) = diagnose(spoilt.dwells)["classes"]
+    assert (group["effects"], tuple(group["dwells"])) == (["bad_dwell"], spoilt.spoilt)

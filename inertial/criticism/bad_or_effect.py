@@ -1,0 +1,53 @@
+"""Bad dwells, but those that an effect explains at a lower price."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inertial import effects as catalogue
+from inertial.criticism.drivers import varies
+from inertial.criticism.field import Candidates
+from inertial.criticism.search import contest, convincing
+from inertial.data_errors.bad_dwells import BadDwell, bad_dwells
+from inertial.effects.base import AnyEffect
+from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
+from inertial.estimation.model import Model
+from inertial.estimation.penalty import price
+
+
+def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
+    """The bad dwells of a lot, without those that an effect explains at a lower price than they have together.
+
+    The first dwells of a sensor that warms up deviate most: left out, they take the warm-up with them.
+
+    Parameters
+    ----------
+    effects : ids of the model
+    """
+    found = bad_dwells(base)
+    if not found:
+        return found
+    field = Candidates(base.problem, candidates_of(base, effects), [])
+    best = next(iter(contest(field, base)), None)
+    if best is None or not convincing(field, base, best):
+        return found
+    kept = bad_dwells(base.with_term(best.term))
+    places = {(d.unit, d.dwell) for d in kept}
+    explained = sum(_score(base, d) for d in found if (d.unit, d.dwell) not in places)
+    return kept if -best.cost > explained else found
+
+
+def _score(base: Model, bad: BadDwell) -> float:
+    """What a bad dwell explains, less the price of its deviation and of its place among all dwells."""
+    units, n = base.problem.lot.state.time.shape
+    dof = max(base.space.dof, 1)
+    drop = dof * float(np.log1p(bad.deviations**2 / dof))
+    return drop - price(drop, bad.by_axis.size) - 2.0 * float(np.log(units * n))
+
+
+def candidates_of(base: Model, held: Sequence[str]) -> list[AnyEffect]:
+    """Effects and covariates beyond those that a model holds."""
+    state = base.problem.lot.state
+    effects = [e for e in catalogue.catalogue().values() if e.id not in set(held)]
+    names = [name for name, values in state.covariates.items() if varies(values)]
+    return [*effects, *(Covariate(name) for name in names if f"{COVARIATE_PREFIX}{name}" not in set(held))]
