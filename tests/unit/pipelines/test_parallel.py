@@ -17,8 +17,8 @@ def square(value: int) -> int:
     return value * value
 
 
-def process(_value: int) -> int:
-    return os.getpid()
+def square_and_process(value: int) -> tuple[int, int]:
+    return value * value, os.getpid()
 
 
 def threads(_value: int) -> int:
@@ -32,17 +32,15 @@ def refuse(value: int) -> int:
     raise DataRejected(f"part {value}: no dwell, one is needed; measure it")
 
 
-def test_results_come_in_the_order_of_the_partitions() -> None:
+def test_results_come_in_the_order_of_the_partitions_and_nothing_to_do_starts_nothing() -> None:
     assert map_partitions(square, [3, 1, 2]) == [9, 1, 4]
-
-
-def test_nothing_to_do_starts_nothing() -> None:
     assert map_partitions(square, [], on_dask("tcp://127.0.0.1:1")) == []
 
 
 def test_several_workers_are_other_processes_and_keep_the_order() -> None:
-    assert map_partitions(square, list(range(5)), workers=2) == [0, 1, 4, 9, 16]
-    assert os.getpid() not in map_partitions(process, [1, 2], workers=2)
+    squares, processes = zip(*map_partitions(square_and_process, list(range(5)), workers=2), strict=True)
+    assert squares == (0, 1, 4, 9, 16)
+    assert os.getpid() not in processes
 
 
 def test_every_partition_is_worked_on_with_one_blas_thread() -> None:

@@ -1,17 +1,12 @@
-"""Compaction: packed files read like single ones, for every reader; a killed compaction loses nothing; open runs refuse it."""
+"""Compaction: packed files read like single ones, for every reader; open runs refuse it."""
 
-import os
 import shutil
-import signal
-import subprocess
-import sys
-import time
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from capture_double import small_run
+from packed_archive import certified_archive, copied, later, logical, packed_zips, single
 
 from pipelines.archive import Archive, files, packs
 from pipelines.archive.backup import copy_archive
@@ -23,48 +18,18 @@ from pipelines.archive.packed_path import PackedPath
 from pipelines.audit.index import up_to_date
 from pipelines.audit.sql import ask
 from pipelines.certificates.ledger import Ledger
-from pipelines.chain.certify import certify
 from pipelines.integrity.archive import verify
 from schemas.errors import ArchiveUnusable, OperatorNeeded
-
-HOUR_S = 3600.0
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An archive with a finished run whose units are certified, all two hours old."""
-    root = tmp_path_factory.mktemp("made") / "archive"
-    run = small_run(root.parent)
-    run.seal()
-    certify(Ledger(root), run)
-    before = time.time() - 2.0 * HOUR_S
-    for place in root.rglob("*"):
-        os.utime(place, (before, before))
-    return root
+    return Path(str(certified_archive(tmp_path_factory.mktemp("made")).root))
 
 
 @pytest.fixture
 def archive(made: Path, tmp_path: Path) -> Archive:
-    shutil.copytree(made, tmp_path / "archive")
-    return Archive(tmp_path / "archive")
-
-
-def logical(archive: Archive) -> dict[str, bytes]:
-    """Every file of an archive as its readers see it, but for locks and what is derived."""
-
-    def below(folder: Path, name: str) -> Iterator[tuple[str, bytes]]:
-        for place in folder.iterdir():
-            here = f"{name}{place.name}"
-            if place.is_dir():
-                yield from below(place, f"{here}/")
-            elif place.name != "lock":
-                yield here, place.read_bytes()
-
-    return {k: v for k, v in below(archive.root, "") if k.partition("/")[0] not in {"index", packs.FOLDER}}
-
-
-def single(archive: Archive) -> list[Path]:
-    return [p for p in Path(str(archive.root)).rglob("*") if p.is_file() and p.name != "lock"]
+    return copied(made, tmp_path / "archive")
 
 
 def test_every_reader_sees_the_same_files(archive: Archive) -> None:
@@ -202,19 +167,6 @@ def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_pat
     assert known.folder("runs/line-1") is None
 
 
-def later(archive: Archive, file: str, data: bytes = b"a later file") -> None:
-    """A file that a later command wrote into a folder of which the rest is packed."""
-    place = Path(str(archive.root)) / file
-    place.parent.mkdir(parents=True, exist_ok=True)
-    place.write_bytes(data)
-    before = time.time() - 2.0 * HOUR_S
-    os.utime(place, (before, before))
-
-
-def packed_zips(archive: Archive) -> list[str]:
-    return sorted(place.name for place in Path(str(archive.root / packs.FOLDER)).glob("*.zip"))
-
-
 @pytest.mark.parametrize(
     ("sizes", "count"),
     [((), 0), ((5,), 1), ((8, 1), 1), ((2, 1), 2), ((9, 5, 1, 1), 2), ((8, 3, 1, 1), 4), ((2**30 - 5, 9), 1)],
@@ -279,100 +231,3 @@ def test_a_damaged_pack_is_not_merged(archive: Archive) -> None:
         compact(archive)
     assert place.is_file()
     assert (archive.root / "runs" / run / "large.json").read_bytes() == bytes(len(data))
-
-
-READING = """
-import sys
-from pathlib import Path
-from pipelines.archive import Archive
-root = Archive(sys.argv[1]).root
-names = sys.stdin.readline().split()
-expected = {name: (root / name).read_bytes() for name in names}
-print("ready", flush=True)
-rounds = 0
-while not (Path(sys.argv[1]) / "stop").exists() or not rounds:
-    assert all((root / name).read_bytes() == data for name, data in expected.items())
-    assert all((root / name).is_file() for name in names)
-    rounds += 1
-print(rounds)
-"""
-
-
-def test_a_reader_finds_every_file_while_packs_are_merged(archive: Archive) -> None:
-    compact(archive)
-    run = archive.run("latest").id
-    names = [name for name in logical(archive) if name.startswith((f"runs/{run}/", "calibrations/"))]
-    words = [sys.executable, "-c", READING, str(archive.root)]
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as reader:
-        assert reader.stdin
-        assert reader.stdout
-        reader.stdin.write(" ".join(names) + "\n")
-        reader.stdin.flush()
-        assert reader.stdout.readline() == "ready\n"
-        merged = 0
-        for count in range(12):
-            later(archive, f"runs/{run}/more/{count}.json", bytes(200_000 * (1 + count)))
-            before = len(packed_zips(archive))
-            compact(archive)
-            merged += len(packed_zips(archive)) <= before
-        (Path(str(archive.root)) / "stop").touch()
-        assert int(reader.stdout.read()) > 1
-    assert reader.returncode == 0
-    assert merged > 5
-
-
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from pipelines.archive import Archive, compaction
-left = int(sys.argv[2])
-def counted(event, arguments):
-    global left
-    writes = event in {"os.rename", "os.remove", "os.rmdir", "os.truncate"}
-    if writes or (event == "open" and "packed" in str(arguments[0]) and sys.argv[3] == "opens"):
-        left -= 1
-        if left < 0:
-            os.kill(os.getpid(), signal.SIGKILL)
-sys.addaudithook(counted)
-compaction.compact(Archive(sys.argv[1]))
-"""
-
-
-def test_killed_at_any_step_leaves_every_file(made: Path, tmp_path: Path) -> None:
-    expected = logical(Archive(str(made)))
-    killed = 0
-    for step in (1, 5, 7, 20, 150):  # before a zip, before its contents, between the packs, among the removals
-        root = tmp_path / f"archive-{step}"
-        shutil.copytree(made, root)
-        ended = subprocess.run([sys.executable, "-c", KILLED, str(root), str(step), "opens"], check=False)
-        killed += ended.returncode == -signal.SIGKILL
-        assert logical(Archive(str(root))) == expected
-        compact(Archive(str(root)))
-        assert logical(Archive(str(root))) == expected
-        assert len(single(Archive(str(root)))) < len(expected) // 10
-        shutil.rmtree(root)
-    assert killed == 5
-
-
-def test_killed_while_merging_leaves_every_file(archive: Archive, tmp_path: Path) -> None:
-    compact(archive)
-    run = archive.run("latest").id
-    later(
-        archive, f"runs/{run}/more.json", bytes((archive.root / packs.FOLDER / packed_zips(archive)[0]).stat().st_size)
-    )
-    expected, killed, ended_well = logical(archive), 0, 0
-    for step in range(0, 60, 2):
-        root = tmp_path / f"archive-{step}"
-        shutil.copytree(Path(str(archive.root)), root)
-        ended = subprocess.run([sys.executable, "-c", KILLED, str(root), str(step), "writes"], check=False)
-        killed += ended.returncode == -signal.SIGKILL
-        ended_well += ended.returncode == 0
-        assert logical(Archive(str(root))) == expected
-        compact(Archive(str(root)))
-        assert logical(Archive(str(root))) == expected
-        assert len(list((root / packs.FOLDER).iterdir())) == 5  # a pack of the month, one of the ledger, and the lock
-        shutil.rmtree(root)
-        if ended_well:
-            break
-    assert killed > 3
-    assert ended_well == 1

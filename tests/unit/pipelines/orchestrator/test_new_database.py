@@ -1,10 +1,7 @@
 """A new database of the orchestrator is a copy of the one that Prefect's migrations made once on this machine."""
 
-import os
 import sqlite3
-import stat
 import subprocess
-import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -42,28 +39,6 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
     monkeypatch.setattr(new_database, "_migrate", migrate)
     return calls
-
-
-def test_prefect_itself_makes_an_empty_database_which_is_copied(cache: Path, home: Path, tmp_path: Path) -> None:
-    assert make_database(home)
-    assert [path.name for path in home.iterdir()] == [NAME]
-    assert stat.S_IMODE((home / NAME).stat().st_mode) == 0o600
-    with closing(sqlite3.connect(home / NAME)) as database:
-        tables = [name for (name,) in database.execute("select name from sqlite_master where type = 'table'")]
-        entries = {name: database.execute(f'select count(*) from "{name}"').fetchone()[0] for name in tables}
-        assert {name for name, count in entries.items() if count} == {"alembic_version"}
-        assert "flow_run" in tables
-        assert database.execute("pragma journal_mode").fetchone() == ("wal",)
-    (stored,) = cache.iterdir()
-    assert stat.S_IMODE(stored.stat().st_mode) == 0o600
-    another = tmp_path / "another"
-    another.mkdir()
-    command = [sys.executable, "-m", "prefect", "server", "database", "upgrade", "-y"]
-    assert make_database(another)
-    before = (another / NAME).read_bytes()
-    assert before == stored.read_bytes()
-    subprocess.run(command, env={**os.environ, "PREFECT_HOME": str(another)}, check=True, capture_output=True)
-    assert (another / NAME).read_bytes() == before, "Prefect finds nothing left to migrate"
 
 
 def test_a_second_server_copies_what_is_stored(cache: Path, home: Path, tmp_path: Path, made: list[Path]) -> None:

@@ -23,7 +23,14 @@ NOISES = {
 RUNS = 20
 
 
-@pytest.mark.parametrize("name", NOISES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "flicker",
+        "white and walk",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("white", "flicker and walk")),
+    ],
+)
 def test_stated_uncertainties_are_the_standard_deviations_between_runs(name: str) -> None:
     rng = np.random.default_rng([20_261_201, len(name)])
     rms, u_rms, wrong, u_record = [], [], [], []

@@ -1,14 +1,14 @@
 """Noise of the samples that grows with temperature is no converter with coarse steps."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from root_process import ROOT
 
 from pipelines.tables.sound_lot import sound_lot
 
-sys.path.insert(0, str(ROOT / "benchmarks" / "worlds"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
 
 from noise import Noise
 from world import World, make

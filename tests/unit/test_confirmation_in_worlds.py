@@ -2,16 +2,16 @@
 
 import re
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from root_process import ROOT
 
 from pipelines.diagnosis.compare import compare
 from pipelines.diagnosis.model_history import text_of
 
-sys.path.insert(0, str(ROOT / "benchmarks" / "worlds"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
 
 from noise import Noise
 from world import World, force_of, make

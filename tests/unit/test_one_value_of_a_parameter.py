@@ -1,11 +1,11 @@
 """A time constant or width has one value under one name: in a diagnosis, and in the comparison of the model with that effect."""
 
 import sys
+from pathlib import Path
 
 import pytest
-from root_process import ROOT
 
-sys.path.insert(0, str(ROOT / "tests" / "blind"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
 
 from truth import Spec, make_run
 

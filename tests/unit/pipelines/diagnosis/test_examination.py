@@ -1,0 +1,187 @@
+"""Each data fault is caught in the unit that has it, and nothing in clean lots; other units are still diagnosed."""
+
+import lots
+import numpy as np
+import pytest
+from each import each
+
+from inertial.data_errors.faults.quantised import lattice_step
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.examination import examination
+
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
+BASE = ["bias", "scale", "misalignment"]
+OUT = ["out_x", "out_y", "out_z"]
+
+
+def flip(table, rows, rng):
+    table.loc[rows, "out_y"] *= -1.0
+
+
+def swap_axes(table, rows, rng):
+    table.loc[rows, ["out_x", "out_y"]] = table.loc[rows, ["out_y", "out_x"]].to_numpy()
+
+
+def swap_dwells(table, rows, rng):
+    table.loc[rows[[3, 10]], OUT] = table.loc[rows[[10, 3]], OUT].to_numpy()
+
+
+def metres(table, rows, rng):
+    table.loc[rows, [*OUT, "sd_x", "sd_y", "sd_z"]] *= 9.80665
+
+
+def half_range(table, rows, rng):
+    table.loc[rows[30:], [*OUT, "sd_x", "sd_y", "sd_z"]] *= 2.0
+
+
+def stuck(table, rows, rng):
+    table.loc[rows[20:30], OUT] = table.loc[rows[20], OUT].to_numpy(dtype=float)
+
+
+def dead(table, rows, rng):
+    table.loc[rows, "out_z"] = 0.01 + rng.normal(0.0, 1e-5, len(rows))
+
+
+def stale(table, rows, rng):
+    table.loc[rows[20:], "unit_C"] = table.loc[rows[20], "unit_C"]
+
+
+def spikes(table, rows, rng):
+    table.loc[rows[[5, 6, 40]], "out_x"] += 3e-3
+    table.loc[rows[[5, 6, 40]], "sd_x"] *= 40.0
+
+
+def coarse(table, rows, rng):
+    table.loc[rows, OUT] = np.round(table.loc[rows, OUT].to_numpy() / 2e-4) * 2e-4
+
+
+def clock(table, rows, rng):
+    table.loc[rows[30:], "time_s"] -= 2000.0
+
+
+def fewer(table, rows, rng):
+    table.loc[rows[10:20], "n"] = 400
+
+
+FAULTS = {
+    "axis_flip": flip,
+    "axis_flip ": swap_axes,
+    "swapped_dwells": swap_dwells,
+    "wrong_units": metres,
+    "wrong_range": half_range,
+    "stuck_output": stuck,
+    "dead_channel": dead,
+    "stale_temperature": stale,
+    "spikes": spikes,
+    "quantised": coarse,
+    "clock_jitter": clock,
+    "dropped_samples": fewer,
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("units", [1, 4])
+def test_a_fault_blocks_its_unit_and_no_other(name, units, rng):
+    if units == 1 and name in {"wrong_units", "dropped_samples"}:
+        pytest.skip("one unit alone shows neither another unit of measure nor another number of samples")
+    table = lots.lot(rng, units=units)
+    rows = table.index[table["unit"] == "U000"].to_numpy()
+    FAULTS[name](table, rows, rng)
+    diagnosis = diagnose(table)
+    assert [(b["fault"], b["units"]) for b in diagnosis["blocked_by"]] == [(name.strip(), ["U000"])]
+    assert diagnosis["recommended"] == []
+    if units == 1:
+        assert not diagnosis["adequate"]
+        assert diagnosis["error"]["rms_ug"] is None
+
+
+def test_swapped_units_are_known_by_their_fingerprints(rng):
+    table = lots.lot(rng)
+    one, other = (table.index[table["unit"] == u].to_numpy()[40:] for u in ("U001", "U003"))
+    kept = table.loc[one, OUT].to_numpy()
+    table.loc[one, OUT] = table.loc[other, OUT].to_numpy()
+    table.loc[other, OUT] = kept
+    faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
+    assert faults == {("units_swapped", "U001"), ("units_swapped", "U003")}
+
+
+def test_missing_dwells_at_the_end_are_a_truncated_file(rng):
+    table = lots.lot(rng)
+    rows = table.index[table["unit"] == "U002"].to_numpy()
+    blocked = diagnose(table.drop(index=rows[50:]))["blocked_by"]
+    assert [(b["fault"], b["units"]) for b in blocked] == [("truncated_file", ["U002"])]
+
+
+def lacking(table, unit, dwells):
+    """The table without some dwells of a unit, by their place."""
+    return table.drop(index=table.index[table["unit"] == unit].to_numpy()[dwells])
+
+
+def test_a_unit_without_some_dwells_is_diagnosed_by_those_it_has(rng):
+    table = lots.lot(rng, hidden=lambda f, t, s, r: r.normal(0.0, 60e-6, 3) * f**3)
+    count = (table["unit"] == "U000").sum()
+    table = lacking(lacking(lacking(table, "U000", [5]), "U001", rng.permutation(count)[: count // 3]), "U002", [-1])
+    document = diagnose(table)
+    assert document["blocked_by"] == []
+    assert document["recommended"] == ["third_order"]
+    (notice,) = (text for text in document["warnings"] if "missing" in text)
+    assert notice.startswith(f"of {count} dwells of the lot are missing: U000 1 (5), U001 {count // 3} (")
+    assert f"U002 1 ({count - 1})" in notice
+
+
+def test_a_unit_without_most_of_its_dwells_is_refused(rng):
+    table = lots.lot(rng)
+    count = int((table["unit"] == "U000").sum())
+    few = rng.permutation(count - 1)[: count // 2 + 1]
+    document = diagnose(lacking(lacking(table, "U001", few), "U003", [2, 3]))
+    assert [(b["fault"], b["units"]) for b in document["blocked_by"]] == [("dropped_samples", ["U001"])]
+    assert ["U003 2 (2, 3)" in text for text in document["warnings"]] == [True]
+
+
+def test_dwells_that_were_numbered_again_are_no_truncated_file(rng):
+    table = lacking(lots.lot(rng), "U001", [5, 20, 21, 40])
+    own = table["unit"] == "U001"
+    table.loc[own, "dwell"] = np.arange(own.sum())
+    assert diagnose(table)["blocked_by"] == []
+
+
+def test_no_notice_is_given_of_dwells_left_out_on_purpose(rng):
+    table = lacking(lots.lot(rng), "U001", [5])
+    assert not any("missing" in text for text in examination(table, None, BASE, ["U001:5"]).document["warnings"])
+
+
+@each(FAULTS)
+def test_a_fault_is_found_where_units_lack_dwells(name, rng):
+    table = lots.lot(rng)
+    rows = table.index[table["unit"] == "U000"].to_numpy()
+    FAULTS[name](table, rows, rng)
+    table = lacking(lacking(table, "U000", [7]), "U002", [15, 44])
+    faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
+    assert faults == {(name.strip(), "U000")}
+
+
+def test_the_other_units_are_diagnosed(rng):
+    table = lots.lot(rng, hidden=lambda f, t, s, r: r.normal(0.0, 60e-6, 3) * f**3)
+    flip(table, table.index[table["unit"] == "U000"].to_numpy(), rng)
+    diagnosis = diagnose(table)
+    assert diagnosis["blocked_by"][0]["units"] == ["U000"]
+    assert diagnosis["recommended"] == ["third_order"]
+
+
+@each(range(8))
+def test_clean_lots_raise_no_alarm(seed):
+    rng = np.random.default_rng(seed)
+    assert diagnose(lots.lot(rng, plan="six" if seed % 2 else "fibonacci", units=1 + seed % 3))["blocked_by"] == []
+
+
+def test_a_clipped_output_is_physics_and_no_fault(rng):
+    table = lots.lot(
+        rng, plan="six", temperatures=(0, 25, 50, 25), hidden=lambda f, t, s, r: np.clip(f, -0.97, 0.97) - f
+    )
+    assert diagnose(table)["blocked_by"] == []
+
+
+def test_the_step_of_a_lattice_is_found_and_real_numbers_have_none(rng):
+    assert lattice_step(np.round(rng.normal(size=40) / 0.25) * 0.25) == pytest.approx(0.25)
+    assert lattice_step(rng.normal(size=40)) is None
