@@ -4,6 +4,7 @@ import html
 import json
 import re
 import shutil
+import tomllib
 from collections.abc import Callable
 from datetime import date
 from io import BytesIO
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from capture_double import small_run
+from laboratory import LABORATORY, laboratory_file
 from pydantic import TypeAdapter
 from typer.testing import CliRunner, Result
 
@@ -39,25 +41,6 @@ pdfplumber = pytest.importorskip("pdfplumber")
 
 Typed = Callable[..., Result]
 NAMES = {"dcc": DCC, "si": SI}
-LABORATORY = """
-[laboratory]
-name = "Example Sensor Works"
-address = "Am Kornfeld 7, 38116 Braunschweig"
-country = "DE"
-email = "calibration@example.com"
-
-[customer]
-name = "Example Drones Ltd"
-address = "12 Mill Lane, Cambridge"
-email = "quality@example.org"
-
-[signatory]
-name = "J. Example"
-role = "Head of calibration"
-
-[item]
-manufacturer = "Analog Devices"
-"""
 ACCREDITATION = '[laboratory.accreditation]\nbody = "DAkkS"\nnumber = "D-K-00000-01"\n'
 
 
@@ -77,8 +60,7 @@ def run(made: Run, tmp_path: Path) -> Run:
 
 @pytest.fixture
 def laboratory(tmp_path: Path) -> Path:
-    (tmp_path / "laboratory.toml").write_text(LABORATORY, encoding="utf-8")
-    return tmp_path / "laboratory.toml"
+    return laboratory_file(tmp_path)
 
 
 @pytest.fixture
@@ -91,8 +73,6 @@ def typed(run: Run, laboratory: Path, tmp_path: Path) -> Typed:
 
 
 def content(run: Run, serial: str = "A1", text: str = LABORATORY) -> CertificateContent:
-    import tomllib
-
     known = Ledger(run.archive).calibrations(serial)
     return compose(run, known[-1], known, LaboratoryFile.model_validate(tomllib.loads(text)))
 
@@ -253,7 +233,7 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     second.seal()
     certify(Ledger(first.archive), second, ["A1"], supersede=True)
     known = Ledger(first.archive).calibrations("A1")
-    c = compose(second, known[-1], known, LaboratoryFile.model_validate(_parsed()))
+    c = compose(second, known[-1], known, LaboratoryFile.model_validate(tomllib.loads(LABORATORY)))
     assert c.adjustment.earlier == "A1/1"
     assert c.adjustment.dwells == 4
     dwells = second.table("dwells").query("unit == 'A1' and kind == 'verification'")
@@ -272,12 +252,6 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     assert "Earlier certificate A1/1" in " ".join(" ".join(text_of(pdf(c, dcc(c)))).split())
     statuses = etree.fromstring(dcc(c)).xpath("//dcc:status/text()", namespaces=NAMES)
     assert statuses == ["beforeAdjustment", "afterAdjustment"]
-
-
-def _parsed() -> dict:
-    import tomllib
-
-    return tomllib.loads(LABORATORY)
 
 
 def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(run: Run) -> None:
