@@ -18,6 +18,7 @@ FRAME = pd.DataFrame({"unit": ["A", "B"], "value": [1.0, 2.0]})
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """One to whose archive runs are added."""
     return small_run(tmp_path_factory.mktemp("run"))
 
 

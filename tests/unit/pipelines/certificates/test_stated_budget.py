@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_double import small_run
 from pydantic import TypeAdapter, ValidationError
 from root_process import ROOT
 from small_station import short_recipe
@@ -191,11 +190,6 @@ def test_a_guard_band_by_an_allowed_probability() -> None:
     assert inside.pfa == pytest.approx(0.02, abs=1e-4)
     with pytest.raises(RecipeInvalid, match="pfa_max"):
         parse_limits(LIMITS.format(rule="allowed_pfa", more="pfa_max = 0.05\n"), "limits", UNITS)
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return small_run(tmp_path_factory.mktemp("run"))
 
 
 def test_a_run_keeps_its_budget_and_the_risk_of_its_decisions(run: Run) -> None:

@@ -49,11 +49,6 @@ int main(void)
 """
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return small_run(tmp_path_factory.mktemp("run"))
-
-
 def test_the_polynomials_correct_as_the_model_does(run: Run) -> None:
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
     lot = lot_arrays(run.table("dwells"))

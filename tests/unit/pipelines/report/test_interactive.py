@@ -10,7 +10,6 @@ from importlib.resources import files
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import small_run
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,11 +22,6 @@ from pipelines.report import make_report, render
 from pipelines.report.interactive import BUNDLE, BUNDLE_SHA256, figure_of, interactive
 from pipelines.report.numbers import significant, with_uncertainty
 from pipelines.report.run_pictures import lot_chart
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return small_run(tmp_path_factory.mktemp("run"))
 
 
 @pytest.fixture(scope="module")

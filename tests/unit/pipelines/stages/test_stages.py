@@ -20,11 +20,6 @@ from schemas.errors import DataRejected
 NO_HISTORY = pd.DataFrame({"time_s": [], "chamber_C": [], "slot": [], "unit": [], "unit_C": []})
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return small_run(tmp_path_factory.mktemp("run"))
-
-
 def test_reduce_gives_means_spreads_and_numbers(run: Run) -> None:
     samples, dwells = run.table("samples"), run.table("dwells")
     row = dwells.iloc[4]

@@ -52,6 +52,21 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return run
 
 
+@pytest.fixture(scope="module")
+def c(made: Run) -> CertificateContent:
+    return content(made)
+
+
+@pytest.fixture(scope="module")
+def xml(c: CertificateContent) -> bytes:
+    return dcc(c)
+
+
+@pytest.fixture(scope="module")
+def paper(c: CertificateContent, xml: bytes) -> bytes:
+    return pdf(c, xml)
+
+
 @pytest.fixture
 def run(made: Run, tmp_path: Path) -> Run:
     shutil.copytree(made.archive.root, tmp_path / "archive")
@@ -132,11 +147,9 @@ def test_an_amended_certificate_names_the_one_it_replaces_and_what_changed(run: 
     assert "was replaced by certificate A1/2" in " ".join(text_of(pdf(old, dcc(old)))[0].split())
 
 
-def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(run: Run) -> None:
-    c = content(run)
-    xml = dcc(c)
-    pages = text_of(pdf(c, xml))
-    paper = " ".join(" ".join(pages).split())
+def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(xml: bytes, paper: bytes) -> None:
+    pages = text_of(paper)
+    printed = " ".join(" ".join(pages).split())
     for part in (
         "Calibration certificate", "Example Sensor Works", "Am Kornfeld 7", "the laboratory named above", "A1/1",
         "Example Drones Ltd", "quality@example.org", "Static multi-position calibration",
@@ -145,7 +158,7 @@ def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(run: Run) -> N
         "Conditions", "9.81230 m/s²", "0.0 to 50.0 °C", "traceability", "No earlier calibration", "coverage factor",
         "ILAC-G8:09/2019 guarded acceptance", "PFA", "End of certificate",
     ):  # fmt: skip
-        assert part in paper, part
+        assert part in printed, part
     tree = etree.fromstring(xml)
     for path in (
         "//dcc:uniqueIdentifier[.='A1/1']", "//dcc:customer", "//dcc:respPerson/dcc:mainSigner", "//dcc:usedMethod/dcc:norm",
@@ -156,8 +169,8 @@ def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(run: Run) -> N
     assert [f"page {n} of {len(pages)}" in page for n, page in enumerate(pages, 1)] == [True] * len(pages)
 
 
-def test_the_head_of_a_budget_is_what_its_contributions_add_up_to(run: Run) -> None:
-    tables = content(run).budgets
+def test_the_head_of_a_budget_is_what_its_contributions_add_up_to(c: CertificateContent) -> None:
+    tables = c.budgets
     assert {one.k is None for one in tables} == {
         True,
         False,
@@ -168,21 +181,22 @@ def test_the_head_of_a_budget_is_what_its_contributions_add_up_to(run: Run) -> N
         assert all("[" not in row.source for row in one.rows)
 
 
-def test_contributions_sources_and_effects_are_named_in_words_and_not_by_keys(run: Run) -> None:
-    made = content(run)
-    named = {row.name for table in made.budgets for row in table.rows}
+def test_contributions_sources_and_effects_are_named_in_words_and_not_by_keys(
+    c: CertificateContent, paper: bytes
+) -> None:
+    named = {row.name for table in c.budgets for row in table.rows}
     assert {"noise of the dwells", "repeatability of the poses", "seat of the fixture"} <= named, named
-    sources = {row.source for table in made.budgets for row in table.rows}
+    sources = {row.source for table in c.budgets for row in table.rows}
     assert "simulation: rotation of the slots" in sources, sources
-    text = " ".join(text_of(pdf(made, dcc(made))))
+    text = " ".join(text_of(paper))
     assert "bias temperature" in text
     for key in ("bias_temperature", "slot_rotation_mrad", "switch_on", "scale_temperature"):
         assert key not in text.replace("\n", "")
 
 
-def test_values_of_the_xml_are_those_of_the_archive_in_si_units(run: Run) -> None:
-    tree = etree.fromstring(dcc(content(run)))
-    rows = run.table("uncertainties").query("unit == 'A1' and quantity == 'bias' and axis == 'y'").iloc[0]
+def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: bytes) -> None:
+    tree = etree.fromstring(xml)
+    rows = made.table("uncertainties").query("unit == 'A1' and quantity == 'bias' and axis == 'y'").iloc[0]
     own = tree.xpath(
         "//dcc:result[dcc:name/dcc:content[contains(.,'bias at') and contains(.,', y')]]//si:real", namespaces=NAMES
     )
@@ -191,7 +205,7 @@ def test_values_of_the_xml_are_those_of_the_archive_in_si_units(run: Run) -> Non
         [value, expanded], [rows["value"] * 9.80665e-6, rows["expanded"] * 9.80665e-6], rtol=1e-14
     )
     assert own[0].findtext(f"{{{SI}}}unit") == r"\metre\second\tothe{-2}"
-    stated = run.table("coefficients").query("unit == 'A1' and effect == 'scale' and axis == 'x'").iloc[0]
+    stated = made.table("coefficients").query("unit == 'A1' and effect == 'scale' and axis == 'x'").iloc[0]
     scale = tree.xpath(
         "//dcc:result[dcc:name/dcc:content[.='sensitivity at the reference temperature, x']]//si:value",
         namespaces=NAMES,
@@ -199,24 +213,27 @@ def test_values_of_the_xml_are_those_of_the_archive_in_si_units(run: Run) -> Non
     assert float(scale[0].text) == pytest.approx(stated["value"] / 9.80665, rel=1e-14)
 
 
-def test_nothing_says_accredited_without_an_accreditation_in_the_file(run: Run, laboratory: Path) -> None:
-    c = content(run)
-    assert not re.search("accredit", " ".join(text_of(pdf(c, dcc(c)))) + dcc(c).decode(), re.IGNORECASE)
+def test_nothing_says_accredited_without_an_accreditation_in_the_file(
+    made: Run, laboratory: Path, xml: bytes, paper: bytes
+) -> None:
+    assert not re.search("accredit", " ".join(text_of(paper)) + xml.decode(), re.IGNORECASE)
     laboratory.write_text(LABORATORY.replace("Example Sensor Works", "Accredited Sensor Works"), encoding="utf-8")
     with pytest.raises(RecipeInvalid, match=r"laboratory.name: speaks of accreditation, \[laboratory.accreditation\]"):
         read_laboratory(laboratory)
-    c = content(run, text=LABORATORY + ACCREDITATION)
+    c = content(made, text=LABORATORY + ACCREDITATION)
     assert "D-K-00000-01 (DAkkS)" in text_of(pdf(c, dcc(c)))[0]
 
 
-def test_an_interval_is_printed_only_where_the_customer_agreed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interval_is_printed_only_where_the_customer_agreed(
+    made: Run, paper: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from pipelines.certificates.document import compose as composing
 
-    due = Ledger(run.archive).calibrations("A1")[-1].until
-    assert due not in " ".join(text_of(pdf(content(run), b"<a/>")))
+    due = Ledger(made.archive).calibrations("A1")[-1].until
+    assert due not in " ".join(text_of(paper))
     real = composing.stated_budget
     monkeypatch.setattr(composing, "stated_budget", lambda *a: {**real(*a), "customer_agreed": True})
-    agreed = content(run)
+    agreed = content(made)
     assert f"As agreed with the customer, the next calibration is due on {due}" in " ".join(
         text_of(pdf(agreed, b"<a/>"))
     )
@@ -254,7 +271,7 @@ def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today
     assert statuses == ["beforeAdjustment", "afterAdjustment"]
 
 
-def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(run: Run) -> None:
+def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(c: CertificateContent) -> None:
     serial = "S" + "0123456789ABCDEF" * 3 + "0123456789ABCDE"
     rows = tuple(
         Coefficient(effect="bias_temperature_quadratic", name=f"k{n}", axis="xyz"[n % 3],
@@ -265,7 +282,7 @@ def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(run: Ru
         id="REF-1", what="local gravity", certificate="PTB 12345/26", laboratory="PTB", date="2026-01-02", due="2028-01-01",
         uncertainty="U = 2 ppm (k = 2)", sha256="0" * 64,
     )  # fmt: skip
-    c = content(run).model_copy(
+    c = c.model_copy(
         update={"serial": serial, "number": f"{serial}/1", "coefficients": rows, "references": (reference,)}
     )
     with_heads = 0
@@ -279,17 +296,15 @@ def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(run: Ru
     assert with_heads >= 3
 
 
-def test_the_pdf_claims_pdf_a_3b_and_holds_the_xml(run: Run) -> None:
-    c = content(run)
-    xml = dcc(c)
-    with pikepdf.open(BytesIO(pdf(c, xml))) as document, document.open_metadata() as meta:
+def test_the_pdf_claims_pdf_a_3b_and_holds_the_xml(c: CertificateContent, xml: bytes, paper: bytes) -> None:
+    with pikepdf.open(BytesIO(paper)) as document, document.open_metadata() as meta:
         assert (meta["pdfaid:part"], meta["pdfaid:conformance"]) == ("3", "B")
         assert document.attachments["certificate.xml"].get_file().read_bytes() == xml
         assert document.attachments["certificate.xml"].relationship == pikepdf.Name.Alternative
         assert str(meta["xmp:CreateDate"]).startswith(date.fromisoformat(c.issued).isoformat())
 
 
-def test_a_second_program_finds_the_xml_valid_and_a_wrong_one_invalid(run: Run) -> None:
+def test_a_second_program_finds_the_xml_valid_and_a_wrong_one_invalid(xml: bytes) -> None:
     xmlschema = pytest.importorskip("xmlschema")
     from importlib.resources import files
 
@@ -297,10 +312,9 @@ def test_a_second_program_finds_the_xml_valid_and_a_wrong_one_invalid(run: Run) 
     rules = xmlschema.XMLSchema(
         str(folder / "dcc.xsd"), locations={SI: str(folder / "SI_Format.xsd")}, allow="local", validation="strict"
     )
-    good = dcc(content(run))
-    rules.validate(BytesIO(good))
+    rules.validate(BytesIO(xml))
     for old, new in ((b"uniqueIdentifier>", b"number>"), (b'schemaVersion="3.0.0"', b'schemaVersion="3.1.0"')):
-        bad = good.replace(old, new)
+        bad = xml.replace(old, new)
         assert not rules.is_valid(BytesIO(bad))
         with pytest.raises(DocumentInvalid):
             validate(bad)
@@ -374,42 +388,33 @@ def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
     assert "not claimed" in _traceability({"references": [], "grade_source": "data_sheet"}, entries)
 
 
-def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(run: Run) -> None:
-    made = content(run)
-    assert re.fullmatch(r"ADEQUATE \(p (= 0\.\d+|= 1)\)", made.adequacy)
-    assert made.left_out.startswith("Not stated, and not contained in the uncertainties U: ")
-    assert "vibration" in made.left_out
-    assert "seat" not in made.left_out
-    declared = dcc(made).decode()
-    assert f"Model of the fit, by its residuals: {made.adequacy}" in declared
-    assert made.left_out in declared
-    printed = json.dumps(page_content(made), ensure_ascii=False)
-    assert made.adequacy in printed
-    assert made.left_out in printed
+def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(
+    c: CertificateContent, xml: bytes
+) -> None:
+    assert re.fullmatch(r"ADEQUATE \(p (= 0\.\d+|= 1)\)", c.adequacy)
+    assert c.left_out.startswith("Not stated, and not contained in the uncertainties U: ")
+    assert "vibration" in c.left_out
+    assert "seat" not in c.left_out
+    declared, printed = xml.decode(), json.dumps(page_content(c), ensure_ascii=False)
+    assert f"Model of the fit, by its residuals: {c.adequacy}" in declared
+    assert c.left_out in declared
+    assert c.adequacy in printed
+    assert c.left_out in printed
 
 
-def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_one(run: Run) -> None:
-    made = content(run)
-    none = made.model_copy(update={"conformity": tuple(one.model_copy(update={"pfa": 0.0}) for one in made.conformity)})
+def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_one(c: CertificateContent) -> None:
+    none = c.model_copy(update={"conformity": tuple(one.model_copy(update={"pfa": 0.0}) for one in c.conformity)})
     assert "probability of false acceptance < 1e-4" in html.unescape(dcc(none).decode())
-    for table in next(part for part in page_content(made)["parts"] if part.get("title") == "Uncertainty budgets")[
-        "tables"
-    ]:
+    parts = {part.get("title"): part for part in page_content(c)["parts"]}
+    for table in parts["Uncertainty budgets"]["tables"]:
         assert sum(row[4] == "0.0 %" for row in table["rows"]) <= 1
-    results = next(part for part in page_content(made)["parts"] if part.get("title") == "Results")
-    names = {row[0] for row in results["tables"][0]["rows"]}
+    names = {row[0] for row in parts["Results"]["tables"][0]["rows"]}
     assert "error of the norm of gravity, verification (largest of the poses)" in names
 
 
 def test_certificate_and_report_round_by_one_function() -> None:
-    for value, expanded in (
-        (2.5, 25.0),
-        (485.37, 549.6),
-        (12.345, 0.105),
-        (-0.0049, 0.0104),
-        (0.125, 0.02),
-        (10.0, 0.98),
-    ):
+    pairs = [(2.5, 25.0), (485.37, 549.6), (12.345, 0.105), (-0.0049, 0.0104), (0.125, 0.02), (10.0, 0.98)]
+    for value, expanded in pairs:
         plain = rounded(value, expanded)
         assert tuple(text.replace("−", "-") for text in with_uncertainty(value, expanded)) == plain
         assert tuple(text.replace("−", "-") for text in report_rounding(value, expanded)) == plain
