@@ -1,16 +1,15 @@
 """The policy of a deployment: what prefect.yaml may state, and that its tags carry it."""
 
-from pathlib import Path
-
 import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from root_process import ROOT
 
 from pipelines.orchestrator.policy import CHOICES, Policy, policy_of, policy_of_tags
 from schemas.errors import WrongUse
 
-DEPLOY = Path(__file__).resolve().parents[2] / "deploy"
+DEPLOY = ROOT / "deploy"
 
 
 @given(

@@ -1,12 +1,12 @@
 """The generated archive is one that the product reads, fits again and grades, and holds the truth that it tells."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from root_process import ROOT
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(ROOT))
 
 from benchmarks.generated_archive import write_archive
 from pipelines.archive import Archive
