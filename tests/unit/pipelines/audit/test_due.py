@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ledger_events import event
@@ -48,31 +49,36 @@ def told(all_: Calibrations, certificates: Certificates) -> tuple[str, str, str,
     return date_of(due_units.day[0]), str(due_units.because[0]), str(due_units.certificate[0]), bool(due_units.valid[0])
 
 
-def test_a_unit_is_due_when_its_certificate_ends_and_not_when_the_interval_does(tmp_path: Path) -> None:
-    ledger = known(tmp_path, event(start="2026-01-02", until="2026-09-01"))
-    assert told(measured(("A1", "r-1", "2026-01-01")), ledger) == ("2026-09-01", "certificate", "A1/1", True)
+REVOKED = {"action": "revoke", "until": "9999-12-31", "ends": (1,)}
+FIRST = ("A1", "r-1", "2026-01-01")
+STATES = {
+    "due when its certificate ends and not when the interval does":
+        ([event(start="2026-01-02", until="2026-09-01")], [FIRST], "pass", ("2026-09-01", "certificate", "A1/1", True)),
+    "due since its certificate ended":
+        ([event(start="2025-01-02", until="2026-01-02")], [("A1", "r-1", "2025-01-01")], "pass",
+         ("2026-01-02", "certificate", "A1/1", False)),
+    "due at once where it is revoked":
+        ([event(start="2026-01-02"), event(start="2026-01-02", when="2026-05-05T08:00:00+00:00", **REVOKED)], [FIRST], "pass",
+         ("2026-05-05", "revoked", "A1/1", False)),
+    "due from the day on which a revocation holds":
+        ([event(start="2026-01-02"), event(start="2026-03-03", **REVOKED)], [FIRST], "pass",
+         ("2026-03-03", "revoked", "A1/1", False)),
+    "a revocation that was written after the day is not known on it":
+        ([event(start="2026-01-02"), event(start="2026-01-02", when="2026-07-01T08:00:00+00:00", **REVOKED)], [FIRST], "pass",
+         ("2027-01-01", "certificate", "A1/1", True)),
+    "a newer pass that is not certified leaves the older certificate standing":
+        ([event(start="2025-08-01", until="2026-08-01")], [("A1", "r-1", "2025-07-31"), ("A1", "r-2", "2026-06-01")], "pass",
+         ("2026-08-01", "certificate", "A1/1", True)),
+    "a unit that failed is due although its certificate holds":
+        ([event(start="2026-01-02")], [FIRST, ("A1", "r-2", "2026-06-01")], "fail",
+         ("2026-06-01", "did not pass", "A1/1", True)),
+}  # fmt: skip
 
 
-def test_a_certificate_that_ended_makes_its_unit_due_since_then(tmp_path: Path) -> None:
-    ledger = known(tmp_path, event(start="2025-01-02", until="2026-01-02"))
-    assert told(measured(("A1", "r-1", "2025-01-01")), ledger) == ("2026-01-02", "certificate", "A1/1", False)
-
-
-def test_a_revoked_calibration_makes_its_unit_due_at_once(tmp_path: Path) -> None:
-    revoked = event(
-        action="revoke", start="2026-01-02", until="9999-12-31", ends=(1,), when="2026-05-05T08:00:00+00:00"
-    )
-    ledger = known(tmp_path, event(start="2026-01-02"), revoked)
-    assert told(measured(("A1", "r-1", "2026-01-01")), ledger) == ("2026-05-05", "revoked", "A1/1", False)
-    from_a_day = event(serial="B1", action="revoke", start="2026-03-03", until="9999-12-31", ends=(1,))
-    ledger = known(tmp_path, event(serial="B1", start="2026-01-02"), from_a_day)
-    assert told(measured(("B1", "r-1", "2026-01-01")), ledger)[:2] == ("2026-03-03", "revoked")
-
-
-def test_a_revocation_that_was_written_after_the_day_is_not_known_on_it(tmp_path: Path) -> None:
-    later = event(action="revoke", start="2026-01-02", until="9999-12-31", ends=(1,), when="2026-07-01T08:00:00+00:00")
-    ledger = known(tmp_path, event(start="2026-01-02"), later)
-    assert told(measured(("A1", "r-1", "2026-01-01")), ledger) == ("2027-01-01", "certificate", "A1/1", True)
+@each(STATES)
+def test_when_a_unit_is_due_why_and_whether_a_certificate_holds(name: str, tmp_path: Path) -> None:
+    events, rows, outcome, expected = STATES[name]
+    assert told(measured(*rows, outcome=outcome), known(tmp_path, *events)) == expected
 
 
 def test_what_passed_and_was_never_certified_is_told_and_due_by_its_interval(tmp_path: Path) -> None:
@@ -90,18 +96,10 @@ def test_without_a_ledger_nothing_is_told_as_uncertified(tmp_path: Path) -> None
     assert told(all_, ledger) == ("2027-02-01", "fixed", "", False)
 
 
-def test_a_newer_pass_that_is_not_certified_leaves_the_older_certificate_standing(tmp_path: Path) -> None:
+def test_a_newer_pass_that_is_not_certified_is_told(tmp_path: Path) -> None:
     ledger = known(tmp_path, event(start="2025-08-01", until="2026-08-01"))
     all_ = measured(("A1", "r-1", "2025-07-31"), ("A1", "r-2", "2026-06-01"))
-    assert told(all_, ledger) == ("2026-08-01", "certificate", "A1/1", True)
-    due_units = due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger)
-    assert uncertified(all_, due_units, ledger).size == 1
-
-
-def test_a_unit_that_failed_is_due_although_its_certificate_holds(tmp_path: Path) -> None:
-    ledger = known(tmp_path, event(start="2026-01-02"))
-    all_ = measured(("A1", "r-1", "2026-01-01"), ("A1", "r-2", "2026-06-01"), outcome="fail")
-    assert told(all_, ledger) == ("2026-06-01", "did not pass", "A1/1", True)
+    assert uncertified(all_, due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger), ledger).size == 1
 
 
 def test_a_run_again_of_the_same_capture_certifies_the_measurement(tmp_path: Path) -> None:

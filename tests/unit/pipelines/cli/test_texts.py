@@ -74,20 +74,18 @@ def test_an_unsigned_pdf_is_not_sent_to_the_archive_that_cannot_prove_it() -> No
     assert "--trust FILE" in _needed(CheckedFile(Path("A1_1.pdf"), checks=signed))
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "text"),
-    [(1118.0, 3000.0, "tau 1120 to 3000 s"), (36000.0, 36000.0, "tau 36000 s"), (0.0123, 0.5, "tau 0.0123 to 0.5 s")],
-)
-def test_a_range_has_no_exponent(low: float, high: float, text: str) -> None:
-    assert str(UnseenRange("tau", "s", low, high)) == text
-
-
-@pytest.mark.parametrize(
-    ("size", "text"),
-    [(1, "1 byte"), (512, "512 bytes"), (18721670, "18.7 MB"), (2_000, "2.00 kB"), (123_456_789_000, "123 GB")],
-)
-def test_a_size_has_three_digits(size: int, text: str) -> None:
-    assert size_text(size) == text
+def test_numbers_have_three_digits_and_no_exponent() -> None:
+    assert str(UnseenRange("tau", "s", 1118.0, 3000.0)) == "tau 1120 to 3000 s"
+    assert str(UnseenRange("tau", "s", 36000.0, 36000.0)) == "tau 36000 s"
+    assert str(UnseenRange("tau", "s", 0.0123, 0.5)) == "tau 0.0123 to 0.5 s"
+    sizes = {1: "1 byte", 512: "512 bytes", 2_000: "2.00 kB", 18721670: "18.7 MB", 123_456_789_000: "123 GB"}
+    assert {size: size_text(size) for size in sizes} == sizes
+    for fall, error, text in (
+        (97.13, 2.8, "falls by 97.1 ± 5.6 (k = 2) µg"),
+        (-6.41, 0.7, "rises by 6.4 ± 1.4 (k = 2) µg"),
+        (123.4, None, "falls by 123 µg"),
+    ):
+        assert _fall({"fall_ug": fall, "fall_u_ug": error}) == f"the error {text}"
 
 
 def test_missing_columns_are_named_once_with_those_that_are_there(tmp_path: Path) -> None:
@@ -117,26 +115,24 @@ def test_a_contribution_of_nothing_is_not_among_the_largest() -> None:
     assert without_nothing("noise of the dwells 80 %, supply 20 %") == "noise of the dwells 80 %, supply 20 %"
 
 
-@each(["line-six.toml", "line-six", "recipes/line-six.toml"])
-def test_a_sample_recipe_that_is_not_here_is_named_with_its_path(name: str) -> None:
+@each([
+    (load_recipe, "line-six.toml", "line-six", "line-seven.toml"),
+    (load_recipe, "line-six", "line-six", "line-seven.toml"),
+    (load_recipe, "recipes/line-six.toml", "line-six", "line-seven.toml"),
+    (load_station, "simulated-awry", "", "simulated-calm"),
+    (load_station, "simulated-awry.toml", "", "simulated-calm"),
+])  # fmt: skip
+def test_a_sample_recipe_or_station_that_is_not_here_is_named_with_its_path(row: tuple) -> None:
+    load, name, own_name, unknown = row
+    kind = str if load is load_recipe else Path
     with pytest.raises(RecipeInvalid) as end:
-        load_recipe(name)
+        load(kind(name))
     path = Path(str(end.value).rpartition("the sample of this name is ")[2])
     assert path.is_file()
-    assert load_recipe(str(path)).name == "line-six"
+    loaded = load(kind(path))
+    assert loaded.name == own_name if own_name else loaded.simulation is not None
     with pytest.raises(RecipeInvalid) as end:
-        load_recipe("line-seven.toml")
-    assert "sample" not in str(end.value)
-
-
-@each(["simulated-awry", "simulated-awry.toml"])
-def test_a_sample_station_that_is_not_here_is_named_with_its_path(name: str) -> None:
-    with pytest.raises(RecipeInvalid) as end:
-        load_station(Path(name))
-    path = Path(str(end.value).rpartition("the sample of this name is ")[2])
-    assert load_station(path).simulation is not None
-    with pytest.raises(RecipeInvalid) as end:
-        load_station(Path("simulated-calm"))
+        load(kind(unknown))
     assert "sample" not in str(end.value)
 
 
@@ -164,18 +160,10 @@ def test_inspect_says_why_dwells_in_the_exchange_format_cannot_be_used(tmp_path:
     assert "column out_y: found oops, a finite number is needed" in text
 
 
-@pytest.mark.parametrize(
-    ("words", "usage"),
-    [
-        (["run"], "run [OPTIONS] [RECIPE]"),
-        (["diagnose"], "diagnose [OPTIONS] DWELLS"),
-        (["inspect"], "inspect [OPTIONS] FILE…"),
-        (["show"], "show [OPTIONS] [RUN|UNIT] [TABLE]"),
-        (["plan", "optimise"], "plan optimise [OPTIONS] [RECIPE]"),
-    ],
-    ids=" ".join,
-)
-def test_arguments_of_a_usage_line_have_one_pair_of_brackets(words: list[str], usage: str) -> None:
+@each(["run [OPTIONS] [RECIPE]", "diagnose [OPTIONS] DWELLS", "inspect [OPTIONS] FILE…", "show [OPTIONS] [RUN|UNIT] [TABLE]",
+       "plan optimise [OPTIONS] [RECIPE]"])  # fmt: skip
+def test_arguments_of_a_usage_line_have_one_pair_of_brackets(usage: str) -> None:
+    words = usage.partition(" [OPTIONS]")[0].split()
     line = next(line for line in CliRunner().invoke(app, [*words, "--help"]).stdout.splitlines() if "Usage" in line)
     assert line.strip().removeprefix("Usage: ").split(" ", 1)[1] == usage
 
@@ -190,8 +178,7 @@ def test_a_name_that_is_refused_says_what_is_needed_in_words(tmp_path: Path) -> 
 
 
 def test_every_pattern_of_a_schema_is_explained_in_words() -> None:
-    root = ROOT
-    rooms = (root / "schemas", root / "pipelines", root / "stations")
+    rooms = (ROOT / "schemas", ROOT / "pipelines", ROOT / "stations")
     text = "".join(path.read_text(encoding="utf-8") for room in rooms for path in room.rglob("*.py"))
     stated = re.findall(r'[(\s]pattern=r"(.*?)"[,)]', text)
     assert len(stated) > 10
@@ -241,18 +228,6 @@ def test_the_tables_of_a_plan_are_not_continued_at_eighty_columns(
     assert sink.getvalue().count("coefficient") == 1
     assert "misalignment_temperature x KxzT, µg/(g·K)" in sink.getvalue()
     assert "bias x, µg/(g·K)" in sink.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("fall", "error", "text"),
-    [
-        (97.13, 2.8, "falls by 97.1 ± 5.6 (k = 2) µg"),
-        (-6.41, 0.7, "rises by 6.4 ± 1.4 (k = 2) µg"),
-        (123.4, None, "falls by 123 µg"),
-    ],
-)
-def test_the_fall_of_an_error_has_no_exponent(fall: float, error: float | None, text: str) -> None:
-    assert _fall({"fall_ug": fall, "fall_u_ug": error}) == f"the error {text}"
 
 
 def test_fit_of_a_file_names_the_command_for_it(tmp_path: Path) -> None:

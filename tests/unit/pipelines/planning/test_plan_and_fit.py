@@ -71,7 +71,7 @@ NOISES = {
 }
 
 
-@pytest.mark.parametrize("name", NOISES)
+@pytest.mark.parametrize("name", ["white", pytest.param("flicker", marks=pytest.mark.slow), "flicker and walk"])
 def test_plan_and_fit_state_the_bias_s_uncertainty_alike_and_lots_scatter_no_more(name: str) -> None:
     noise = NOISES[name]
     scatter = scattered(noise, 20_261_130 + len(name))
