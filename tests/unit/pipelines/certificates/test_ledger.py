@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from capture_double import small_run
+from each import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ledger_events import day, event
@@ -120,8 +121,8 @@ def test_a_missing_event_is_found(tmp_path: Path) -> None:
         ledger.valid_at("A1", "2026-11-01")
 
 
-@pytest.mark.parametrize("serial", ["../../etc/x", "a/b", "a\\b", "A1\n", "", " A1", "A" * 65, "A1\x00"])
-def test_serials_that_could_be_paths_or_lines_are_refused_and_write_nothing(tmp_path: Path, serial: str) -> None:
+@each(["../../etc/x", "a/b", "a\\b", "A1\n", "", " A1", "A" * 65, "A1\x00"])
+def test_serials_that_could_be_paths_or_lines_are_refused_and_write_nothing(serial: str, tmp_path: Path) -> None:
     with pytest.raises(WrongUse, match="correct the serial where it was entered") as problem:
         Ledger(tmp_path).add(event(serial))
     assert len(str(problem.value).splitlines()) == 1
@@ -190,15 +191,10 @@ def test_no_two_calibrations_of_a_unit_hold_on_one_day_whatever_is_written(steps
         assert sum(one.holds(day) for one in calibrations_of(events)) <= 1
 
 
-@pytest.mark.parametrize(
-    ("text", "day"),
-    [("2026-05-01", "2026-05-01"), ("2026-05-01T23:30:00-02:00", "2026-05-02"), ("2026-05-01T12:00:00Z", "2026-05-01")],
-)
-def test_a_day_is_that_of_utc(text: str, day: str) -> None:
-    assert day_of(text, "--at") == day
-
-
-def test_what_is_no_date_is_refused() -> None:
+def test_a_day_is_that_of_utc_and_what_is_no_date_is_refused() -> None:
+    for text, told in (("2026-05-01", "2026-05-01"), ("2026-05-01T23:30:00-02:00", "2026-05-02")):
+        assert day_of(text, "--at") == told
+    assert day_of("2026-05-01T12:00:00Z", "--at") == "2026-05-01"
     with pytest.raises(WrongUse, match=r"--at: found '31\.12\.2026', a date such as 2026-05-01"):
         day_of("31.12.2026", "--at")
 

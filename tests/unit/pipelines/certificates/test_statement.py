@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 from capture_double import small_run
 from ledger_events import day
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 from pipelines.archive import Archive, Run
 from pipelines.certificates.days import months_after
-from pipelines.cli import app
 from pipelines.integrity import verify
 from pipelines.report import make_report
 
@@ -30,14 +29,6 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
 def run(made: Run, tmp_path: Path) -> Run:
     shutil.copytree(made.archive.root, tmp_path / "archive")
     return Archive(tmp_path / "archive").run(made.id)
-
-
-@pytest.fixture
-def typed(run: Run) -> Typed:
-    def type_(*words: str) -> Result:
-        return CliRunner().invoke(app, [*words, "--archive", str(run.archive.root)])
-
-    return type_
 
 
 def units(typed: Typed, run: Run, *words: str) -> dict[str, dict]:

@@ -54,14 +54,6 @@ def run(made: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     return Archive(tmp_path / "archive").run(made.id)
 
 
-@pytest.fixture
-def typed(run: Run) -> Typed:
-    def type_(*words: str) -> Result:
-        return CliRunner().invoke(app, [*words, "--archive", str(run.archive.root)])
-
-    return type_
-
-
 def end_of(run: Run) -> str:
     """The day on which a run was measured: a suite may run over midnight."""
     return str(run.manifest("readings")["when"])[:10]
@@ -91,11 +83,9 @@ def test_a_certificate_does_not_begin_before_the_measurement(run: Run, typed: Ty
     assert typed("certify", run.id, "--from", day(1)).exit_code == 0
 
 
-@pytest.mark.parametrize(
-    "words", [("--months", "13"), ("--until", "2099-01-01"), ("--from", day(400)), ("--months", "1200")]
-)
-def test_a_certificate_lasts_no_longer_than_the_policy_allows(run: Run, typed: Typed, words: tuple[str, str]) -> None:
-    assert typed("certify", run.id, *words).exit_code != 0
+def test_a_certificate_lasts_no_longer_than_the_policy_allows(run: Run, typed: Typed) -> None:
+    for words in (("--months", "13"), ("--until", "2099-01-01"), ("--from", day(400)), ("--months", "1200")):
+        assert typed("certify", run.id, *words).exit_code != 0, words
     assert Ledger(run.archive).events("A1") == []
 
 
@@ -153,39 +143,38 @@ def test_limits_that_do_not_say_how_long_are_kept_as_before() -> None:
     )
 
 
+def meanwhile(monkeypatch: pytest.MonkeyPatch, certified: Callable[[], object]) -> list[object]:
+    """What somebody else certifies once, while a command checks its run."""
+    real, done = certifying.refuse_unsound, list[object]()
+
+    def checked(which: Run, keys: object) -> None:
+        real(which, keys)
+        if not done:
+            done.append(None)
+            done[0] = certified()
+
+    monkeypatch.setattr(certifying, "refuse_unsound", checked)
+    return done
+
+
 def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """While one checks its run, the other certifies a run of the same units: the first is told, and writes nothing."""
     (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
     other = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
-    ledger, real, done = Ledger(run.archive), certifying.refuse_unsound, []
-
-    def meanwhile(which: Run, keys: object) -> None:
-        real(which, keys)
-        if not done:
-            done.append(None)
-            done[0] = certify(ledger, other, ["A2"]).written
-
-    monkeypatch.setattr(certifying, "refuse_unsound", meanwhile)
-    with pytest.raises(
-        WrongUse, match=r"unit A2: certificate A2/1 of run .* was written by .* while this command was at work"
-    ):
+    ledger = Ledger(run.archive)
+    meanwhile(monkeypatch, lambda: certify(ledger, other, ["A2"]))
+    told = r"unit A2: certificate A2/1 of run .* was written by .* while this command was at work"
+    with pytest.raises(WrongUse, match=told):
         certify(ledger, run)
     assert [len(ledger.events(serial)) for serial in ("A1", "A2", "A3")] == [0, 1, 0]
     assert certify(ledger, run).events  # now it is known, and takes its place
 
 
 def test_the_same_certificate_at_the_same_moment_is_written_once(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    ledger, real, done = Ledger(run.archive), certifying.refuse_unsound, []
-
-    def meanwhile(which: Run, keys: object) -> None:
-        real(which, keys)
-        if not done:
-            done.append(None)
-            done[0] = certify(ledger, run)
-
-    monkeypatch.setattr(certifying, "refuse_unsound", meanwhile)
+    ledger = Ledger(run.archive)
+    meanwhile(monkeypatch, lambda: certify(ledger, run))
     assert {event.certificate for event in certify(ledger, run).there} == {"A1/1", "A2/1", "A3/1"}
     assert len(ledger.events("A1")) == 1
 
@@ -289,30 +278,24 @@ def restated(run: Run, **entries: object) -> Run:
     return Archive(run.archive.root).run(run.id)
 
 
-@pytest.mark.parametrize(
-    ("entries", "named"),
-    [
-        ({"reader": None}, "reader (dominates scale and bias)"),
-        ({"reader": {"gain_u_ppm": 0.0, "offset_u_ug": 2.0, "source": "s"}}, "reader gain (dominates"),
-        ({"inner_offset": None}, "inner_offset (dominates misalignment)"),
-        ({"level": {"u_urad": 0.0}}, "level (dominates bias and misalignment)"),
-        ({"thermometer": None}, "thermometer (dominates"),
-        (
-            {
-                "gradient": None,
-                "thermometer": {"measures": "slot", "offset_u_K": 0.1, "slope_u_percent": 0.1, "source": "s"},
-            },
-            "gradient (dominates bias and scale over temperature)",
-        ),
-    ],
-)
+@each([
+    ({"reader": None}, "reader (dominates scale and bias)"),
+    ({"reader": {"gain_u_ppm": 0.0, "offset_u_ug": 2.0, "source": "s"}}, "reader gain (dominates"),
+    ({"inner_offset": None}, "inner_offset (dominates misalignment)"),
+    ({"level": {"u_urad": 0.0}}, "level (dominates bias and misalignment)"),
+    ({"thermometer": None}, "thermometer (dominates"),
+    ({"gradient": None, "thermometer": {"measures": "slot", "offset_u_K": 0.1, "slope_u_percent": 0.1, "source": "s"}},
+     "gradient (dominates bias and scale over temperature)"),
+])  # fmt: skip
 def test_an_entry_that_the_results_depend_on_is_asked_for_and_a_zero_is_none(
-    run: Run, entries: dict[str, object], named: str
+    row: tuple[dict[str, object], str], made: Run, tmp_path: Path
 ) -> None:
-    refuse_unstated(run)
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    own = Archive(tmp_path / "archive").run(made.id)
+    refuse_unstated(own)
     with pytest.raises(WrongUse, match="not stated: ") as refused:
-        refuse_unstated(restated(run, **entries))
-    assert named in str(refused.value)
+        refuse_unstated(restated(own, **row[0]))
+    assert row[1] in str(refused.value)
     assert "a 0 needs exact = true" in str(refused.value)
 
 
@@ -332,20 +315,17 @@ def verdict(p: float | None, reason: str | None = None, named: str = "") -> dict
     return {"adequate": adequate, "reason": reason, **figures, "units": 3, "faulty": []}
 
 
-@pytest.mark.parametrize(
-    ("judged", "said"),
-    [
-        (verdict(4e-5), "NOT ADEQUATE (p < 0.001), p of at least 0.001 is needed"),
-        (verdict(0.01, named="warm_up"), "NOT ADEQUATE (p = 0.01), and what it lacks is found"),
-        (verdict(0.4, named="unit_moved"), "NOT ADEQUATE (p = 0.4), and what it lacks is found"),
-        (verdict(None, "too few poses"), "cannot be judged (too few poses)"),
-    ],
-)
+@each([
+    (verdict(4e-5), "NOT ADEQUATE (p < 0.001), p of at least 0.001 is needed"),
+    (verdict(0.01, named="warm_up"), "NOT ADEQUATE (p = 0.01), and what it lacks is found"),
+    (verdict(0.4, named="unit_moved"), "NOT ADEQUATE (p = 0.4), and what it lacks is found"),
+    (verdict(None, "too few poses"), "cannot be judged (too few poses)"),
+])  # fmt: skip
 def test_a_captured_run_whose_model_is_not_adequate_is_not_certified(
-    run: Run, monkeypatch: pytest.MonkeyPatch, judged: dict, said: str
+    row: tuple[dict, str], run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(certifiable, "adequacy_of", lambda _run: judged)
-    with pytest.raises(WrongUse, match=re.escape(said)):
+    monkeypatch.setattr(certifiable, "adequacy_of", lambda _run: row[0])
+    with pytest.raises(WrongUse, match=re.escape(row[1])):
         certify(Ledger(run.archive), run)
     assert Ledger(run.archive).events("A1") == []
 

@@ -4,6 +4,7 @@ import io
 from pathlib import Path
 
 import pytest
+from each import each
 from rich.console import Console
 from rich.text import Text
 from typer.testing import CliRunner
@@ -65,30 +66,15 @@ def test_a_sentence_is_wrapped_between_words_and_a_command_stays_whole() -> None
     assert report.endswith("report.html")
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["keys", "station"],
-        ["plan"],
-        ["station", "profiles"],
-        ["station", "profiles", "watlow_f4t"],
-        ["list"],
-        ["run", "--help"],
-    ],
-    ids=" ".join,
-)
-def test_a_command_needs_eighty_columns_at_most(
-    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@each(["keys station", "plan", "station profiles", "station profiles watlow_f4t", "list", "run --help"])
+def test_a_command_needs_eighty_columns_at_most(words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("NO_COLOR", "1")
-    result = CliRunner().invoke(app, words, env={"COLUMNS": "80"})
+    result = CliRunner().invoke(app, words.split(), env={"COLUMNS": "80"})
     assert result.exit_code == 0, result.output
-    long = [
-        line for line in result.stdout.splitlines() if len(line) > 80 and not line.lstrip().startswith("tumbleline ")
-    ]
-    assert long == []
-    assert "…" not in "".join(line[-2:] for line in result.stdout.splitlines() if "│" in line)
+    lines = result.stdout.splitlines()
+    assert [line for line in lines if len(line) > 80 and not line.lstrip().startswith("tumbleline ")] == []
+    assert "…" not in "".join(line[-2:] for line in lines if "│" in line)
 
 
 COLUMNS = ["effect", "of the", "size\nµg", "p", "left\nµg", "left out\nµg", "with"]
@@ -143,18 +129,7 @@ def test_a_column_without_an_entry_is_left_out_and_an_empty_table_keeps_its_head
 
 
 def test_narrower_gaps_save_a_continuation_of_one_column() -> None:
-    heads = [
-        "slot",
-        "unit",
-        "result",
-        "grade",
-        "fit\nµg",
-        "verify\nµg",
-        "error\nµg",
-        "period\nµg",
-        "N\nµg/√Hz",
-        "B\nµg",
-    ]
+    heads = ["slot", "unit", "result", "grade", "fit\nµg", "verify\nµg", "error\nµg", "period\nµg", "N\nµg/√Hz", "B\nµg"]
     line = ["0", "TL0001", "pass", "consumer", "352", "474", "595", "731", "10.3", "299"]
     out = WordConsole(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
     print_table(heads, [line], out=out)

@@ -16,6 +16,7 @@ import pytest
 import yaml
 from asgi_client import AsgiClient
 from capture_double import small_run
+from each import each
 from prometheus_client.parser import text_string_to_metric_families
 from root_process import ROOT
 
@@ -280,9 +281,24 @@ def test_each_alert_is_delivered_once_although_the_receiver_fails_and_the_servic
     assert other[0]["id"] not in {one["id"] for one in alerts}, "the second crash of a run is told too"
 
 
-def test_alerts_are_posted_by_the_service_as_they_come(tmp_path: Path) -> None:
-    monitor = _Fixed(full())
-    with receiver([503]) as (address, accepted), alerting(monitor, Poster(address, tmp_path), None, every_s=0.02):
+class _Failing(_Fixed):
+    """A monitor whose first snapshots fail."""
+
+    failures = 2
+
+    def snapshot(self) -> Snapshot:
+        if self.failures:
+            self.failures -= 1
+            raise ValueError("no number")
+        return self.taken
+
+
+@each([(_Fixed, 503), (_Failing, 200)])
+def test_alerts_are_posted_as_they_come_and_go_on_after_a_refusal_and_an_unexpected_error(
+    row: tuple[type[_Fixed], int], tmp_path: Path
+) -> None:
+    monitor = row[0](full())
+    with receiver([row[1]]) as (address, accepted), alerting(monitor, Poster(address, tmp_path), None, every_s=0.02):
         monitor.taken = full(stations=StationNumbers(set(), {"line-1": "run-1"}))
         for _ in range(500):
             if accepted:
@@ -346,25 +362,3 @@ def test_an_unexpected_error_of_one_source_does_not_hide_the_others(
     taken = Monitor(Archive(tmp_path / "none")).snapshot()
     assert "KeyError" in taken.faults["stations"]
     assert not taken.ok
-
-
-class _Failing(_Fixed):
-    """A monitor whose first snapshots fail."""
-
-    failures = 2
-
-    def snapshot(self) -> Snapshot:
-        if self.failures:
-            self.failures -= 1
-            raise ValueError("no number")
-        return self.taken
-
-
-def test_alerts_go_on_after_an_unexpected_error(tmp_path: Path) -> None:
-    monitor = _Failing(full(stations=StationNumbers(set(), {"line-1": "run-1"})))
-    with receiver([]) as (address, accepted), alerting(monitor, Poster(address, tmp_path), None, every_s=0.02):
-        for _ in range(500):
-            if accepted:
-                break
-            threading.Event().wait(0.02)
-    assert [one["kind"] for one in accepted] == ["unsafe"]

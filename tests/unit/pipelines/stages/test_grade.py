@@ -1,6 +1,7 @@
 """Limits, decision rules and grades."""
 
 import pytest
+from each import each
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,25 +17,16 @@ rule = "{rule}"
 [figures]
 bias_error_ug = {{ max = 100.0, unit = "µg" }}
 """
+LEAST = """
+name = "bandwidth"
+rule = "{rule}"
+[figures]
+sweep_bandwidth_hz = {{ min = 800.0, unit = "Hz" }}
+"""
 
 
 def limits(rule: str = "guarded_acceptance") -> Limits:
     return parse_limits(TEXT.format(rule=rule), "limits test", UNITS)
-
-
-@pytest.mark.parametrize(
-    ("value", "guarded", "simple"),
-    [
-        (80.0, "pass", "pass"),
-        (95.0, "conditional pass", "pass"),
-        (105.0, "conditional fail", "fail"),
-        (115.0, "fail", "fail"),
-        (-115.0, "fail", "fail"),
-    ],
-)
-def test_decides_by_the_agreed_rule(value: float, guarded: str, simple: str) -> None:
-    assert decide(limits(), "bias_error_ug", value, 5.0).outcome == guarded
-    assert decide(limits("simple_acceptance"), "bias_error_ug", value, 5.0).outcome == simple
 
 
 def test_names_value_uncertainty_limit_margin_and_rule() -> None:
@@ -53,28 +45,20 @@ def test_names_value_uncertainty_limit_margin_and_rule() -> None:
     assert decision.rule == "ILAC-G8:09/2019 guarded acceptance, w = U with k = 2"
 
 
-def test_refuses_a_limit_in_another_unit_than_its_figure() -> None:
-    with pytest.raises(RecipeInvalid, match="the limit is in mg, the figure is in µg"):
-        parse_limits(TEXT.format(rule="simple_acceptance").replace('"µg"', '"mg"'), "limits test", UNITS)
+@each([
+    ('"µg"', '"mg"', "the limit is in mg, the figure is in µg"),
+    ("bias_error_ug", "bias_eror_ug", "did you mean bias_error_ug"),
+    ("{rule}", "none", "rule.*guarded_acceptance"),
+])  # fmt: skip
+def test_refuses_limits_by_what_is_wrong_in_them(row: tuple[str, str, str]) -> None:
+    old, new, said = row
+    with pytest.raises(RecipeInvalid, match=said):
+        parse_limits(TEXT.replace(old, new).format(rule="simple_acceptance"), "limits test", UNITS)
 
 
-def test_names_close_figures() -> None:
-    with pytest.raises(RecipeInvalid, match="did you mean bias_error_ug"):
-        parse_limits(
-            TEXT.format(rule="simple_acceptance").replace("bias_error_ug", "bias_eror_ug"), "limits test", UNITS
-        )
-
-
-def test_names_the_rules_where_one_is_unknown() -> None:
-    with pytest.raises(RecipeInvalid, match=r"rule.*guarded_acceptance"):
-        limits("none")
-
-
-@pytest.mark.parametrize(
-    ("value", "grade"), [(30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)]
-)
-def test_grades_by_the_bias_that_is_left(value: float, grade: str | None) -> None:
-    assert grade_of(value, 0.0, "guarded_acceptance") == grade
+def test_grades_by_the_bias_that_is_left() -> None:
+    for value, grade in ((30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)):
+        assert grade_of(value, 0.0, "guarded_acceptance") == grade
 
 
 @given(st.floats(0.0, 3000.0), st.floats(0.0, 500.0))
@@ -88,35 +72,28 @@ def test_there_are_limits_for_every_grade() -> None:
     assert set(sample_names("limits-")) - {"production"} == set(GRADES)
 
 
-LEAST = """
-name = "bandwidth"
-rule = "{rule}"
-[figures]
-sweep_bandwidth_hz = {{ min = 800.0, unit = "Hz" }}
-"""
-
-
-@pytest.mark.parametrize(
-    ("value", "guarded", "simple"),
-    [
-        (820.0, "pass", "pass"),
-        (805.0, "conditional pass", "pass"),
-        (795.0, "conditional fail", "fail"),
-        (700.0, "fail", "fail"),
-        (-900.0, "fail", "fail"),
-        (float("nan"), "conditional fail", "conditional fail"),  # passes nothing
-    ],
-)
-def test_a_least_value_is_decided_by_the_same_rules(value: float, guarded: str, simple: str) -> None:
-    decision = decide(
-        parse_limits(LEAST.format(rule="guarded_acceptance"), "test", UNITS), "sweep_bandwidth_hz", value, 5.0
-    )
-    assert decision.outcome == guarded
-    assert decision.accept == 810.0
-    other = decide(
-        parse_limits(LEAST.format(rule="simple_acceptance"), "test", UNITS), "sweep_bandwidth_hz", value, 5.0
-    )
-    assert other.outcome == simple
+@each([
+    (TEXT, 80.0, "pass", "pass"),
+    (TEXT, 95.0, "conditional pass", "pass"),
+    (TEXT, 105.0, "conditional fail", "fail"),
+    (TEXT, 115.0, "fail", "fail"),
+    (TEXT, -115.0, "fail", "fail"),
+    (LEAST, 820.0, "pass", "pass"),
+    (LEAST, 805.0, "conditional pass", "pass"),
+    (LEAST, 795.0, "conditional fail", "fail"),
+    (LEAST, 700.0, "fail", "fail"),
+    (LEAST, -900.0, "fail", "fail"),
+    (LEAST, float("nan"), "conditional fail", "conditional fail"),  # passes nothing
+])  # fmt: skip
+def test_decides_by_the_agreed_rule(row: tuple[str, float, str, str]) -> None:
+    text, value, *expected = row
+    figure, accept = ("bias_error_ug", 90.0) if text == TEXT else ("sweep_bandwidth_hz", 810.0)
+    decisions = [
+        decide(parse_limits(text.format(rule=rule), "test", UNITS), figure, value, 5.0)
+        for rule in ("guarded_acceptance", "simple_acceptance")
+    ]
+    assert [one.outcome for one in decisions] == expected
+    assert decisions[0].accept == accept
 
 
 def test_a_least_value_says_its_side_its_margin_and_its_risk() -> None:
