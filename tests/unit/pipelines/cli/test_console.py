@@ -129,7 +129,18 @@ def test_a_column_without_an_entry_is_left_out_and_an_empty_table_keeps_its_head
 
 
 def test_narrower_gaps_save_a_continuation_of_one_column() -> None:
-    heads = ["slot", "unit", "result", "grade", "fit\nµg", "verify\nµg", "error\nµg", "period\nµg", "N\nµg/√Hz", "B\nµg"]
+    heads = [
+        "slot",
+        "unit",
+        "result",
+        "grade",
+        "fit\nµg",
+        "verify\nµg",
+        "error\nµg",
+        "period\nµg",
+        "N\nµg/√Hz",
+        "B\nµg",
+    ]
     line = ["0", "TL0001", "pass", "consumer", "352", "474", "595", "731", "10.3", "299"]
     out = WordConsole(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
     print_table(heads, [line], out=out)

@@ -146,9 +146,10 @@ def test_dwells_and_steps_of_others_are_imported_by_the_command(tmp_path: Path, 
         "z=dut [V],reference=ref [m/s^2]",
         "--unit",
         "W1",
-        "--json",
     ]
-    answer = CliRunner().invoke(app, ["import", *map(str, paths), *arguments, "--archive", str(tmp_path / "archive")])
+    answer = CliRunner().invoke(
+        app, ["import", *map(str, paths), *arguments, "--json", "--archive", str(tmp_path / "archive")]
+    )
     document = json.loads(answer.stdout)
     figures = {one["figure"]: one["value"] for one in document["figures"]}
     assert figures["sweep_natural_hz"] == pytest.approx(2000.0, rel=0.01)

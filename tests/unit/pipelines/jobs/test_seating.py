@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from capture_double import recipe_file
+from each import each
 from root_process import ROOT
 
 from pipelines.jobs.job import Request
@@ -33,19 +34,17 @@ def test_a_slot_map_says_where_each_unit_sits(tmp_path: Path, name: str, text: s
     assert read_seating(written(tmp_path, name, text)) == Seating(("A5", "A2"), (5, 2))
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("map.csv", "A1\nA2\n", "begins with 'a1', a first line 'slot,serial' is needed"),
-        ("map.csv", "slot,serial\nx,A1\n", "row 1: slot 'x', a whole number"),
-        ("map.csv", "slot,serial\n-1,A1\n", "row 1: slot '-1', a whole number"),
-        ("map.csv", "slot,serial\n1,A1\n1,A2\n", "row 2: slot 1 is there twice"),
-        ("map.csv", "slot,serial\n1,\n", "slot 1 has no serial number"),
-        ("map.csv", "slot,serial\n", "no slot has a unit"),
-        ("map.toml", "seats = 1\n", r"no table \[slots\]"),
-    ],
-)
-def test_refuses_slot_maps_with_a_slip(tmp_path: Path, name: str, text: str, words: str) -> None:
+@each([
+    ("map.csv", "A1\nA2\n", "begins with 'a1', a first line 'slot,serial' is needed"),
+    ("map.csv", "slot,serial\nx,A1\n", "row 1: slot 'x', a whole number"),
+    ("map.csv", "slot,serial\n-1,A1\n", "row 1: slot '-1', a whole number"),
+    ("map.csv", "slot,serial\n1,A1\n1,A2\n", "row 2: slot 1 is there twice"),
+    ("map.csv", "slot,serial\n1,\n", "slot 1 has no serial number"),
+    ("map.csv", "slot,serial\n", "no slot has a unit"),
+    ("map.toml", "seats = 1\n", r"no table \[slots\]"),
+])  # fmt: skip
+def test_refuses_slot_maps_with_a_slip(row: tuple[str, str, str], tmp_path: Path) -> None:
+    name, text, words = row
     with pytest.raises(WrongUse, match=words):
         read_seating(written(tmp_path, name, text))
 
@@ -91,18 +90,16 @@ def test_faults_of_the_command_line_and_the_recipe_become_the_stations(tmp_path:
     assert job.capture_id != Request(recipe=recipe_file(tmp_path)).job().capture_id
 
 
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ("sillent:serial=A1", "did you mean silent"),
-        ("silent:serial=A9", "no unit 'A9'"),
-        ("silent", "correct the fault"),
-        ("silent:serial", "found 'serial', key=value is needed"),
-        ("door:at_s=soon", "at_s: input should be a valid number"),
-        ("vibration:rms=1", "no figure 'rms'; did you mean rms_g"),
-    ],
-)
-def test_refuses_faults_with_a_slip(tmp_path: Path, fault: str, words: str) -> None:
+@each([
+    ("sillent:serial=A1", "did you mean silent"),
+    ("silent:serial=A9", "no unit 'A9'"),
+    ("silent", "correct the fault"),
+    ("silent:serial", "found 'serial', key=value is needed"),
+    ("door:at_s=soon", "at_s: input should be a valid number"),
+    ("vibration:rms=1", "no figure 'rms'; did you mean rms_g"),
+])  # fmt: skip
+def test_refuses_faults_with_a_slip(row: tuple[str, str], tmp_path: Path) -> None:
+    fault, words = row
     with pytest.raises((WrongUse, RecipeInvalid), match=words):
         Request(recipe=recipe_file(tmp_path), faults=(fault,)).job()
 

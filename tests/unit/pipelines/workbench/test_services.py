@@ -286,14 +286,10 @@ def test_a_search_in_memory_gives_what_the_files_of_the_archive_give(tmp_path: P
     write_archive(archive, 6, years=2.0, seed=3, workers=1)
     recent = RecentIndex(str(archive))
     pages = [
-        UnitsPage(),
-        UnitsPage(search="3", order="unit"),
-        UnitsPage(outcome="fail", order="station", page=2),
+        UnitsPage(), UnitsPage(search="3", order="unit"), UnitsPage(outcome="fail", order="station", page=2),
         UnitsPage(station="line-1", since="2022-01-01", order="outcome"),
-        UnitsPage(search="no'such"),
-        UnitsPage(search="RUN"),
-        UnitsPage(search="100%_µ!"),
-    ]
+        UnitsPage(search="no'such"), UnitsPage(search="RUN"), UnitsPage(search="100%_µ!"),
+    ]  # fmt: skip
     questions = [question(page) for page in pages for question in (units_question, yield_question)]
     unit = str(recent.ask(units_question(UnitsPage())).rows[0][0])
     for question in (*questions, newest_question(12), history_question(unit)):
