@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from each import each
 from root_process import ROOT
 
 from pipelines.orchestrator.worker_health import Silence
@@ -26,32 +27,26 @@ def said(heartbeats: list[str | None], every: float = BEAT) -> list[bool]:
     return out
 
 
-def test_heartbeats_that_come_are_no_silence() -> None:
-    assert not any(said([f"{n}" for n in range(50)]))
+CLOCK_SET_BACK = ["2026-05-01T10:00", "2026-05-01T10:01", "2026-05-01T09:00", "2026-05-01T09:01", "2026-05-01T09:02"]
+CASES = {
+    "heartbeats that come": ([f"{n}" for n in range(50)], BEAT, False),
+    "heartbeats that stop, before the time": (["1", "2", "2", "2", "2"], BEAT, False),
+    "heartbeats that stop, after the time": (["1", "2", "2", "2", "2", "2"], BEAT, True),
+    "an outage of the server": (["1", "2", *[None] * 20, "2", "2", "2", "2"], BEAT, False),
+    "silence after an outage of the server": (["1", "2", *[None] * 20, "2", "2", "2", "2", "2"], BEAT, True),
+    "a worker that starts": ([""] * 6, BEAT, False),
+    "a worker that starts too slowly": ([""] * 7, BEAT, True),
+    "a worker that follows another": (["of its predecessor"] * 6, BEAT, False),
+    "a worker that follows another too slowly": (["of its predecessor"] * 7, BEAT, True),
+    "a computer that was suspended counts from its waking": (["1", "2", "2", "2", "2", "2", "2"], 3600.0, False),
+    "a clock that was set back": (CLOCK_SET_BACK, BEAT, False),
+}
 
 
-def test_heartbeats_that_stop_are_silence_after_the_time_and_not_before() -> None:
-    assert said(["1", "2", "2", "2", "2", "2"]) == [False] * 5 + [True]
-
-
-def test_an_outage_of_the_server_is_not_the_workers_fault() -> None:
-    assert not any(said(["1", "2", *[None] * 20, "2", "2", "2", "2"]))
-    assert said(["1", "2", *[None] * 20, "2", "2", "2", "2", "2"])[-1]
-
-
-def test_a_worker_has_longer_to_start() -> None:
-    assert said([""] * 7) == [False] * 6 + [True]
-    assert said(["of its predecessor"] * 7) == [False] * 6 + [True]
-
-
-def test_a_computer_that_was_suspended_counts_from_its_waking() -> None:
-    assert not any(said(["1", "2", "2", "2", "2", "2", "2"], every=3600.0))
-
-
-def test_a_clock_that_was_set_back_is_no_silence() -> None:
-    assert not any(
-        said(["2026-05-01T10:00", "2026-05-01T10:01", "2026-05-01T09:00", "2026-05-01T09:01", "2026-05-01T09:02"])
-    )
+@each(CASES)
+def test_silence_is_said_after_its_time_and_not_before(name: str) -> None:
+    heartbeats, every, silent = CASES[name]
+    assert said(heartbeats, every) == [False] * (len(heartbeats) - 1) + [silent]
 
 
 HANGS = """

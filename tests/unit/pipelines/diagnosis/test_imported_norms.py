@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from each import each
 from scipy.spatial.transform import Rotation
 
 from benchmarks.made_recordings import NOISES, Recording, make
@@ -21,12 +22,16 @@ from schemas.errors import DataRejected, WrongUse
 PLAIN = ("bias", "scale", "misalignment")
 
 
-@pytest.mark.parametrize(
-    ("p", "answer"),
-    [(0.2, True), (0.01, False), (np.nan, None), ([0.2, np.nan], None), ([0.01, np.nan], False), ([], None)],
-)
-def test_a_probability_that_is_no_number_neither_passes_nor_fails(p: object, answer: object) -> None:
-    assert passes(p, 0.05) is answer
+def test_a_probability_that_is_no_number_neither_passes_nor_fails() -> None:
+    for p, answer in (
+        (0.2, True),
+        (0.01, False),
+        (np.nan, None),
+        ([0.2, np.nan], None),
+        ([0.01, np.nan], False),
+        ([], None),
+    ):
+        assert passes(p, 0.05) is answer, p
 
 
 def test_white_noise_and_a_long_first_rest_are_adequate() -> None:
@@ -144,28 +149,20 @@ def test_a_warm_up_of_unknown_poses_comes_back_with_its_uncertainty() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("effects", "words"),
-    [
-        ((*PLAIN, "gravity_value"), "gravity_value is an effect of the station"),
-        (("bias", "misalignment"), "needs bias and scale"),
-        ((*PLAIN, "slot_rotation"), "slot_rotation on axis . does not show in the norm"),
-        ((*PLAIN, "supply_sensitivity"), "supply_sensitivity: the dwells have no supply"),
-    ],
-)
-def test_what_the_norm_does_not_determine_is_refused_by_name(effects: tuple[str, ...], words: str) -> None:
-    with pytest.raises(DataRejected, match=words):
-        norms_fitted(make(Recording(30), 2).dwells, None, effects)
+@each([
+    ((*PLAIN, "gravity_value"), "gravity_value is an effect of the station"),
+    (("bias", "misalignment"), "needs bias and scale"),
+    ((*PLAIN, "slot_rotation"), "slot_rotation on axis . does not show in the norm"),
+    ((*PLAIN, "supply_sensitivity"), "supply_sensitivity: the dwells have no supply"),
+])  # fmt: skip
+def test_what_the_norm_does_not_determine_is_refused_by_name(row: tuple[tuple[str, ...], str]) -> None:
+    with pytest.raises(DataRejected, match=row[1]):
+        norms_fitted(make(Recording(30), 2).dwells, None, row[0])
 
 
 def test_a_class_names_the_effect_that_its_parameters_are_of() -> None:
-
-    group = {
-        "effects": ["aging_linear", "warm_up"],
-        "scope": "sensor",
-        "nonlinear": {"tau": 7200.0},
-        "nonlinear_of": "warm_up",
-    }
+    group = {"effects": ["aging_linear", "warm_up"], "scope": "sensor"}
+    group |= {"nonlinear": {"tau": 7200.0}, "nonlinear_of": "warm_up"}
     assert parameters_of(group) == "warm_up: tau = 7200 s"
     assert parameters_of({**group, "nonlinear": {}, "nonlinear_of": None}) == ""
     assert parameters_of({**group, "effects": ["warm_up"]}) == "tau = 7200 s"

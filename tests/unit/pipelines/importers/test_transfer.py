@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
 from scipy import signal
 from typer.testing import CliRunner
 
@@ -12,6 +13,8 @@ from pipelines.archive import Archive
 from pipelines.cli import app
 from pipelines.importers.transfer import import_transfer
 from schemas.errors import DataRejected
+
+HEAD = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
 
 
 def written(path: Path, *, low_pass_hz: float = 0.0, top: float = 5000.0, seed: int = 1) -> Path:
@@ -26,9 +29,7 @@ def written(path: Path, *, low_pass_hz: float = 0.0, top: float = 5000.0, seed: 
     size = 0.3 * np.abs(h) * (1.0 + 0.002 * rng.normal(size=f.size))
     phase = np.degrees(np.angle(h)) + 0.15 * rng.normal(size=f.size)
     rows = "\n".join(f"{a:.9g},{b:.9g},{c:.9g},0.2,0.15" for a, b, c in zip(f, size, phase, strict=True))
-    path.write_text(
-        "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n" + rows + "\n"
-    )
+    path.write_text(f"{HEAD}\n{rows}\n")
     return path
 
 
@@ -59,27 +60,16 @@ def test_a_sweep_that_ends_too_soon_gives_an_interval(tmp_path: Path) -> None:
     assert diagnosis["next_hz"] == [] or min(diagnosis["next_hz"]) > 100.0
 
 
-@pytest.mark.parametrize(
-    ("text", "needed"),
-    [
-        ("f,h\n1,2\n", "column frequency_hz, magnitude"),
-        (
-            "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,0,0,1\n",
-            "a value above 0",
-        ),
-        (
-            "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,x,1,1\n",
-            "a finite number",
-        ),
-        (
-            "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg\n1,2,0,1,1\n",
-            "1 points",
-        ),
-    ],
-)
-def test_a_file_without_units_or_values_is_refused(text: str, needed: str, tmp_path: Path) -> None:
+@each([
+    ("f,h", "1,2", "column frequency_hz, magnitude"),
+    (HEAD, "1,2,0,0,1", "a value above 0"),
+    (HEAD, "1,2,x,1,1", "a finite number"),
+    (HEAD, "1,2,0,1,1", "1 points"),
+])  # fmt: skip
+def test_a_file_without_units_or_values_is_refused(row: tuple[str, str, str], tmp_path: Path) -> None:
+    head, line, needed = row
     path = tmp_path / "bad.csv"
-    path.write_text(text)
+    path.write_text(f"{head}\n{line}\n")
     with pytest.raises(DataRejected, match=needed):
         import_transfer(path, "S1", archive=str(tmp_path / "archive"))
 
