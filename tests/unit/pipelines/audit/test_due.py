@@ -1,6 +1,7 @@
 """What is due agrees with the ledger: with what ``show UNIT --at DATE`` says, whatever was certified, superseded and revoked."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def told(all_: Calibrations, certificates: Certificates) -> tuple[str, str, str,
     return date_of(due_units.day[0]), str(due_units.because[0]), str(due_units.certificate[0]), bool(due_units.valid[0])
 
 
-REVOKED = {"action": "revoke", "until": "9999-12-31", "ends": (1,)}
+REVOKED: dict[str, Any] = {"action": "revoke", "until": "9999-12-31", "ends": (1,)}
 FIRST = ("A1", "r-1", "2026-01-01")
 STATES = {
     "due when its certificate ends and not when the interval does":
