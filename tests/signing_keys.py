@@ -4,11 +4,26 @@ from datetime import UTC, datetime, timedelta
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.asymmetric.types import CertificateIssuerPrivateKeyTypes
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import NameOID
 
 from pipelines.certificates.document.signing import SigningKey
+
+
+def self_signed(
+    subject: str, begins: int, ends: int, *, issuer: SigningKey | None = None, authority: bool = False
+) -> SigningKey:
+    """A key whose certificate holds between these days from now, signed by itself or by an issuer's key."""
+    own = ec.generate_private_key(ec.SECP256R1())
+    name, now = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, subject)]), datetime.now(UTC)
+    builder = x509.CertificateBuilder().subject_name(name).public_key(own.public_key()).serial_number(9)
+    builder = builder.issuer_name(name if issuer is None else issuer.certificate.subject)
+    builder = builder.not_valid_before(now + timedelta(days=begins)).not_valid_after(now + timedelta(days=ends))
+    if authority:
+        builder = builder.add_extension(x509.BasicConstraints(True, None), critical=True)
+    return SigningKey(own, builder.sign(own if issuer is None else issuer.key, hashes.SHA256()), ())
 
 
 def made_key(key: CertificateIssuerPrivateKeyTypes) -> SigningKey:

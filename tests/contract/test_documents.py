@@ -147,9 +147,9 @@ def test_certify_prints_the_document_of_its_type(kept: Path) -> None:
 def test_every_typed_document_is_printed_by_a_test() -> None:
     # lots of other tests' runs; tests/e2e/test_inquiry.py and test_operator.py
     untested = {"run --json (several fillings)", "show RUN --json (no grades)", "investigate --json", "operator --json"}
-    untested |= {"certificate --json"}  # tests/unit/test_certificate_document.py
-    untested |= {"verify FILE… --json"}  # tests/unit/test_certificate_check.py
-    untested |= {"certify --json"}  # above, and tests/unit/test_certificate_check.py
+    untested |= {"certificate --json"}  # tests/unit/pipelines/certificates/document/test_compose.py
+    untested |= {"verify FILE… --json"}  # tests/unit/pipelines/certificates/document/test_file_check.py
+    untested |= {"certify --json"}  # above, and tests/unit/pipelines/certificates/document/test_file_check.py
     untested |= {"program --json"}  # tests/faults/test_programming.py
     untested |= {"fit --json (an import)"}  # tests/e2e/test_imported_recording.py
     untested |= {"demo --auto --json", "demo --by-hand --json"}  # tests/e2e/test_diagnosis_commands.py

@@ -59,7 +59,7 @@ ELSEWHERE = {
     "whatif": "fits the archive twice; its table is that of diff",
     "workbench": "serves pages",
     "operator": "asks an orchestrator",
-    "doctor": "asks an orchestrator; its table is tested in tests/unit/test_doctor.py",
+    "doctor": "asks an orchestrator; its table is tested in tests/unit/pipelines/doctor/test_examine.py",
     "program": "moves a station",
     "certificate": "writes documents, prints one line each",
     "correct": "prints lines, tests/e2e/test_correct.py",

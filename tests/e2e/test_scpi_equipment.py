@@ -1,0 +1,168 @@
+"""Equipment by SCPI on its line: the level loop of the exciter, refusals, safe states; adapters that know no plant."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from root_process import ROOT
+from small_station import lot_of
+
+from inertial.dynamics.sine_fit import fit_tone
+from schemas.errors import OperatorNeeded, StationRefused
+from schemas.fault import FaultOrder
+from schemas.station import load_station, with_faults
+from schemas.station_devices import Device, Equipment
+from stations import open_station
+from stations.clock import Clock
+from stations.devices.families.scpi_supply import ScpiSupply
+from stations.devices.recording import RecordingSpoilt
+from stations.devices.values import Values
+
+FAMILIES = ROOT / "stations" / "devices" / "families"
+
+
+def station_of(faults: list[FaultOrder] | None = None):
+    """The built-in station with the generator before its exciter."""
+    own = Equipment(exciter=Device(profile="scpi_exciter", device_id=241, link="ascii"))
+    return with_faults(load_station().model_copy(update={"equipment": own}), faults or [])
+
+
+@pytest.mark.parametrize(("frequency", "level"), [(20.0, 0.3), (160.0, 2.0), (900.0, 5.0)])
+def test_the_level_of_an_open_loop_generator_is_reached(frequency: float, level: float) -> None:
+    with open_station(station_of(), lot_of(1), roles=["exciter"]) as station:
+        recording = station.equipment["exciter"].sine(frequency, level, 2, 0.2, [0])
+        tone = fit_tone(recording.reference, recording.reference_rate_hz, frequency)
+        assert abs(tone.value[2]) == pytest.approx(level, rel=0.12)
+        assert recording.outputs[0].shape[1] == 3
+
+
+def test_a_level_beyond_the_exciter_and_a_missed_trigger_give_no_recording() -> None:
+    with (
+        open_station(station_of(), lot_of(1), roles=["exciter"]) as station,
+        pytest.raises((OperatorNeeded, RecordingSpoilt)),
+    ):
+        station.equipment["exciter"].sine(5.0, 5.0, 2, 0.2, [0])
+    missed = station_of([FaultOrder(kind="missed_trigger")])
+    with open_station(missed, lot_of(1), roles=["exciter"]) as station, pytest.raises(RecordingSpoilt, match="trigger"):
+        station.equipment["exciter"].sine(80.0, 1.0, 2, 0.1, [0])
+
+
+def test_the_supply_sets_measures_and_returns_to_its_nominal_voltage() -> None:
+    with open_station(load_station(), lot_of(1), roles=["power_supply"]) as station:
+        supply = station.equipment["power_supply"]
+        nominal = station.reader.instruments().supply_V[0]
+        ratio = supply.set_voltage(0.9 * 3.3)
+        assert station.reader.instruments().supply_V[0] / nominal == pytest.approx(ratio, rel=1e-3)
+        supply.stand_by()
+        assert station.reader.instruments().supply_V[0] == pytest.approx(nominal, rel=1e-3)
+        for volt in (60.0, 12.0, float("nan")):  # in the range of the supply or not: devices for 3.3 V do not endure it
+            with pytest.raises(StationRefused, match=r"at most 50 % from the nominal 3\.3 V"):
+                supply.set_voltage(volt)
+        assert station.reader.instruments().supply_V[0] == pytest.approx(nominal, rel=1e-3)
+        supply.set_voltage(3.0)
+        assert "power supply stopped" in station.make_safe().done
+        assert station.reader.instruments().supply_V[0] == pytest.approx(nominal, rel=1e-3)
+
+
+class Queue:
+    """A supply whose queue has errors that somebody else has caused."""
+
+    name = "power supply"
+
+    def __init__(self, codes: list[int]) -> None:
+        self.codes, self.set, self.profile = codes, 3.3, SimpleNamespace(stated={})
+
+    def number(self, name: str) -> float:
+        if name == "error":
+            return float(self.codes.pop(0)) if self.codes else 0.0
+        return self.set
+
+    def write(self, name: str, value: object) -> None:
+        if name == "voltage":
+            self.set = float(str(value))
+
+
+def test_errors_of_earlier_users_of_a_supply_are_not_those_of_our_orders() -> None:
+    queue = Queue([-113, -222, -410])
+    supply = ScpiSupply(cast("Values", queue), cast("Clock", SimpleNamespace(sleep=lambda seconds: None)))
+    assert supply.set_voltage(3.0) == pytest.approx(3.0 / 3.3)
+    queue.codes.append(-222)
+    with pytest.raises(StationRefused, match=r"error -222 at 2\.8 V"):
+        supply.set_voltage(2.8)
+
+
+def test_a_supply_whose_errors_never_end_is_refused() -> None:
+    supply = ScpiSupply(
+        cast("Values", Queue([-350] * 1000)), cast("Clock", SimpleNamespace(sleep=lambda seconds: None))
+    )
+    with pytest.raises(StationRefused, match="queue is not empty, an end is needed"):
+        supply.set_voltage(3.0)
+
+
+def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:
+    from pipelines.archive import Archive
+    from pipelines.capture.capture import capture
+    from pipelines.jobs.recipes import load_recipe
+    from pipelines.procedures import PROCEDURES, parts_of
+    from pipelines.procedures.recorded import nominal_device, procedure_record
+    from pipelines.schedule.steps import steps
+    from schemas.lot import Lot, Unit
+    from schemas.progress import silent
+
+    path = tmp_path / "recipe.toml"
+    path.write_text(
+        'name = "generator"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n[[procedures]]\n'
+        'kind = "sweep"\nfrequencies_hz = [40.0, 80.0, 120.0, 160.0, 320.0, 640.0, 900.0, 1300.0, 2000.0]\n'
+        "nominal_scale = 0.007\nlevel_g = 2.0\nrecord_s = 0.05\ncycles = 4\n"
+    )
+    recipe = load_recipe(str(path))
+    lot, records = (
+        Lot(units=[Unit(serial="G1", slot=0)], device="SF1500", seed=3),
+        Archive(tmp_path / "a").capture("one"),
+    )
+    with open_station(station_of(), lot, roles=["exciter"]) as station:
+        capture(station, recipe, lot, records, progress=silent, events=records.events)
+    readings = records.gathered("readings")
+    part, plan = parts_of(recipe)[0], steps(recipe)
+    taken = [
+        procedure_record(k, step.order, [next(records.samples([k]))], readings[readings["record"] == k])
+        for k, step in enumerate(plan)
+    ]
+    points = PROCEDURES["sweep"].reduce(part, taken, nominal_device(readings))
+    assert np.all(np.isfinite(points["value"]))
+    assert points["value"].iloc[3] == pytest.approx(0.007, rel=0.02)
+
+
+def shock_station(faults: list[FaultOrder] | None = None):
+    """The built-in station with a shock machine that holds registers."""
+    own = Equipment(shock_machine=Device(profile="modbus_shock", device_id=60, link="tcp"))
+    return with_faults(load_station().model_copy(update={"equipment": own}), faults or [])
+
+
+def test_a_shock_machine_by_modbus_is_armed_released_and_read() -> None:
+    with open_station(shock_station(), lot_of(2), roles=["shock_machine"]) as station:
+        recording = station.equipment["shock_machine"].shock(30.0, 0.011, 2, -1, [0, 1])
+        assert float(recording.reference[:, 2].min()) == pytest.approx(-30.0, rel=0.15)
+        assert set(recording.outputs) == {0, 1}
+        assert "shock machine stopped" in station.make_safe().done
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "text"),
+    [
+        ("guard_door", OperatorNeeded, "guard door is open"),
+        ("missed_trigger", RecordingSpoilt, "trigger was missed"),
+        ("level_not_reached", RecordingSpoilt, "was ordered"),
+    ],
+)
+def test_trouble_at_a_shock_machine_by_modbus_gives_no_recording(kind: str, error: type, text: str) -> None:
+    station = shock_station([FaultOrder(kind=kind)])
+    with open_station(station, lot_of(1), roles=["shock_machine"]) as opened, pytest.raises(error, match=text):
+        opened.equipment["shock_machine"].shock(30.0, 0.011, 2, 1, [0])
+
+
+def test_production_adapters_of_equipment_know_no_plant() -> None:
+    for path in FAMILIES.glob("*.py"):
+        assert "plant" not in path.read_text(encoding="utf-8"), path.name

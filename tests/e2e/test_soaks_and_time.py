@@ -1,0 +1,300 @@
+"""Soaks with waits of their own, and dwells while the devices still follow the chamber, on the simulated station."""
+
+import dataclasses
+import itertools
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+import small_station as small
+from inquiries import job_of
+from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
+
+from inertial.planning.sequences import SequenceStep as Wanted
+from inertial.planning.sequences import timeline
+from pipelines.capture.capture import capture
+from pipelines.capture.time_left import Remaining, duration_text
+from pipelines.inquiry.followup import circumstances, state_after, station_minutes
+from pipelines.schedule.planned_state import planned_state
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import StationPose, minutes
+from schemas.poses import Pose, SoakPart
+from schemas.recipe import Recipe
+from stations.opening import open_station
+
+
+def in_parts(*parts: SoakPart) -> Recipe:
+    plain = small.short_recipe(3)
+    content = plain.model_dump() | {
+        "verification": [],
+        "soaks": [p.model_dump() for p in parts],
+        "temperatures_C": [p.temperature_C for p in parts],
+    }
+    return Recipe.model_validate(content)
+
+
+def readings(recipe: Recipe) -> pd.DataFrame:
+    lot, sink = small.lot_of(1), small.MemorySink()
+    with open_station(small.station_of(), lot) as station:
+        capture(station, recipe, lot, sink, progress=small.quiet_progress)
+    return sink.all(1)
+
+
+def test_each_pose_of_a_soak_may_have_its_own_wait():
+    recipe = in_parts(SoakPart(temperature_C=23.0, poses=[1, 2, 1], waits_s=[0.0, 30.0, 90.0], settled=False))
+    assert [s.wait_s for s in steps(recipe)] == [0.0, 30.0, 90.0]
+    since = readings(recipe)["since_move_s"].to_numpy()
+    assert since - since[0] == pytest.approx([0.0, 30.0, 90.0], abs=0.5)
+
+
+def test_dwells_of_a_soak_that_is_not_settled_are_read_on_the_way():
+    recipe = in_parts(SoakPart(temperature_C=60.0, poses=[1, 2, 1, 2], waits_s=[60.0] * 4, settled=False))
+    seen = readings(recipe)
+    temperature = seen["unit_C"].to_numpy()
+    assert (temperature[1:] > temperature[:-1] + 0.3).all()
+    assert temperature[-1] < 45.0
+    assert seen["start_s"].iloc[-1] < 400.0
+
+
+def test_refuses_waits_that_are_not_as_many_as_the_poses():
+    with pytest.raises(ValueError, match="soak 1 has 2 waits for 3 poses"):
+        in_parts(SoakPart(temperature_C=23.0, waits_s=[1.0, 2.0]))
+
+
+LEFT = re.compile(r"(?:(\d+) h )?(?:(\d+) min|(\d+) s) of station time left(?:, about [^,]+ here)?$")
+
+
+def told_and_true(recipe, config, lot=None):
+    """Pairs (station time, seconds left as told), and when the run was over."""
+    told, lot = [], lot or lot_of(8)
+    with open_station(config, lot) as station:
+
+        def progress(_done, _total, note):
+            match = LEFT.search(note)
+            if match:
+                hours, minutes, seconds = (int(part or 0) for part in match.groups())
+                told.append((station.clock.now(), 3600.0 * hours + 60.0 * minutes + seconds, note))
+
+        capture(station, recipe, lot, MemorySink(), progress=progress)
+        return told, station.clock.now()
+
+
+def after_first_soak(told):
+    first = next(k for k, (_, _, note) in enumerate(told) if "soak" not in note)
+    return told[first:]
+
+
+@pytest.mark.parametrize(
+    ("temperatures", "changes"),
+    [
+        ((50.0, 10.0), {}),
+        pytest.param((25.0, 60.0, -10.0), {}, marks=pytest.mark.slow),
+        pytest.param((60.0, -20.0, 10.0, 40.0), {}, marks=pytest.mark.slow),
+        pytest.param((40.0, 0.0, 60.0), {"slot_lag_s": [250.0, 400.0]}, marks=pytest.mark.slow),
+    ],
+)
+def test_the_time_that_is_left_is_right_within_a_tenth_after_the_first_soak(temperatures, changes):
+    recipe = short_recipe(poses=6, static_s=300.0).model_copy(update={"temperatures_C": list(temperatures)})
+    told, end = told_and_true(recipe, station_of(**changes))
+    judged = [(now, left, end - now) for now, left, _ in after_first_soak(told) if end - now > 600.0]
+    assert len(judged) > 50
+    worst = max(abs(left - true) / true for _, left, true in judged)
+    assert worst < 0.10
+
+
+def test_a_station_that_is_slower_than_its_file_says_teaches_by_its_first_soak_and_records():
+    config = station_of()
+    wrong = config.model_copy(update={"pace": config.pace.model_copy(update={"ramp_K_per_min": 6.0})})
+    recipe = short_recipe(poses=6).model_copy(update={"temperatures_C": [60.0, -10.0, 40.0], "soak_min_s": 900.0})
+    told, end = told_and_true(recipe, wrong)
+    judged = [(left, end - now) for now, left, _ in after_first_soak(told) if end - now > 600.0]
+    first_error = abs(told[0][1] - end) / end
+    assert first_error > 0.12  # before the first soak nobody can know
+    assert max(abs(left - true) / true for left, true in judged) < 0.10
+
+
+def test_the_time_left_never_runs_up_within_a_soak():
+    recipe = short_recipe(poses=2, temperatures=(25.0, 60.0))
+    told, _ = told_and_true(recipe, station_of())
+    soaking = [left for _, left, note in told if "soak at 60" in note]
+    assert len(soaking) > 50
+    assert all(b <= a for a, b in itertools.pairwise(soaking))
+
+
+def test_a_resumed_run_counts_only_what_is_left():
+    recipe = short_recipe(poses=4)
+    plan = steps(recipe)
+    remaining = Remaining(plan, station_of(), recipe)
+    first, last = remaining.seconds(plan[0], 0.0), Remaining(plan, station_of(), recipe).seconds(plan[-1], 0.0)
+    assert first > 900.0
+    assert last < 30.0
+
+
+def test_far_moves_count_for_more():
+    near, far = short_recipe(poses=1), short_recipe(poses=1)
+    far = far.model_copy(update={"poses": [Pose(name="far", outer_deg=180.0, inner_deg=0.0)]})
+    seconds = [Remaining(steps(r), station_of(), r).seconds(steps(r)[0], 0.0) for r in (near, far)]
+    assert seconds[1] > seconds[0]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(59.6, "60 s"), (119.0, "119 s"), (121.0, "2 min"), (3599.0, "1 h 00 min"), (7380.0, "2 h 03 min")],
+)
+def test_durations_are_told_in_words(seconds, text):
+    assert duration_text(seconds) == text
+
+
+def test_only_a_simulated_station_has_a_time_of_its_own():
+    recipe = short_recipe()
+    plan = steps(recipe)
+    real = station_of().model_copy(update={"kind": "modbus", "simulation": None})
+    assert Remaining(plan, station_of(), recipe).text(plan[0], 0.0).endswith(" of station time left")
+    assert re.fullmatch(r"\d+ min left", Remaining(plan, real, recipe).text(plan[0], 0.0))
+
+
+def test_the_time_by_the_wall_clock_is_in_proportion_to_the_records_that_are_left(monkeypatch: pytest.MonkeyPatch):
+    clock = [100.0]
+    monkeypatch.setattr("pipelines.capture.time_left.time.monotonic", lambda: clock[0])
+    recipe = short_recipe(poses=4)
+    plan = steps(recipe)
+    left = Remaining(plan, station_of(), recipe)
+    assert left.wall_seconds(plan[0]) is None
+    clock[0] += 6.0
+    for step in plan[:2]:
+        left.add_record(step, 12.0)
+    done, rest = (sum(left._record[step.record] for step in part) for part in (plan[:2], plan[2:]))
+    assert left.wall_seconds(plan[2]) == pytest.approx(6.0 * rest / done)
+    assert left.text(plan[2], 0.0).endswith(" here")
+
+
+def really_taken(recipe, config):
+    """Minutes of the plant's clock, in all and of the soaks."""
+    with open_station(config, lot_of(8)) as station:
+        sink = MemorySink()
+        begun = station.clock.now()
+        soaks = []
+        inner = station.soak
+
+        def soak(*given):
+            took = inner(*given)
+            soaks.append(took)
+            return took
+
+        watched = dataclasses.replace(station)
+        object.__setattr__(watched, "soak", soak)
+        capture(watched, recipe, lot_of(8), sink, progress=quiet_progress)
+        return (station.clock.now() - begun) / 60.0, sum(soaks) / 60.0
+
+
+@pytest.mark.parametrize(("temperatures", "poses"), [((25.0, 60.0, -10.0), 6), ((10.0, 15.0, 20.0, 15.0, 10.0), 4)])
+def test_planned_minutes_are_those_the_station_takes(temperatures, poses):
+    recipe = short_recipe(poses, static_s=60.0).model_copy(update={"temperatures_C": list(temperatures)})
+    config = station_of()
+    total, soaks = really_taken(recipe, config)
+    planned = minutes(steps(recipe), config, recipe)
+    assert planned.total == pytest.approx(total, rel=0.1)
+    assert planned.soaks == pytest.approx(soaks, rel=0.1)
+    assert planned.total - planned.soaks == pytest.approx(total - soaks, rel=0.1)
+
+
+def test_parts_of_the_planned_time_are_told_apart():
+    recipe = short_recipe(2, static_s=120.0)
+    planned = minutes(steps(recipe), station_of(), recipe)
+    assert planned.static_record == pytest.approx(2.0)
+    assert planned.dwells == pytest.approx(3 * 2.0 / 60.0)
+    assert planned.total == pytest.approx(planned.moves + planned.soaks + planned.dwells + planned.static_record)
+
+
+def test_a_station_that_is_soaked_already_only_moves_and_dwells():
+    recipe = short_recipe(1)
+    first = steps(recipe)[0]
+    standing = StationPose(outer=0.0, inner=0.0, air=25.0, device=25.0, soak=first.soak)
+    planned = minutes([first], station_of(), recipe, standing)
+    assert planned.soaks == 0.0
+    assert planned.dwells > 0.0
+
+
+def test_far_moves_and_slow_axes_take_longer():
+    recipe, config = short_recipe(1), station_of()
+    near, far = (
+        dataclasses.replace(steps(recipe)[0], pose=Pose(name="p", outer_deg=angle, inner_deg=0.0))
+        for angle in (10, 180)
+    )
+    slow = config.model_copy(update={"limits": config.limits.model_copy(update={"speed_deg_s": 5.0})})
+    assert minutes([far], config, recipe).moves > minutes([near], config, recipe).moves
+    assert minutes([far], slow, recipe).moves > 3.0 * minutes([far], config, recipe).moves
+
+
+def test_hardware_takes_its_pace_from_the_stations_file():
+    recipe = short_recipe(1, temperatures=(60.0,))
+    config = station_of().model_copy(update={"simulation": None})
+    fast = config.model_copy(update={"pace": config.pace.model_copy(update={"ramp_K_per_min": 10.0, "lag_s": 60.0})})
+    assert minutes(steps(recipe), fast, recipe).soaks < minutes(steps(recipe), config, recipe).soaks
+
+
+def ordered_recipe():
+    """A recipe of soaks with waits of their own, dwells on the way to a temperature, and a pause without power."""
+    recipe = short_recipe(4)
+    soaks = [
+        SoakPart(temperature_C=25.0, poses=[1, 2, 3, 4], waits_s=[2.0, 60.0, 300.0, 2.0]),
+        SoakPart(temperature_C=60.0, poses=[1, 2, 3, 4, 1, 2], waits_s=[30.0] * 6, settled=False),
+        SoakPart(temperature_C=25.0, poses=[1, 2], verification=[], off_s=[0.0, 240.0]),
+    ]
+    return recipe.model_copy(update={"soaks": soaks, "temperatures_C": [s.temperature_C for s in soaks]})
+
+
+def test_waits_readings_on_the_way_and_pauses_without_power_take_the_minutes_that_are_planned():
+    recipe, config = ordered_recipe(), station_of()
+    total, soaks = really_taken(recipe, config)
+    planned = minutes(steps(recipe), config, recipe)
+    assert planned.soaks == pytest.approx(soaks, rel=0.1)
+    assert planned.total - planned.soaks == pytest.approx(total - soaks, rel=0.1)
+
+
+def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there():
+    recipe, config = ordered_recipe(), station_of(slot_gradient_K=0.0, slot_lag_s=(200.0, 200.0))
+    with open_station(config, lot_of(1)) as station:
+        sink = MemorySink()
+        capture(station, recipe, lot_of(1), sink, progress=quiet_progress)
+    plan = [step for step in steps(recipe) if step.kind == "dwell"]
+    really = [float(sink.records[step.record][1]["unit_C"].iloc[0]) for step in plan]
+    state = planned_state(recipe, config, history=True)
+    assert not plan[4].settled
+    assert state.temperature == pytest.approx(really, abs=0.6)
+    assert state.temperature[4] < state.temperature[9] < 50.0
+    assert state.since_move[2] == pytest.approx(301.0, rel=0.1)
+    assert state.since_power[11] < state.since_power[10]
+    assert state.history is not None
+    assert np.interp(state.time[4:10], state.history.time, state.history.temperature) == pytest.approx(
+        state.temperature[4:10], abs=0.5
+    )
+
+
+def test_follow_ups_and_plans_take_the_same_time_and_the_same_temperatures(tmp_path):
+    """The same steps, as the science proposes them and as the station is asked for them: soaked, on the way, after a pause."""
+    job = job_of(tmp_path)
+    place = state_after(job)
+    wanted = [
+        Wanted(0.3, -1.0, 25.0, wait=5.0), Wanted(2.0, 2.5, 25.0, wait=5.0, off=90.0),
+        Wanted(1.0, 0.2, 55.0), Wanted(-1.5, 0.2, 55.0),
+        Wanted(0.0, 3.0, -5.0, soaked=False), Wanted(1.2, -2.0, -5.0, soaked=False),
+    ]  # fmt: skip
+    pace = circumstances(job, job, 100.0).pace
+    ran = timeline(wanted, pace, place.step(), place.temperature)
+    assert ran.end == pytest.approx(60.0 * station_minutes(wanted, job, place))
+    for count in range(1, len(wanted)):
+        assert ran.time[count - 1] + 0.5 * pace.dwell_s == pytest.approx(
+            60.0 * station_minutes(wanted[:count], job, place)
+        )
+    # the last two are read on the way: against the first-order lag, integrated in small steps from the soak at 55 °C on
+    air, device, now = 55.0, float(ran.device[3]), float(ran.time[3]) + 0.5 * pace.dwell_s
+    temperatures = {}
+    while now < ran.end:
+        air += float(np.clip(-5.0 - air, -pace.ramp * 0.01, pace.ramp * 0.01))
+        device += (air - device) * 0.01 / pace.lag
+        now += 0.01
+        temperatures |= {k: (air, device) for k in (4, 5) if k not in temperatures and now >= ran.time[k]}
+    for k in (4, 5):
+        assert (ran.air[k], ran.device[k]) == pytest.approx(temperatures[k], abs=0.02)

@@ -1,0 +1,301 @@
+"""What the files of deploy/ promise: services and containers that may do little, a key from a file, a queue per station."""
+
+import re
+import shlex
+import shutil
+import subprocess
+from collections import defaultdict
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import yaml
+from each import each
+from root_process import ROOT
+from typer.main import get_command
+
+from pipelines.cli import app
+from pipelines.orchestrator import server, worker
+from pipelines.serving.connections import MOST
+from schemas.safety import SAFE_WITHIN_S
+from schemas.station import load_station
+
+DEPLOY = ROOT / "deploy"
+UNITS = sorted(path.stem for path in (DEPLOY / "systemd").glob("*.service"))
+SERVING = [name for name in UNITS if name != "tumbleline-backup"]
+WORKER = "tumbleline-worker@"
+SEALED = """
+UMask=0077 NoNewPrivileges=yes ProtectSystem=strict ProtectHome=yes PrivateTmp=yes DevicePolicy=closed
+ProtectKernelTunables=yes ProtectKernelModules=yes ProtectKernelLogs=yes ProtectControlGroups=yes ProtectClock=yes
+ProtectHostname=yes ProtectProc=invisible ProcSubset=pid RestrictNamespaces=yes RestrictRealtime=yes
+RestrictSUIDSGID=yes LockPersonality=yes SystemCallArchitectures=native CapabilityBoundingSet= RemoveIPC=yes IPAddressDeny=any
+MemoryMax=4G TasksMax=512 KillMode=mixed StateDirectoryMode=0700 User=tumbleline
+"""
+MOST_EXPOSED = 2.0  # as systemd-analyze counts: 10 is a service without any protection
+COMPOSE = yaml.safe_load((DEPLOY / "compose.yaml").read_text(encoding="utf-8"))
+PLANT = yaml.safe_load((DEPLOY / "compose.plant.yaml").read_text(encoding="utf-8"))
+SERVICES = COMPOSE["services"]
+ENDING = ("register", "backup")  # containers of one command
+PAGES = {
+    name: (DEPLOY / f"{name}.md").read_text(encoding="utf-8") for name in ("README", "one-pc", "plant", "containers")
+}
+CONTAINERFILE = (DEPLOY / "Containerfile").read_text(encoding="utf-8")
+
+
+def unit(name: str) -> dict[str, dict[str, list[str]]]:
+    """Sections of a unit: the values of each key, in order."""
+    sections: dict[str, dict[str, list[str]]] = {}
+    for line in (DEPLOY / "systemd" / f"{name}.service").read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            section = sections.setdefault(line.strip("[]"), defaultdict(list))
+        elif line and not line.startswith("#"):
+            key, mark, value = line.partition("=")
+            assert mark, line
+            section[key].append(value)
+    return sections
+
+
+@each(UNITS)
+def test_a_service_may_do_little(name: str) -> None:
+    service = unit(name)["Service"]
+    for wanted in SEALED.split():
+        key, _, value = wanted.partition("=")
+        assert service[key] == [value], wanted
+    assert service["SystemCallFilter"] == ["@system-service", "~@privileged @resources"]
+    assert service["RestrictAddressFamilies"] == ["AF_INET AF_INET6 AF_UNIX"]
+    assert service["IPAddressAllow"][0] == "localhost"
+
+
+@each(SERVING)
+def test_a_service_that_ended_is_started_again_but_not_for_ever(name: str) -> None:
+    service = unit(name)["Service"]
+    assert (service["Type"], service["Restart"], service["RestartSec"]) == (["exec"], ["always"], ["10"])
+    assert unit(name)["Unit"]["StartLimitIntervalSec"] == ["300"]
+    assert unit(name)["Install"]["WantedBy"] == ["multi-user.target"]
+
+
+def test_the_backup_is_made_every_night_and_may_write_to_its_own_folder_only() -> None:
+    service = unit("tumbleline-backup")["Service"]
+    assert service["Type"] == ["oneshot"]
+    assert service["ReadWritePaths"] == ["/var/backups/tumbleline"]
+    timer = (DEPLOY / "systemd" / "tumbleline-backup.timer").read_text(encoding="utf-8")
+    assert "OnCalendar=*-*-* 02:30:00" in timer
+    assert "Persistent=true" in timer
+
+
+@each(["tumbleline-server", WORKER, "tumbleline-monitor"])
+def test_a_service_that_speaks_with_the_orchestrator_gets_the_key_as_a_credential(name: str) -> None:
+    assert "prefect-auth:/etc/tumbleline/prefect-auth" in unit(name)["Service"]["LoadCredential"]
+
+
+@each(UNITS)
+def test_a_service_holds_no_key_and_writes_below_its_own_folders_only(name: str) -> None:
+    service = unit(name)["Service"]
+    assert "AUTH_STRING" not in str(service)
+    own = [f"/var/lib/{folder}" for folder in service["StateDirectory"][0].split()] + service["ReadWritePaths"]
+    written = [value.partition("=")[2] for value in service["Environment"] if "=/var" in value]
+    assert written
+    assert [path for path in written if not any(path == one or path.startswith(f"{one}/") for one in own)] == []
+
+
+def test_the_worker_is_asked_to_stop_and_its_watchdog_has_time() -> None:
+    service = unit(WORKER)["Service"]
+    assert "worker stop" in service["ExecStop"][0]
+    minutes = re.fullmatch(r"(\d+)min", service["TimeoutStopSec"][0])
+    assert minutes
+    assert 60 * int(minutes[1]) > 10 * SAFE_WITHIN_S
+    assert float(re.search(r"--wait (\d+)", service["ExecStop"][0])[1]) < 60 * int(minutes[1])
+    assert service["OOMPolicy"] == ["continue"]
+
+
+@each(["server", "workbench", "monitor"])
+def test_a_server_has_more_files_than_connections(name: str) -> None:
+    assert int(unit(f"tumbleline-{name}")["Service"]["LimitNOFILE"][0]) >= 4 * MOST
+
+
+@pytest.mark.skipif(
+    not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed: the files are parsed above"
+)
+@pytest.mark.parametrize("name", UNITS)
+def test_systemd_has_nothing_against_a_service(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{name.replace('@', '@line-1')}.service"
+    text = (DEPLOY / "systemd" / f"{name}.service").read_text(encoding="utf-8")
+    path.write_text(
+        re.sub(r"=(-?)/opt/tumbleline/\.venv/bin/\w+", rf"=\1{shutil.which('true')}", text), encoding="utf-8"
+    )
+    verified = subprocess.run(["systemd-analyze", "verify", path], capture_output=True, text=True, check=False)
+    told = [line for line in verified.stderr.splitlines() if path.name in line]
+    assert (verified.returncode, told) == (0, [])
+    judged = subprocess.run(
+        ["systemd-analyze", "security", "--offline=true", "--no-pager", path],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    level = re.search(r"exposure level for .*: ([\d.]+)", judged.stdout)
+    assert level, judged.stdout + judged.stderr
+    assert float(level[1]) <= MOST_EXPOSED
+
+
+@each([*SERVICES, "database"])
+def test_a_container_may_do_little(name: str) -> None:
+    service = SERVICES.get(name) or PLANT["services"][name]
+    assert service["init"] is True
+    assert service["read_only"] is True
+    assert service["tmpfs"][0] == "/tmp"
+    assert service["cap_drop"] == ["ALL"]
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert service["mem_limit"] == "4g"
+    assert service["pids_limit"] == 512
+    assert all(port.startswith("127.0.0.1:") for port in service.get("ports", []))
+    assert name in ENDING or (service["healthcheck"]["test"] and service["restart"] == "unless-stopped")
+    assert name in ENDING or service["stop_grace_period"]
+
+
+@each(SERVICES)
+def test_a_container_gets_the_key_as_a_secret_and_runs_as_a_user(name: str) -> None:
+    service = SERVICES[name]
+    assert "user" not in service  # that of the image
+    assert re.findall(r"^USER (\S+)$", CONTAINERFILE, re.MULTILINE) == ["tumbleline"]
+    assert service["secrets"] == ["prefect-auth"]
+    assert service["environment"]["TUMBLELINE_ORCHESTRATOR_KEY"] == "/run/secrets/prefect-auth"
+    assert "AUTH_STRING" not in str(service)
+
+
+def test_containers_listen_on_loopback_are_looked_at_and_have_time_to_end() -> None:
+    server, worker = SERVICES["server"], SERVICES["worker"]
+    assert server["ports"] == ["127.0.0.1:4200:4200"]
+    assert "--with-healthcheck" in worker["entrypoint"]
+    assert worker["environment"]["PREFECT_WORKER_WEBSERVER_HOST"] == "127.0.0.1"
+    assert all(service["healthcheck"]["test"] for service in (server, worker))
+    assert int(worker["stop_grace_period"].removesuffix("m")) * 60 > 10 * SAFE_WITHIN_S
+    assert "sh" not in worker["entrypoint"]  # it would not pass SIGTERM on
+
+
+def test_every_folder_that_a_container_writes_is_a_named_volume() -> None:
+    places = dict(re.findall(r"(TUMBLELINE_ARCHIVE|TUMBLELINE_STATE|PREFECT_HOME)=(\S+)", CONTAINERFILE))
+    mounted = {name: dict(v.split(":")[:2] for v in SERVICES[name].get("volumes", [])) for name in SERVICES}
+    assert places["PREFECT_HOME"] in mounted["server"].values()
+    assert {places["TUMBLELINE_ARCHIVE"], places["TUMBLELINE_STATE"]} <= set(mounted["worker"].values())
+    assert set(COMPOSE["volumes"]) == {name for own in mounted.values() for name in own}
+    [declared] = re.findall(r"^VOLUME (\[[^]]*\])$", CONTAINERFILE, re.MULTILINE)
+    assert set(yaml.safe_load(declared.replace("\\\n", ""))) == {
+        place for own in mounted.values() for place in own.values()
+    }
+    made = re.search(r"mkdir -p (.*) \\", CONTAINERFILE)[1].split()
+    assert {f"/var/lib/{folder}" for folder in made} == {place for own in mounted.values() for place in own.values()}
+
+
+def test_the_database_of_a_plant_is_an_image_by_digest_with_its_password_in_a_file() -> None:
+    database, server = PLANT["services"]["database"], PLANT["services"]["server"]
+    assert re.fullmatch(r"docker\.io/library/postgres@\$\{POSTGRES_DIGEST:\?[^}]+\}", database["image"])
+    assert database["user"] == "999:999"
+    assert database["environment"]["POSTGRES_PASSWORD_FILE"] == "/run/secrets/postgres-password"
+    assert not [key for key in database["environment"] if key == "POSTGRES_PASSWORD"]
+    assert server["environment"]["TUMBLELINE_ORCHESTRATOR_DATABASE"] == "/run/secrets/prefect-database"
+    assert set(PLANT["secrets"]) == {"postgres-password", "prefect-database"}
+    assert set(PLANT["volumes"]) == {"database"}
+
+
+def test_the_base_image_has_a_digest_or_is_not_built() -> None:
+    assert re.findall(r"^FROM (\S+)$", CONTAINERFILE, re.MULTILINE) == ["docker.io/library/python@${PYTHON_DIGEST}"]
+    assert re.findall(r"^ARG (.*)$", CONTAINERFILE, re.MULTILINE) == ["PYTHON_DIGEST"]  # with no value of its own
+    assert {service["build"]["args"]["PYTHON_DIGEST"].partition(":?")[0] for service in SERVICES.values()} == {
+        "${PYTHON_DIGEST"
+    }
+
+
+@pytest.mark.skipif(not shutil.which("buildah"), reason="buildah is not installed: the file is parsed above")
+@pytest.mark.parametrize(
+    "arguments", [[], ["--build-arg", "PYTHON_DIGEST="], ["--build-arg", "PYTHON_DIGEST=3.11-slim"]]
+)
+def test_a_build_without_a_digest_is_refused(arguments: list[str]) -> None:
+    command = ["buildah", "--storage-driver", "vfs", "bud", "--isolation", "chroot", "--pull-never", *arguments]
+    done = subprocess.run(
+        [*command, "-f", "deploy/Containerfile", "."], cwd=DEPLOY.parent, capture_output=True, text=True, check=False
+    )
+    assert done.returncode
+    assert "invalid reference format" in done.stderr
+
+
+def test_every_deployment_of_a_lot_is_in_the_queue_of_its_station() -> None:
+    deployments = yaml.safe_load((DEPLOY / "prefect.yaml").read_text(encoding="utf-8"))["deployments"]
+    queues = {one["name"]: one["work_pool"]["work_queue_name"] for one in deployments}
+    station = load_station(DEPLOY / "stations" / "line-1.toml").name
+    assert {queues["production-line"], queues["on-demand"]} == {station}
+    assert queues["weekly-audit"] != station
+    assert "--station %i" in unit(WORKER)["Service"]["ExecStart"][0]
+    assert f"tumbleline-worker@{station} tumbleline-worker@{queues['weekly-audit']}" in PAGES["one-pc"]
+    assert f"--station={station}" in SERVICES["worker"]["entrypoint"]
+
+
+def lines() -> list[str]:
+    """Every command of the pages, of the units and of the containers."""
+    commands = [line[2:] for page in PAGES.values() for line in page.splitlines() if line.startswith("$ ")]
+    for path in (*(DEPLOY / "systemd").glob("*.service"), DEPLOY / "plant" / "server.conf"):
+        joined = path.read_text(encoding="utf-8").replace("\\\n", " ")
+        commands += [line.partition("=")[2].lstrip("-") for line in joined.splitlines() if re.match(r"Exec\w+=.", line)]
+    for service in SERVICES.values():
+        commands.append(" ".join([*service.get("entrypoint", ["tumbleline"]), *service["command"]]))
+    return commands
+
+
+def test_every_start_of_a_server_or_worker_is_one_that_is_there() -> None:
+    matches = [re.search(r"-m pipelines\.orchestrator\.(server|worker) ([^&]*)", text) for text in lines()]
+    given = [(match[1], match[2].split()) for match in matches if match]
+    assert [module for module, _ in given].count("worker") >= 4
+    for module, arguments in given:
+        {"server": server, "worker": worker}[module]._parser().parse_args(arguments)
+
+
+def test_every_command_of_the_product_is_one_that_is_there() -> None:
+    matches = [re.search(r"(?:^|/)tumbleline ([a-z].*)", text) for text in lines()]
+    given = [shlex.split(match[1]) for match in matches if match]
+    assert {"monitor", "workbench", "archive", "doctor", "run"} >= {words[0] for words in given}
+    for name, *words in given:
+        command = get_command(app).get_command(None, name)._load()
+        below = getattr(command, "commands", {})
+        leaf, rest = (below[words[0]], words[1:]) if below else (command, words)
+        leaf.make_context(name, rest)
+
+
+@each(PAGES)
+def test_what_the_commands_of_a_page_name_is_there(page: str) -> None:
+    text = PAGES[page]
+    given = "\n".join(line for line in text.splitlines() if line.startswith("$ "))
+    for name in re.findall(r"(?<![\w/])(?:/opt/tumbleline/)?(deploy/[\w./@*-]+)", text):
+        assert list(DEPLOY.parent.glob(name.rstrip("./"))), name
+    for module in re.findall(r"-m ([a-z_.]+)", given):
+        assert find_spec(module), module
+    units = {path.name for path in (DEPLOY / "systemd").iterdir()}
+    for name in re.findall(r"tumbleline-[a-z]+(?:@[a-z0-9-]+)?(?:\.[a-z]+)?", given):
+        if "systemctl" in given and name not in {"tumbleline-server.service.d", "tumbleline-worker"}:
+            plain = re.sub(r"@[a-z0-9-]+", "@", name)
+            assert plain in units or f"{plain}.service" in units, name
+    for profile in re.findall(r"run --rm (\w+)", given):
+        assert profile in SERVICES
+
+
+@each(["server.conf", "worker.conf"])
+def test_a_drop_in_of_a_plant_changes_its_unit_without_a_remark_of_systemd(name: str, tmp_path: Path) -> None:
+    base = {"server.conf": "tumbleline-server", "worker.conf": WORKER}[name]
+    text = (DEPLOY / "plant" / name).read_text(encoding="utf-8")
+    assert "PASSWORD@" not in re.sub(r"^#.*$", "", text, flags=re.MULTILINE)
+    assert set(re.findall(r"^(\w+)=", text, re.MULTILINE)) <= {
+        "After", "LoadCredential", "ExecStart", "IPAddressAllow", "Environment",
+    }  # fmt: skip
+    if not shutil.which("systemd-analyze"):
+        pytest.skip("systemd-analyze is not installed: the file is parsed above")
+    unit_name = f"{base.replace('@', '@line-1')}.service"
+    for content, path in (
+        ((DEPLOY / "systemd" / f"{base}.service").read_text(encoding="utf-8"), tmp_path / unit_name),
+        (text, tmp_path / f"{unit_name}.d" / "plant.conf"),
+    ):
+        path.parent.mkdir(exist_ok=True)
+        program = rf"=\1{shutil.which('true')}"
+        path.write_text(re.sub(r"=(-?)/opt/tumbleline/\.venv/bin/\w+", program, content), encoding="utf-8")
+    done = subprocess.run(
+        ["systemd-analyze", "verify", tmp_path / unit_name], capture_output=True, text=True, check=False
+    )
+    told = [line for line in done.stderr.splitlines() if "plant.conf" in line or unit_name in line]
+    assert (done.returncode, told) == (0, [])

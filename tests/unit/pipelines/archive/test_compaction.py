@@ -1,0 +1,233 @@
+"""Compaction: packed files read like single ones, for every reader; open runs refuse it."""
+
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+from packed_archive import certified_archive, copied, later, logical, packed_zips, single
+
+from pipelines.archive import Archive, files, packs
+from pipelines.archive.backup import copy_archive
+from pipelines.archive.compaction import compact
+from pipelines.archive.locks import alone
+from pipelines.archive.pack_merging import due_of, merge_packs
+from pipelines.archive.pack_writing import FolderToPack, write_pack
+from pipelines.archive.packed_path import PackedPath
+from pipelines.audit.index import up_to_date
+from pipelines.audit.sql import ask
+from pipelines.certificates.ledger import Ledger
+from pipelines.integrity.archive import verify
+from schemas.errors import ArchiveUnusable, OperatorNeeded
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(str(certified_archive(tmp_path_factory.mktemp("made")).root))
+
+
+@pytest.fixture
+def archive(made: Path, tmp_path: Path) -> Archive:
+    return copied(made, tmp_path / "archive")
+
+
+def test_every_reader_sees_the_same_files(archive: Archive) -> None:
+    before, run = logical(archive), archive.run("latest")
+    tables = {name: run.table(name) for name in run.tables()}
+    serials = [unit["serial"] for unit in run.about["lot"]["units"]]
+    listed, events = archive.runs(), [Ledger(archive).events(serial) for serial in serials]
+    count = len(single(archive))
+    done = compact(archive)
+    assert done.packed == done.freed > 100
+    assert not done.kept
+    assert len(single(archive)) < count // 10
+    again = Archive(str(archive.root))
+    assert logical(again) == before
+    assert again.runs() == listed
+    assert list(again.root.glob(Path("runs/*/run.json"))) == list(
+        again.root.glob("runs/*/run.json")
+    )  # as rglob of Python 3.13
+    assert [Ledger(again).events(serial) for serial in serials] == events
+    assert all(events)
+    run = again.run("latest")
+    assert all(run.table(name).equals(table) for name, table in tables.items())
+    assert len(run.table("samples"))
+    report = verify(again, keys={})
+    assert report.whole, report.checked.findings
+
+
+def test_index_and_queries_are_as_before(archive: Archive) -> None:
+    question = "SELECT count(*), sum(value) FROM coefficients"
+    first = up_to_date(archive)
+    expected = ask(archive, question, compact=False).rows
+    compact(archive)
+    second = up_to_date(archive)
+    assert (second.made, second.kept) == (0, first.made)  # stamps are those of the single files
+    assert ask(archive, question, compact=False).rows == expected
+    shutil.rmtree(archive.root / "index")
+    assert up_to_date(archive).made == first.made
+    assert ask(archive, question).rows == expected
+
+
+def test_finished_command_finds_its_packed_run(archive: Archive) -> None:
+    compact(archive)
+    before = single(archive)
+    again = small_run(Path(str(archive.root)).parent)
+    assert again.id == archive.run("latest").id
+    assert {p.suffix for p in set(single(archive)) - set(before)} <= {".html", ".json"}
+
+
+def test_refused_while_a_run_is_open(archive: Archive) -> None:
+    run = archive.run("latest")
+    before = logical(archive)
+    with alone(run.path), pytest.raises(OperatorNeeded, match="without open runs is needed"):
+        compact(archive)
+    assert not (archive.root / packs.FOLDER / "000001-calibrations.zip").exists()
+    assert logical(archive) == before
+
+
+def test_unfinished_run_stays(archive: Archive) -> None:
+    run = archive.run("latest")
+    (run.path / "sealed.json").unlink()
+    done = compact(archive)
+    assert done.unfinished == [run.id]
+    assert (Path(str(run.path)) / "run.json").stat().st_size
+
+
+def test_next_event_follows_the_packed_ones(archive: Archive) -> None:
+    compact(archive)
+    serial = archive.run("latest").about["lot"]["units"][0]["serial"]
+    ledger = Ledger(archive)
+    assert [event.action for event in ledger.events(serial)] == ["certify"]
+    ledger.revoke(serial, "dropped")
+    assert [event.sequence for event in ledger.events(serial)] == [1, 2]
+    assert not compact(archive).kept
+    first = ledger.root / "calibrations"
+    place = next(one for one in first.glob("*/*/000001.json"))
+    assert not files.publish_first(place, b"another")
+    assert isinstance(place, PackedPath)
+
+
+def test_copy_of_a_compacted_archive_is_of_single_files(archive: Archive, tmp_path: Path) -> None:
+    expected = logical(archive)
+    compact(archive)
+    copy = Archive(tmp_path / "copy")
+    copy_archive(archive, copy)
+    assert logical(copy) == expected
+    assert not (copy.root / packs.FOLDER).exists()
+    compact(copy)
+    assert copy_archive(archive, copy).files == 0
+
+
+def test_unzip_restores_the_single_files(archive: Archive) -> None:
+    expected = logical(archive)
+    compact(archive)
+    for place in Path(str(archive.root / packs.FOLDER)).glob("*.zip"):
+        with zipfile.ZipFile(place) as container:
+            container.extractall(archive.root)
+    shutil.rmtree(archive.root / packs.FOLDER)
+    assert logical(Archive(str(archive.root))) == expected
+
+
+@pytest.mark.parametrize("what", ["a byte of the zip", "the zip is gone", "the table of contents"])
+def test_damage_is_found(archive: Archive, what: str) -> None:
+    compact(archive)
+    top = Path(str(archive.root / packs.FOLDER))
+    zip_, toc = next(iter(sorted(top.glob("*.zip")))), next(iter(sorted(top.glob("*.toc"))))
+    if what == "the zip is gone":
+        zip_.unlink()
+    else:
+        place = zip_ if what == "a byte of the zip" else toc
+        data = bytearray(place.read_bytes())
+        data[len(data) // 2] ^= 1
+        place.write_bytes(data)
+    try:
+        report = verify(Archive(str(archive.root)), keys={})
+    except ArchiveUnusable:
+        return
+    assert not report.whole
+    assert any(packs.FOLDER in finding.path for finding in report.checked.findings)
+
+
+def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_path: Path) -> None:
+    top = tmp_path / packs.FOLDER
+    top.mkdir()
+    names = [f'runs/line-{k}"é' for k in range(3 * packs.SEARCHED)]
+    for number, own in enumerate((names[::2], names[1::2], names[:2]), 1):
+        lines = [packs.line_of(name, number, {"run.json": (100 * number, 7, number)}) for name in own]
+        (top / f"{number:06d}-2026-01.zip").write_bytes(b"zip")
+        (top / f"{number:06d}-2026-01.toc").write_bytes(b"{}\n{}\n" + b"".join(lines))
+    known = packs.Packs(tmp_path)
+    for name in names * 2:
+        number = 3 if name in names[:2] else 1 + names.index(name) % 2
+        folder = known.folder(name)
+        assert folder is not None
+        assert folder.files["run.json"][1:] == (100 * number, 7, number)
+    assert known.folder("runs/line-1") is None
+
+
+@pytest.mark.parametrize(
+    ("sizes", "count"),
+    [((), 0), ((5,), 1), ((8, 1), 1), ((2, 1), 2), ((9, 5, 1, 1), 2), ((8, 3, 1, 1), 4), ((2**30 - 5, 9), 1)],
+)
+def test_small_packs_are_merged_with_one_at_most_twice_as_large(sizes: tuple[int, ...], count: int) -> None:
+    assert due_of(sizes) == count
+
+
+def test_many_compactions_leave_few_packs_and_the_same_files(archive: Archive) -> None:
+    compact(archive)
+    run, serial = archive.run("latest").id, archive.run("latest").about["lot"]["units"][0]["serial"]
+    ledger = Ledger(archive)
+    for count in range(40):
+        later(archive, f"runs/{run}/more/{count:02d}.json", b"x" * 50_000)
+        ledger.revoke(serial, "dropped") if not count else None
+        done = compact(archive)
+        assert len(done.packs) == 1
+        assert (archive.root / packs.FOLDER / done.packs[0]).is_file()
+        assert len(packed_zips(archive)) <= 10
+    assert len(packed_zips(archive)) < 8
+    assert all(
+        (archive.root / "runs" / run / f"more/{count:02d}.json").read_bytes() == b"x" * 50_000 for count in range(40)
+    )
+    shutil.rmtree(Path(str(archive.root)) / "runs" / run, ignore_errors=True)
+    found = verify(Archive(str(archive.root)), keys={}).checked.findings
+    assert not [one for one in found if packs.FOLDER in one.path]
+
+
+def test_merging_keeps_the_newer_of_two_files_wherever_it_is_packed(archive: Archive) -> None:
+    compact(archive)
+    root = Path(str(archive.root))
+    month = next(name[7:-4] for name in packed_zips(archive) if "calibrations" not in name)
+    folder = f"runs/{archive.run('latest').id}"
+
+    def pack(what: str, data: bytes, size: int) -> None:
+        files_ = {"note.json": (len(data), size), f"{size}.json": (10**6, size)}
+        write_pack(
+            root, what, [FolderToPack(folder, 1, files_)], lambda _, name: data if name == "note.json" else b"y" * 10**6
+        )
+
+    pack(month, b"first", 1)
+    pack("2099-12", b"second", 2)
+    pack(month, b"third is not the newest of its own month alone", 3)
+    pack("2099-12", b"fourth", 4)
+    merged = merge_packs(root)
+    assert sorted(len(own) for own in merged.values()) == [2, 3]
+    assert (Archive(str(root)).root / folder / "note.json").read_bytes() == b"fourth"
+    assert {f"{k}.json" for k in range(1, 5)} <= {p.name for p in (archive.root / folder).iterdir()}
+    assert (archive.root / folder / "run.json").is_file()
+
+
+def test_a_damaged_pack_is_not_merged(archive: Archive) -> None:
+    compact(archive)
+    run = archive.run("latest").id
+    name = next(one for one in packed_zips(archive) if "calibrations" not in one)
+    place = Path(str(archive.root / packs.FOLDER / name))
+    data = bytearray(place.read_bytes())
+    data[len(data) // 2] ^= 1
+    place.write_bytes(data)
+    later(archive, f"runs/{run}/large.json", bytes(len(data)))
+    with pytest.raises(ArchiveUnusable, match=r"has changed since it was made; restore it from a copy"):
+        compact(archive)
+    assert place.is_file()
+    assert (archive.root / "runs" / run / "large.json").read_bytes() == bytes(len(data))

@@ -1,0 +1,420 @@
+"""The certificate that is handed out: what ISO/IEC 17025 lists is on it, what must not be said is not, its XML is valid."""
+
+import html
+import json
+import re
+import shutil
+import tomllib
+from collections.abc import Callable
+from datetime import date
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import small_run
+from laboratory import LABORATORY, laboratory_file
+from pydantic import TypeAdapter
+from typer.testing import CliRunner, Result
+
+from inertial.uncertainty.rounding import rounded
+from pipelines.archive import Archive, Run
+from pipelines.certificates import Ledger
+from pipelines.certificates.document.compose import compose
+from pipelines.certificates.document.content import CertificateContent, Coefficient, ReferenceStandard
+from pipelines.certificates.document.dcc import DCC, SI, dcc
+from pipelines.certificates.document.issue import pdf
+from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
+from pipelines.certificates.document.numbers import si_unit, with_uncertainty
+from pipelines.certificates.document.pages import page_content
+from pipelines.certificates.document.schema_files import DocumentInvalid, validate
+from pipelines.chain.certify import certify
+from pipelines.cli import app
+from pipelines.cli.documents.certificates import CertificateDocument
+from pipelines.report.numbers import with_uncertainty as report_rounding
+from schemas.errors import RecipeInvalid, WrongUse
+
+etree = pytest.importorskip("lxml.etree")
+pytest.importorskip("typst")
+pikepdf = pytest.importorskip("pikepdf")
+pdfplumber = pytest.importorskip("pdfplumber")
+
+Typed = Callable[..., Result]
+NAMES = {"dcc": DCC, "si": SI}
+ACCREDITATION = '[laboratory.accreditation]\nbody = "DAkkS"\nnumber = "D-K-00000-01"\n'
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    run = small_run(tmp_path_factory.mktemp("run"), {"A3": "silent"})
+    run.seal()
+    certify(Ledger(run.archive), run)
+    return run
+
+
+@pytest.fixture(scope="module")
+def c(made: Run) -> CertificateContent:
+    return content(made)
+
+
+@pytest.fixture(scope="module")
+def xml(c: CertificateContent) -> bytes:
+    return dcc(c)
+
+
+@pytest.fixture(scope="module")
+def paper(c: CertificateContent, xml: bytes) -> bytes:
+    return pdf(c, xml)
+
+
+@pytest.fixture
+def run(made: Run, tmp_path: Path) -> Run:
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(made.id)
+
+
+@pytest.fixture
+def laboratory(tmp_path: Path) -> Path:
+    return laboratory_file(tmp_path)
+
+
+@pytest.fixture
+def typed(run: Run, laboratory: Path, tmp_path: Path) -> Typed:
+    def type_(*words: str, command: str = "certificate") -> Result:
+        own = ["--laboratory", str(laboratory), "--output", str(tmp_path / "out")] if command == "certificate" else []
+        return CliRunner().invoke(app, [command, *words, *own, "--archive", str(run.archive.root)])
+
+    return type_
+
+
+def content(run: Run, serial: str = "A1", text: str = LABORATORY) -> CertificateContent:
+    known = Ledger(run.archive).calibrations(serial)
+    return compose(run, known[-1], known, LaboratoryFile.model_validate(tomllib.loads(text)))
+
+
+def text_of(document: bytes) -> list[str]:
+    """The text of every page, by a program that is not the one that wrote it."""
+    with pdfplumber.open(BytesIO(document)) as pages:
+        return [page.extract_text() for page in pages.pages]
+
+
+def test_a_run_gives_a_pdf_and_an_xml_per_certified_unit_and_names_those_without(
+    run: Run, typed: Typed, tmp_path: Path
+) -> None:
+    done = typed(run.id, "--json")
+    assert done.exit_code == 1
+    TypeAdapter(CertificateDocument).validate_json(done.stdout, strict=True, extra="forbid")
+    document = json.loads(done.stdout)
+    assert [one["certificate"] for one in document["certificates"]] == ["A1/1", "A2/1"]
+    assert "refused, no certificate: stopped answering" in document["left_out"]["A3"]
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["A1_1.pdf", "A1_1.xml", "A2_1.pdf", "A2_1.xml"]
+    for path in (tmp_path / "out").glob("*.xml"):
+        validate(path.read_bytes())
+
+
+def test_the_same_certificate_has_the_same_bytes(run: Run, typed: Typed, tmp_path: Path) -> None:
+    assert typed("A1").exit_code == 0
+    first = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    assert typed("A1/1").exit_code == 0
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == first
+
+
+def test_a_unit_without_a_certificate_is_refused_with_the_reason(run: Run, typed: Typed, tmp_path: Path) -> None:
+    problem = typed("A1", "A3").exception
+    assert isinstance(problem, WrongUse)
+    assert re.search(
+        r"unit A3 has no certificate, one is needed; run .*: refused, no certificate: stopped", str(problem)
+    )
+    assert not (tmp_path / "out").exists()  # not even that of A1
+    assert "A1/7 is not in the ledger, there are A1/1" in str(typed("A1/7").exception)
+
+
+def test_a_revoked_certificate_is_not_made(run: Run, typed: Typed) -> None:
+    assert typed("A1", "--reason", "dropped", command="revoke").exit_code == 0
+    assert "certificate A1/1 of run" in str(typed("A1").exception)
+    assert "was revoked (dropped)" in str(typed("A1").exception)
+
+
+def test_an_amended_certificate_names_the_one_it_replaces_and_what_changed(run: Run, typed: Typed) -> None:
+    again = certify(Ledger(run.archive), run, ["A1"], months=6, reason="validity corrected to six months")
+    assert again.written[0].certificate == "A1/2"
+    page = " ".join(text_of(pdf(content(run), dcc(content(run))))[0].split())
+    assert "amends and replaces certificate A1/1. Change: validity corrected to six months" in page
+    known = Ledger(run.archive).calibrations("A1")
+    old = compose(run, known[0], known, content(run).who)
+    assert old.number == "A1/1"
+    assert "was replaced by certificate A1/2" in " ".join(text_of(pdf(old, dcc(old)))[0].split())
+
+
+def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(xml: bytes, paper: bytes) -> None:
+    pages = text_of(paper)
+    printed = " ".join(" ".join(pages).split())
+    for part in (
+        "Calibration certificate", "Example Sensor Works", "Am Kornfeld 7", "the laboratory named above", "A1/1",
+        "Example Drones Ltd", "quality@example.org", "Static multi-position calibration",
+        "Accelerometer, Analog Devices, adxl355", "Date of calibration", "Date of issue", "relate only to the item",
+        "J. Example, Head of calibration",
+        "Conditions", "9.81230 m/s²", "0.0 to 50.0 °C", "traceability", "No earlier calibration", "coverage factor",
+        "ILAC-G8:09/2019 guarded acceptance", "PFA", "End of certificate",
+    ):  # fmt: skip
+        assert part in printed, part
+    tree = etree.fromstring(xml)
+    for path in (
+        "//dcc:uniqueIdentifier[.='A1/1']", "//dcc:customer", "//dcc:respPerson/dcc:mainSigner", "//dcc:usedMethod/dcc:norm",
+        "//dcc:item/dcc:identifications", "//dcc:influenceCondition", "//si:expandedUnc/si:coverageFactor",
+        "//dcc:metaData/dcc:conformity[.='pass']", "//dcc:performanceLocation",
+    ):  # fmt: skip
+        assert tree.xpath(path, namespaces=NAMES), path
+    assert [f"page {n} of {len(pages)}" in page for n, page in enumerate(pages, 1)] == [True] * len(pages)
+
+
+def test_the_head_of_a_budget_is_what_its_contributions_add_up_to(c: CertificateContent) -> None:
+    tables = c.budgets
+    assert {one.k is None for one in tables} == {
+        True,
+        False,
+    }  # the error over the period is a standard deviation itself
+    for one in tables:
+        if one.k is None:
+            assert np.sqrt(sum(row.u**2 for row in one.rows)) == pytest.approx(one.u, rel=2e-3)
+        assert all("[" not in row.source for row in one.rows)
+
+
+def test_contributions_sources_and_effects_are_named_in_words_and_not_by_keys(
+    c: CertificateContent, paper: bytes
+) -> None:
+    named = {row.name for table in c.budgets for row in table.rows}
+    assert {"noise of the dwells", "repeatability of the poses", "seat of the fixture"} <= named, named
+    sources = {row.source for table in c.budgets for row in table.rows}
+    assert "simulation: rotation of the slots" in sources, sources
+    text = " ".join(text_of(paper))
+    assert "bias temperature" in text
+    for key in ("bias_temperature", "slot_rotation_mrad", "switch_on", "scale_temperature"):
+        assert key not in text.replace("\n", "")
+
+
+def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: bytes) -> None:
+    tree = etree.fromstring(xml)
+    rows = made.table("uncertainties").query("unit == 'A1' and quantity == 'bias' and axis == 'y'").iloc[0]
+    own = tree.xpath(
+        "//dcc:result[dcc:name/dcc:content[contains(.,'bias at') and contains(.,', y')]]//si:real", namespaces=NAMES
+    )
+    value, expanded = (float(own[0].findtext(f".//{{{SI}}}{name}")) for name in ("value", "uncertainty"))
+    np.testing.assert_allclose(
+        [value, expanded], [rows["value"] * 9.80665e-6, rows["expanded"] * 9.80665e-6], rtol=1e-14
+    )
+    assert own[0].findtext(f"{{{SI}}}unit") == r"\metre\second\tothe{-2}"
+    stated = made.table("coefficients").query("unit == 'A1' and effect == 'scale' and axis == 'x'").iloc[0]
+    scale = tree.xpath(
+        "//dcc:result[dcc:name/dcc:content[.='sensitivity at the reference temperature, x']]//si:value",
+        namespaces=NAMES,
+    )
+    assert float(scale[0].text) == pytest.approx(stated["value"] / 9.80665, rel=1e-14)
+
+
+def test_nothing_says_accredited_without_an_accreditation_in_the_file(
+    made: Run, laboratory: Path, xml: bytes, paper: bytes
+) -> None:
+    assert not re.search("accredit", " ".join(text_of(paper)) + xml.decode(), re.IGNORECASE)
+    laboratory.write_text(LABORATORY.replace("Example Sensor Works", "Accredited Sensor Works"), encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match=r"laboratory.name: speaks of accreditation, \[laboratory.accreditation\]"):
+        read_laboratory(laboratory)
+    c = content(made, text=LABORATORY + ACCREDITATION)
+    assert "D-K-00000-01 (DAkkS)" in text_of(pdf(c, dcc(c)))[0]
+
+
+def test_an_interval_is_printed_only_where_the_customer_agreed(
+    made: Run, paper: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipelines.certificates.document import compose as composing
+
+    due = Ledger(made.archive).calibrations("A1")[-1].until
+    assert due not in " ".join(text_of(paper))
+    real = composing.stated_budget
+    monkeypatch.setattr(composing, "stated_budget", lambda *a: {**real(*a), "customer_agreed": True})
+    agreed = content(made)
+    assert f"As agreed with the customer, the next calibration is due on {due}" in " ".join(
+        text_of(pdf(agreed, b"<a/>"))
+    )
+    assert due in dcc(agreed).decode()
+
+
+def test_as_found_is_what_the_earlier_coefficients_make_of_the_readings_of_today(tmp_path: Path) -> None:
+    first = small_run(tmp_path)
+    first.seal()
+    certify(Ledger(first.archive), first, ["A1"])
+    second = small_run(tmp_path, None, ('"small"', '"later"'))
+    # the earlier certificate was given for coefficients of a device that has moved since: here the table's bias is moved
+    table = first.table("coefficients")
+    second.seal()
+    certify(Ledger(first.archive), second, ["A1"], supersede=True)
+    known = Ledger(first.archive).calibrations("A1")
+    c = compose(second, known[-1], known, LaboratoryFile.model_validate(tomllib.loads(LABORATORY)))
+    assert c.adjustment.earlier == "A1/1"
+    assert c.adjustment.dwells == 4
+    dwells = second.table("dwells").query("unit == 'A1' and kind == 'verification'")
+    own = {(r.axis, r.effect, r.name): r.value for r in table.query("unit == 'A1'").itertuples()}
+    errors = []
+    for row in dwells.itertuples():  # a second implementation: K⁻¹(ã − b) with θ = T − 25
+        theta = row.unit_C - 25.0
+        b = [own[a, "bias", "K0"] + theta * own[a, "bias_temperature", "kT"] for a in "xyz"]
+        k = np.array(
+            [[own[a, "scale", "K1"] if a == o else own[a, "misalignment", f"K{a}{o}"] for o in "xyz"] for a in "xyz"]
+        )
+        k *= [[1.0 + theta * own[a, "scale_temperature", "aT"] / own[a, "scale", "K1"]] for a in "xyz"]
+        force = np.linalg.solve(k, np.array([row.out_x, row.out_y, row.out_z]) - b)
+        errors.append(1e6 * (np.linalg.norm(force) - np.linalg.norm([row.force_x, row.force_y, row.force_z])))
+    np.testing.assert_allclose(c.adjustment.found_rms_ug, np.sqrt(np.mean(np.square(errors))), rtol=1e-6)
+    assert "Earlier certificate A1/1" in " ".join(" ".join(text_of(pdf(c, dcc(c)))).split())
+    statuses = etree.fromstring(dcc(c)).xpath("//dcc:status/text()", namespaces=NAMES)
+    assert statuses == ["beforeAdjustment", "afterAdjustment"]
+
+
+def test_a_long_serial_and_three_pages_of_coefficients_stay_on_the_paper(c: CertificateContent) -> None:
+    serial = "S" + "0123456789ABCDEF" * 3 + "0123456789ABCDE"
+    rows = tuple(
+        Coefficient(effect="bias_temperature_quadratic", name=f"k{n}", axis="xyz"[n % 3],
+                    value=1e5 / (n + 1), standard_error=1.2, unit="LSB")
+        for n in range(150)
+    )  # fmt: skip
+    reference = ReferenceStandard(
+        id="REF-1", what="local gravity", certificate="PTB 12345/26", laboratory="PTB", date="2026-01-02", due="2028-01-01",
+        uncertainty="U = 2 ppm (k = 2)", sha256="0" * 64,
+    )  # fmt: skip
+    c = c.model_copy(
+        update={"serial": serial, "number": f"{serial}/1", "coefficients": rows, "references": (reference,)}
+    )
+    with_heads = 0
+    with pdfplumber.open(BytesIO(pdf(c, dcc(c)))) as pages:
+        for page in pages.pages:
+            assert max(word["x1"] for word in page.extract_words()) < page.width - 40.0  # the margin is 20 mm = 57 pt
+            text = " ".join(page.extract_text().split())
+            assert f"{serial}/1" in text
+            if "bias temperature quadratic" in text:
+                with_heads += "standard uncertainty of noise" in text
+    assert with_heads >= 3
+
+
+def test_the_pdf_claims_pdf_a_3b_and_holds_the_xml(c: CertificateContent, xml: bytes, paper: bytes) -> None:
+    with pikepdf.open(BytesIO(paper)) as document, document.open_metadata() as meta:
+        assert (meta["pdfaid:part"], meta["pdfaid:conformance"]) == ("3", "B")
+        assert document.attachments["certificate.xml"].get_file().read_bytes() == xml
+        assert document.attachments["certificate.xml"].relationship == pikepdf.Name.Alternative
+        assert str(meta["xmp:CreateDate"]).startswith(date.fromisoformat(c.issued).isoformat())
+
+
+def test_a_second_program_finds_the_xml_valid_and_a_wrong_one_invalid(xml: bytes) -> None:
+    xmlschema = pytest.importorskip("xmlschema")
+    from importlib.resources import files
+
+    folder = files("pipelines.certificates.document") / "schemas"
+    rules = xmlschema.XMLSchema(
+        str(folder / "dcc.xsd"), locations={SI: str(folder / "SI_Format.xsd")}, allow="local", validation="strict"
+    )
+    rules.validate(BytesIO(xml))
+    for old, new in ((b"uniqueIdentifier>", b"number>"), (b'schemaVersion="3.0.0"', b'schemaVersion="3.1.0"')):
+        bad = xml.replace(old, new)
+        assert not rules.is_valid(BytesIO(bad))
+        with pytest.raises(DocumentInvalid):
+            validate(bad)
+
+
+@pytest.mark.parametrize(
+    ("value", "expanded", "shown"),
+    [(823.7011, 18.142, ("824", "18")), (255648.8274, 3.459, ("255648.8", "3.5")), (-1786.87, 2000.02, ("−1800", "2000")),
+     (0.0123456, 0.000996, ("0.0123", "0.0010")), (5.0, 0.0996, ("5.00", "0.10")), (-0.0001, 0.5, ("0.00", "0.50"))],
+)  # fmt: skip
+def test_u_has_two_digits_and_the_value_ends_where_u_ends(
+    value: float, expanded: float, shown: tuple[str, str]
+) -> None:
+    assert with_uncertainty(value, expanded) == shown
+
+
+def test_units_become_si() -> None:
+    assert si_unit("LSB/g") == (r"\metre\tothe{-1}\second\tothe{2}", pytest.approx(1 / 9.80665))
+    assert si_unit("µg") == (r"\metre\second\tothe{-2}", pytest.approx(9.80665e-6))
+    assert si_unit("LSB/(g·K)")[0] == r"\metre\tothe{-1}\second\tothe{2}\kelvin\tothe{-1}"
+    assert si_unit("furlong") is None
+
+
+def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
+    for old, new, why in (
+        ('country = "DE"', 'country = "Germany"', r"laboratory\.country"),
+        ("[customer]", "[costumer]", "unknown key 'costumer'"),
+        ('email = "quality@example.org"', "", r"customer\.email"),
+        ('role = "Head of calibration"', 'role = ""', r"signatory\.role"),
+    ):
+        laboratory.write_text(LABORATORY.replace(old, new), encoding="utf-8")
+        with pytest.raises(RecipeInvalid, match=why):
+            read_laboratory(laboratory)
+    with pytest.raises(WrongUse, match=r"is not there, one with \[laboratory\]"):
+        read_laboratory(laboratory.parent / "none.toml")
+
+
+def test_certificates_are_signed_on_request_and_stay_valid(run: Run, typed: Typed, tmp_path: Path) -> None:
+    pytest.importorskip("pyhanko")
+    signxml = pytest.importorskip("signxml")
+    from cryptography.hazmat.primitives.asymmetric import ec
+    from cryptography.hazmat.primitives.serialization import Encoding
+    from signing_keys import made_key, pem
+
+    signing = made_key(ec.generate_private_key(ec.SECP256R1()))
+    (tmp_path / "key.pem").write_bytes(pem(signing))
+    assert (
+        typed("A1", "--sign-with", str(tmp_path / "key.pem"), "--address", "https://example.org/{number}").exit_code
+        == 0
+    )
+    own = signing.certificate.public_bytes(Encoding.PEM).decode()
+    out = tmp_path / "out"
+    signature = etree.fromstring((out / "A1_1.xml.sig").read_bytes())
+    configuration = signxml.SignatureConfiguration(location="./", require_x509=True)
+    good = signxml.XMLVerifier().verify(signature, x509_cert=own, expect_config=configuration)
+    assert good.signed_xml.xpath("//*[local-name()='uniqueIdentifier']/text()") == ["A1/1"]
+    with pikepdf.open(out / "A1_1.pdf") as document:
+        assert document.attachments["certificate.xml"].get_file().read_bytes() == (out / "A1_1.xml").read_bytes()
+        assert document.Root.AcroForm.Fields[0].V.SubFilter == pikepdf.Name("/ETSI.CAdES.detached")
+    refused = typed("A1", "--sign-with", str(tmp_path / "none.pem")).exception
+    assert isinstance(refused, WrongUse)
+
+
+def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
+    from pipelines.certificates.document.compose import _traceability
+
+    entries = {"grade_source": "certificates", "gravity": {"u_ppm": 1.0, "reference": "G-1"}, "seat": {"u_urad": 9.0}}
+    text = _traceability({"references": [{"id": "G-1"}], "grade_source": "certificates"}, entries)
+    assert "of the standards listed: gravity." in text
+    assert text.endswith("by the sources in the budgets (certificates): seat.")
+    assert "not claimed" in _traceability({"references": [], "grade_source": "data_sheet"}, entries)
+
+
+def test_the_certificate_states_the_verdict_with_p_and_what_u_does_not_contain(
+    c: CertificateContent, xml: bytes
+) -> None:
+    assert re.fullmatch(r"ADEQUATE \(p (= 0\.\d+|= 1)\)", c.adequacy)
+    assert c.left_out.startswith("Not stated, and not contained in the uncertainties U: ")
+    assert "vibration" in c.left_out
+    assert "seat" not in c.left_out
+    declared, printed = xml.decode(), json.dumps(page_content(c), ensure_ascii=False)
+    assert f"Model of the fit, by its residuals: {c.adequacy}" in declared
+    assert c.left_out in declared
+    assert c.adequacy in printed
+    assert c.left_out in printed
+
+
+def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_one(c: CertificateContent) -> None:
+    none = c.model_copy(update={"conformity": tuple(one.model_copy(update={"pfa": 0.0}) for one in c.conformity)})
+    assert "probability of false acceptance < 1e-4" in html.unescape(dcc(none).decode())
+    parts = {part.get("title"): part for part in page_content(c)["parts"]}
+    for table in parts["Uncertainty budgets"]["tables"]:
+        assert sum(row[4] == "0.0 %" for row in table["rows"]) <= 1
+    names = {row[0] for row in parts["Results"]["tables"][0]["rows"]}
+    assert "error of the norm of gravity, verification (largest of the poses)" in names
+
+
+def test_certificate_and_report_round_by_one_function() -> None:
+    pairs = [(2.5, 25.0), (485.37, 549.6), (12.345, 0.105), (-0.0049, 0.0104), (0.125, 0.02), (10.0, 0.98)]
+    for value, expanded in pairs:
+        plain = rounded(value, expanded)
+        assert tuple(text.replace("−", "-") for text in with_uncertainty(value, expanded)) == plain
+        assert tuple(text.replace("−", "-") for text in report_rounding(value, expanded)) == plain

@@ -1,0 +1,107 @@
+"""What is handed out names its certificate: exports and reports say whether one holds, was revoked, or never was given."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+from ledger_events import day
+from typer.testing import Result
+
+from pipelines.archive import Archive, Run
+from pipelines.certificates.days import months_after
+from pipelines.integrity import verify
+from pipelines.report import make_report
+
+Typed = Callable[..., Result]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run without a report: ledger commands draw the report again only where there is one, which takes their time."""
+    return small_run(tmp_path_factory.mktemp("run"), {"A3": "silent"})
+
+
+@pytest.fixture
+def run(made: Run, tmp_path: Path) -> Run:
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(made.id)
+
+
+def units(typed: Typed, run: Run, *words: str) -> dict[str, dict]:
+    return {one["unit"]: one for one in json.loads(typed("export", run.id, *words).stdout)["units"]}
+
+
+def test_an_export_without_a_certificate_says_so(run: Run, typed: Typed) -> None:
+    done = typed("export", run.id)
+    assert {one["certificate"] for one in json.loads(done.stdout)["units"]} == {None}
+    assert "not certified: A1, A2; 'tumbleline certify" in done.stderr
+
+
+def test_an_export_names_the_certificate_and_whether_it_holds(run: Run, typed: Typed) -> None:
+    typed("certify", run.id)
+    done = typed("export", run.id)
+    assert done.stderr == ""
+    wanted = {
+        "certificate": "A1/1", "from": day(), "until": months_after(day(), 12), "state": "valid", "reason": "", "valid_now": True,
+    }  # fmt: skip
+    assert units(typed, run)["A1"]["certificate"] == wanted
+    px4 = ("--format", "px4", "--nominal", "256000", "--units", "A1", "--device-id", "1310988")
+    line = f"certificate A1/1, valid from {day()} until {months_after(day(), 12)}"
+    assert f"/* A1: {line} */" in typed("export", run.id, "--format", "c").stdout
+    assert f"# {line}\n" in typed("export", run.id, *px4).stdout
+    assert line in typed("export", run.id, "--format", "csv").stdout.splitlines()[1]
+
+
+def test_a_certificate_that_has_ended_is_told(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
+    typed("certify", run.id, "--until", day(30))
+    for place in ("pipelines.certificates.days.today", "pipelines.certificates.statement.today"):
+        monkeypatch.setattr(place, lambda: day(31))
+    assert units(typed, run)["A1"]["certificate"]["valid_now"] is False
+    assert f"A1: certificate A1/1, valid from {day()} until {day(30)}" in typed("export", run.id).stderr
+
+
+def test_revoked_coefficients_leave_the_house_only_when_they_are_asked_for(run: Run, typed: Typed) -> None:
+    typed("certify", run.id)
+    typed("revoke", "A1", "--reason", "dropped */ on the floor")
+    done = typed("export", run.id)
+    assert [one["unit"] for one in json.loads(done.stdout)["units"]] == ["A2"]
+    assert "left out: A1, certificate A1/1 REVOKED (dropped */ on the floor)" in done.stderr
+    refused = typed("export", run.id, "--units", "A1")
+    assert "the calibration of unit A1" in str(refused.exception)
+    given = typed("export", run.id, "--units", "A1", "--revoked")
+    assert json.loads(given.stdout)["units"][0]["certificate"]["state"] == "revoked"
+    assert "A1: certificate A1/1 REVOKED" in given.stderr
+    header = typed("export", run.id, "--units", "A1", "--revoked", "--format", "c").stdout
+    assert "REVOKED (dropped * / on the floor) */" in header
+
+
+def test_where_every_calibration_was_revoked_nothing_is_exported(run: Run, typed: Typed) -> None:
+    typed("certify", run.id)
+    for unit in ("A1", "A2"):
+        typed("revoke", unit, "--reason", "wrong reference")
+    assert "was revoked (wrong reference)" in str(typed("export", run.id).exception)
+
+
+def test_a_unit_that_is_certified_again_after_a_revocation_is_exported(run: Run, typed: Typed) -> None:
+    typed("certify", run.id)
+    typed("revoke", "A1", "--reason", "by mistake")
+    typed("certify", run.id, "--units", "A1")
+    assert units(typed, run)["A1"]["certificate"]["certificate"] == "A1/3"
+
+
+def test_the_report_names_the_certificates_and_follows_the_ledger(run: Run, typed: Typed) -> None:
+    make_report(run)
+    assert "No unit of this run had a certificate" in run.report.read_text(encoding="utf-8")
+    typed("certify", run.id)
+    page = re.sub(r"<[^>]*>", " ", run.report.read_text(encoding="utf-8"))
+    assert re.search(rf"A1\s+A1/1\s+{day()}\s+{months_after(day(), 12)}\s+valid", page)
+    assert re.search(r"A3\s+not certified", page)
+    typed("revoke", "A1", "--reason", "dropped")
+    page = re.sub(r"<[^>]*>", " ", run.report.read_text(encoding="utf-8"))
+    assert re.search(rf"A1\s+A1/1\s+{day()}\s+{day()}\s+revoked\s+dropped", page)
+    assert verify(run.archive, keys={}).checked.findings == []
+    assert make_report(run)

@@ -1,0 +1,354 @@
+"""What is certified, for how long, by whom, and once: the run is named, its dates are allowed, its files are sound and signed."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from capture_double import small_run
+from each import each
+from ledger_events import day
+from typer.testing import CliRunner, Result
+
+from pipelines.archive import Archive, Run, files
+from pipelines.archive.signatures import VARIABLE, make_key
+from pipelines.certificates import Ledger
+from pipelines.certificates.coefficient_remarks import library_remarks
+from pipelines.certificates.days import months_after
+from pipelines.certificates.measured import measured_on, measured_span
+from pipelines.certificates.refusals import allowed_months
+from pipelines.chain import certifiable
+from pipelines.chain import certify as certifying
+from pipelines.chain.certifiable import refuse_unstated
+from pipelines.chain.certify import certify
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.cli import app
+from pipelines.jobs.job import job_of_run
+from pipelines.jobs.model_change import change_from_options
+from pipelines.rerun.rerun import again
+from pipelines.stages.figures import UNITS
+from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse
+from schemas.event import Event
+from schemas.limits import VALIDITY_MONTHS, parse_limits
+
+Typed = Callable[..., Result]
+LIMITS = 'name = "half"\nvalidity_months = 6\n[figures]\nresidual_rms_ug = {max = 5000.0, unit = "µg"}\n'
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, "")
+        run = small_run(tmp_path_factory.mktemp("run"))
+        run.seal()
+    return run
+
+
+@pytest.fixture
+def run(made: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setenv(VARIABLE, "")
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(made.id)
+
+
+def end_of(run: Run) -> str:
+    """The day on which a run was measured: a suite may run over midnight."""
+    return str(run.manifest("readings")["when"])[:10]
+
+
+def test_the_run_is_named_before_it_is_signed(run: Run, typed: Typed, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_args: object) -> None:
+        raise WrongUse("stopped before anything was written")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(certifying, "refuse_unsound", refused)
+        assert f"certify: run {run.id}, measured on {end_of(run)}, 3 units: A1, A2, A3" in typed("certify").stderr
+    done = typed("certify", "--json")
+    assert f"certify: run {run.id}, measured on {end_of(run)}" in done.stderr
+    assert json.loads(done.stdout)["run"] == run.id
+
+
+def test_a_certificate_does_not_begin_before_the_measurement(run: Run, typed: Typed) -> None:
+    refused = typed("certify", run.id, "--from", "2020-01-01").exception
+    assert isinstance(refused, WrongUse)
+    assert (
+        f"valid from 2020-01-01, run {run.id} was measured on {end_of(run)}, that day or a later one is needed"
+        in str(refused)
+    )
+    assert typed("certify", run.id, "--from", day(-1)).exit_code == 1
+    assert Ledger(run.archive).events("A1") == []
+    assert typed("certify", run.id, "--from", day(1)).exit_code == 0
+
+
+def test_a_certificate_lasts_no_longer_than_the_policy_allows(run: Run, typed: Typed) -> None:
+    for words in (("--months", "13"), ("--until", "2099-01-01"), ("--from", day(400)), ("--months", "1200")):
+        assert typed("certify", run.id, *words).exit_code != 0, words
+    assert Ledger(run.archive).events("A1") == []
+
+
+def test_without_dates_it_lasts_as_long_as_is_allowed(run: Run, typed: Typed) -> None:
+    assert allowed_months(run) == VALIDITY_MONTHS
+    typed("certify", run.id)
+    assert Ledger(run.archive).events("A1")[0].until == months_after(end_of(run), VALIDITY_MONTHS)
+
+
+def test_the_limits_file_says_how_long(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
+    new = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
+    assert allowed_months(new) == 6
+    assert measured_on(new) == end_of(run)
+    ledger = Ledger(run.archive)
+    with pytest.raises(WrongUse, match=r"no more than until .* is allowed; limits 'half' allow 6 months"):
+        certify(ledger, new, months=7)
+    assert certify(ledger, new).written[0].until == months_after(end_of(run), 6)
+
+
+@each(["0", "121", '"6"', "true", "6.5"])
+def test_the_months_of_a_limits_file_are_bounded(months: str) -> None:
+    with pytest.raises(RecipeInvalid, match="validity_months"):
+        parse_limits(LIMITS.replace("= 6", f"= {months}"), "half.toml", UNITS)
+
+
+def test_a_fit_of_archived_data_has_the_date_of_the_measurement(run: Run) -> None:
+    start = "2020-02-03T04:05:06.000+00:00"
+    about = {**run.about, "when": start}
+    (run.path / "run.json").write_bytes(files.json_bytes(about))
+    runner = Runner(job_of_run(run, effects=[*run.about["recipe"]["effects"], "second_order"]), run.archive)
+    for stage in ORDER[:-1]:
+        runner.stage(stage)
+    assert runner.run.id != run.id
+    assert measured_span(runner.run) is None
+    assert measured_on(runner.run) == "2020-02-03"
+
+
+def test_a_fit_by_an_older_version_has_the_date_of_its_capture(run: Run) -> None:
+    assert run.records is not None
+    happened = Event(kind="soak", time_s=0.0, record=0, reason="25 °C", action="settled")
+    run.records.events.note(happened)
+    [place] = (run.records.path / "events").iterdir()
+    place.write_bytes(files.json_bytes({**happened.document(), "when": "2020-02-03T23:30:00.000+00:00"}))
+    assert measured_span(run) is None
+    assert measured_on(run) == "2020-02-03"
+    (run.path / "run.json").write_bytes(files.json_bytes({**run.about, "when": "2020-02-03T23:00:00.000+00:00"}))
+    assert measured_span(run) is not None
+
+
+def test_limits_that_do_not_say_how_long_are_kept_as_before() -> None:
+    """A run is named for its limits: those of earlier versions keep their names."""
+    assert "validity_months" not in parse_limits(LIMITS.replace("validity_months = 6\n", ""), "x", UNITS).model_dump(
+        mode="json"
+    )
+
+
+def meanwhile(monkeypatch: pytest.MonkeyPatch, certified: Callable[[], object]) -> list[object]:
+    """What somebody else certifies once, while a command checks its run."""
+    real, done = certifying.refuse_unsound, list[object]()
+
+    def checked(which: Run, keys: object) -> None:
+        real(which, keys)
+        if not done:
+            done.append(None)
+            done[0] = certified()
+
+    monkeypatch.setattr(certifying, "refuse_unsound", checked)
+    return done
+
+
+def test_two_that_certify_at_the_same_moment_do_not_both_succeed(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While one checks its run, the other certifies a run of the same units: the first is told, and writes nothing."""
+    (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
+    other = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(tmp_path / "half.toml"))).new)
+    ledger = Ledger(run.archive)
+    meanwhile(monkeypatch, lambda: certify(ledger, other, ["A2"]))
+    told = r"unit A2: certificate A2/1 of run .* was written by .* while this command was at work"
+    with pytest.raises(WrongUse, match=told):
+        certify(ledger, run)
+    assert [len(ledger.events(serial)) for serial in ("A1", "A2", "A3")] == [0, 1, 0]
+    assert certify(ledger, run).events  # now it is known, and takes its place
+
+
+def test_the_same_certificate_at_the_same_moment_is_written_once(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    ledger = Ledger(run.archive)
+    meanwhile(monkeypatch, lambda: certify(ledger, run))
+    assert {event.certificate for event in certify(ledger, run).there} == {"A1/1", "A2/1", "A3/1"}
+    assert len(ledger.events("A1")) == 1
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> dict[str, Path]:
+    paths = {name: tmp_path / f"{name}.key" for name in ("own", "foreign")}
+    for place in paths.values():
+        make_key(place)
+    return paths
+
+
+def sign(run: Run, key: Path | None) -> None:
+    """All manifests of a run anew by a key, and its entry of the chain."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, str(key or ""))
+        for name in ("coefficients", "covariance", "grades"):
+            path = run.path / f"{name}.json"
+            path.write_bytes(files.manifest_bytes(json.loads(path.read_text())))
+
+
+@pytest.mark.parametrize(("by", "said"), [("", "not signed"), ("foreign", "signed with a key that is not the own")])
+def test_show_export_and_verify_name_who_did_not_sign(
+    run: Run, typed: Typed, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch, by: str, said: str
+) -> None:
+    typed("certify", run.id)
+    sign(run, keys.get(by))
+    for words in (("show", run.id), ("show", "A1"), ("export", run.id)):
+        assert said not in typed(*words).stderr
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    for words in (("show", run.id), ("show", "A1"), ("export", run.id)):
+        done = typed(*words)
+        assert done.exit_code == 0, (words, done.exception)
+        assert f"{said}: " in done.stderr, words
+        assert f"runs/{run.id}/coefficients.json" in done.stderr
+        assert "calibrations/" in done.stderr  # the certificate was not signed either
+    assert typed("verify").exit_code == 1
+    refused = typed("certify", run.id, "--months", "6").exception
+    assert isinstance(refused, ArchiveUnusable)
+    assert "a signature by the own key, or by one given with --key, is needed" in str(refused)
+
+
+def test_an_edit_behind_a_signature_stops_show_and_export(
+    run: Run, typed: Typed, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sign(run, keys["own"])
+    path = run.path / "coefficients.json"
+    path.write_bytes(files.json_bytes({**json.loads(path.read_text()), "who": "somebody else"}))
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    for words in (("show", run.id), ("export", run.id)):
+        assert "was edited after it was signed" in str(typed(*words).exception)
+
+
+def test_verify_with_an_own_key_demands_it(run: Run, typed: Typed, keys: dict[str, Path], monkeypatch) -> None:
+    assert typed("verify").exit_code == 0
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    done = typed("verify")
+    assert done.exit_code == 1
+    assert "is not signed" in done.stdout
+
+
+def test_a_run_of_a_station_with_another_key_is_certified_where_that_key_is_trusted(
+    tmp_path: Path, keys: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, str(keys["foreign"]))
+    run = small_run(tmp_path)
+    run.seal()
+    pem = tmp_path / "station.pem"
+    write_public(keys["foreign"], pem)
+    monkeypatch.setenv(VARIABLE, str(keys["own"]))
+    words = ["certify", run.id, "--archive", str(run.archive.root)]
+    assert isinstance(CliRunner().invoke(app, words).exception, ArchiveUnusable)
+    assert CliRunner().invoke(app, [*words, "--key", str(pem)]).exit_code == 0
+
+
+def write_public(key: Path, place: Path) -> None:
+    from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat, load_pem_private_key
+
+    public = load_pem_private_key(key.read_bytes(), None).public_key()
+    place.write_bytes(public.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo))
+
+
+def test_tables_made_with_different_libraries_are_told_wherever_they_are_handed_out(run: Run, typed: Typed) -> None:
+    assert library_remarks(run) == []
+    path = run.path / "coefficients.json"
+    content = json.loads(path.read_text())
+    path.write_bytes(files.json_bytes({**content, "libraries": {**content["libraries"], "scipy": "0.1"}}))
+    for words in (("show", run.id), ("export", run.id), ("certify", run.id)):
+        assert "tables made with scipy 0.1 (coefficients)" in typed(*words).stderr, words
+    assert "tables made with scipy 0.1 (coefficients)" in typed("verify").stdout
+
+
+def restated(run: Run, **entries: object) -> Run:
+    """A run whose station states other entries of its uncertainty; None takes one away."""
+    about = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
+    for name, entry in entries.items():
+        about["station"]["uncertainty"].pop(name, None)
+        if entry is not None:
+            about["station"]["uncertainty"][name] = entry
+    (run.path / "run.json").write_bytes(files.json_bytes(about))
+    return Archive(run.archive.root).run(run.id)
+
+
+@each([
+    ({"reader": None}, "reader (dominates scale and bias)"),
+    ({"reader": {"gain_u_ppm": 0.0, "offset_u_ug": 2.0, "source": "s"}}, "reader gain (dominates"),
+    ({"inner_offset": None}, "inner_offset (dominates misalignment)"),
+    ({"level": {"u_urad": 0.0}}, "level (dominates bias and misalignment)"),
+    ({"thermometer": None}, "thermometer (dominates"),
+    ({"gradient": None, "thermometer": {"measures": "slot", "offset_u_K": 0.1, "slope_u_percent": 0.1, "source": "s"}},
+     "gradient (dominates bias and scale over temperature)"),
+])  # fmt: skip
+def test_an_entry_that_the_results_depend_on_is_asked_for_and_a_zero_is_none(
+    row: tuple[dict[str, object], str], made: Run, tmp_path: Path
+) -> None:
+    shutil.copytree(made.archive.root, tmp_path / "archive")
+    own = Archive(tmp_path / "archive").run(made.id)
+    refuse_unstated(own)
+    with pytest.raises(WrongUse, match="not stated: ") as refused:
+        refuse_unstated(restated(own, **row[0]))
+    assert row[1] in str(refused.value)
+    assert "a 0 needs exact = true" in str(refused.value)
+
+
+def test_the_seat_is_asked_for_in_either_frame_as_the_misalignment_is_a_result(run: Run) -> None:
+    bare = restated(run, seat=None)
+    about = json.loads((bare.path / "run.json").read_text(encoding="utf-8"))
+    for frame in ("fixture", "intrinsic"):
+        about["recipe"]["certificate"] = {**(about["recipe"].get("certificate") or {}), "frame": frame}
+        (bare.path / "run.json").write_bytes(files.json_bytes(about))
+        with pytest.raises(WrongUse, match=r"not stated: seat \(dominates misalignment\)"):
+            refuse_unstated(Archive(bare.archive.root).run(bare.id))
+
+
+def verdict(p: float | None, reason: str | None = None, named: str = "") -> dict[str, object]:
+    adequate = None if p is None else False
+    figures = {"rms_ug": 1.0, "floor_ug": 1.0, "p_value": p, "named": bool(named)}
+    return {"adequate": adequate, "reason": reason, **figures, "units": 3, "faulty": []}
+
+
+@each([
+    (verdict(4e-5), "NOT ADEQUATE (p < 0.001), p of at least 0.001 is needed"),
+    (verdict(0.01, named="warm_up"), "NOT ADEQUATE (p = 0.01), and what it lacks is found"),
+    (verdict(0.4, named="unit_moved"), "NOT ADEQUATE (p = 0.4), and what it lacks is found"),
+    (verdict(None, "too few poses"), "cannot be judged (too few poses)"),
+])  # fmt: skip
+def test_a_captured_run_whose_model_is_not_adequate_is_not_certified(
+    row: tuple[dict, str], run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certifiable, "adequacy_of", lambda _run: row[0])
+    with pytest.raises(WrongUse, match=re.escape(row[1])):
+        certify(Ledger(run.archive), run)
+    assert Ledger(run.archive).events("A1") == []
+
+
+def test_a_p_that_one_good_lot_in_twenty_has_is_certified_unless_the_limits_ask_for_more(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certifiable, "adequacy_of", lambda _run: verdict(0.01))
+    strict = tmp_path / "strict.toml"
+    strict.write_text(LIMITS.replace("[figures]", "adequacy_p_min = 0.02\n[figures]"), encoding="utf-8")
+    new = run.archive.run(again(run.archive, run.id, change_from_options(limits=str(strict))).new)
+    with pytest.raises(WrongUse, match=r"NOT ADEQUATE \(p = 0.01\), p of at least 0.02 is needed"):
+        certify(Ledger(run.archive), new)
+    event = certify(Ledger(run.archive), run).written[0]
+    assert event.adequacy.startswith("NOT ADEQUATE at the level of 5 % (p = 0.01)")
+    assert Ledger(run.archive).events("A1")[0].adequacy == event.adequacy
+
+
+def test_a_lot_with_an_effect_that_its_model_lacks_is_not_certified(tmp_path: Path) -> None:
+    """By its own verdict: temperature terms left out of a run over 50 K."""
+    (tmp_path / "half.toml").write_text(LIMITS, encoding="utf-8")
+    own = ('limits = "consumer"', f'limits = "{tmp_path / "half.toml"}"')
+    lacking = small_run(tmp_path, None, (', "bias_temperature", "scale_temperature"]', "]"), own)
+    lacking.seal()
+    with pytest.raises(WrongUse, match=r"is NOT ADEQUATE \(p < 0\.001\)"):
+        certifiable.refuse_inadequate(lacking)

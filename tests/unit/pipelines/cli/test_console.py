@@ -1,0 +1,151 @@
+"""Eighty columns: no word is broken, nothing is cut, and what is copied stays on one line."""
+
+import io
+from pathlib import Path
+
+import pytest
+from each import each
+from rich.console import Console
+from rich.text import Text
+from typer.testing import CliRunner
+
+from inertial.effects import built_in
+from pipelines.cli import app
+from pipelines.cli.console import WordConsole
+from pipelines.cli.options import console, print_table
+
+HEADS = ["run", "started (UTC)", "station", "passed", "largest deviation, µg", "meaning of the number", "unit"]
+LINE = ["production-30db20d7e5", "2026-11-22 09:24", "simulated", "8 of 8", "472.25", "deviation of the norm", "µg"]
+
+
+def printed(width: int, *, terminal: bool = True) -> list[str]:
+    sink = io.StringIO()
+    out = WordConsole(file=sink, width=width, force_terminal=terminal, color_system=None, legacy_windows=False)
+    print_table(HEADS, [LINE, LINE], out=out)
+    return sink.getvalue().splitlines()
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 200])
+def test_a_table_fits_the_terminal_and_keeps_every_word(width: int) -> None:
+    lines = printed(width)
+    assert max(map(len, lines)) <= width
+    words = " ".join(lines).split()
+    for text in (*HEADS, *LINE):
+        assert set(text.split()) <= set(words), text
+    assert sum("production-30db20d7e5" in line for line in lines) % 2 == 0
+
+
+def test_a_table_in_a_pipe_is_one_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert sum("production-30db20d7e5" in line for line in printed(80, terminal=False)) == 2
+    assert sum("production-30db20d7e5" in line for line in printed(80)) > 2
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_the_name_of_an_effect_is_not_broken(*, terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    sink = io.StringIO()
+    out = WordConsole(file=sink, width=80, force_terminal=terminal, color_system=None, legacy_windows=False)
+    longest = max(built_in(), key=len)
+    figures = ["4697.7", "0.38", "-45.882", "1.9034", "LSB/(g·K)"]
+    print_table(["unit", "effect", "value", "error", "low", "high", "text"], [["LT-01", longest, *figures]], out=out)
+    assert longest in sink.getvalue()
+
+
+def test_a_sentence_is_wrapped_between_words_and_a_command_stays_whole() -> None:
+    sink = io.StringIO()
+    out = WordConsole(file=sink, width=40, force_terminal=True, color_system=None)
+    out.print("the largest deviation of the norm from local gravity over all poses", soft_wrap=True)
+    out.print(
+        "  tumbleline diagnose a/long/path/of/dwells.parquet --history a/long/path/of/history.parquet", soft_wrap=True
+    )
+    out.print(f"report  /{'folder/' * 12}report.html", soft_wrap=True)
+    first, second, command, report = sink.getvalue().splitlines()
+    assert f"{first.strip()} {second}" == "the largest deviation of the norm from local gravity over all poses"
+    assert command.endswith("history.parquet")
+    assert report.endswith("report.html")
+
+
+@each(["keys station", "plan", "station profiles", "station profiles watlow_f4t", "list", "run --help"])
+def test_a_command_needs_eighty_columns_at_most(words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NO_COLOR", "1")
+    result = CliRunner().invoke(app, words.split(), env={"COLUMNS": "80"})
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert [line for line in lines if len(line) > 80 and not line.lstrip().startswith("tumbleline ")] == []
+    assert "…" not in "".join(line[-2:] for line in lines if "│" in line)
+
+
+COLUMNS = ["effect", "of the", "size\nµg", "p", "left\nµg", "left out\nµg", "with"]
+LINES = [["scale_temperature_quadratic (αT2)", "sensor", "181", "1e-212", "392", "425", ""]]
+
+
+def table_text(width: int, *args: object, **kwargs: object) -> str:
+    out = Console(file=io.StringIO(), width=width, markup=False, emoji=False)
+    print_table(*args, out=out, **kwargs)  # pyright: ignore[reportArgumentType]
+    assert isinstance(out.file, io.StringIO)
+    return out.file.getvalue()
+
+
+@pytest.mark.parametrize("width", [20, 40, 60, 80, 200])
+def test_no_number_and_no_heading_is_ever_cut(width: int) -> None:
+    text = table_text(width, COLUMNS, LINES, whole=6)
+    for word in ("scale_temperature_quadratic (αT2)", "sensor", "181", "1e-212", "392", "425", "size", "left out"):
+        assert word in text
+
+
+@pytest.mark.parametrize("width", [20, 60])
+def test_words_are_broken_between_words_before_the_table_grows(width: int) -> None:
+    text = table_text(width, ["unit", "why"], [["U1", "the proof mass hangs on an arm that load turns"]])
+    assert max(map(len, text.splitlines())) <= max(width, len("  U1     ") + 24)
+    assert " ".join(text.split()).endswith("load turns")
+
+
+def test_a_table_that_fits_is_no_wider_than_the_terminal() -> None:
+    text = table_text(100, ["unit", "why"], [["U1", "because " * 30]])
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_brackets_and_colons_of_a_reason_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    print_table(["unit", "why"], [["U1", "dropped [red] [/x] :warning:"], ["[2]", "x"]], title="archive [a]")
+    console().print("run [/b] :bug:")
+    out = capsys.readouterr().out
+    assert all(words in out for words in ("dropped [red] [/x] :warning:", "[2]", "archive [a]", "run [/b] :bug:"))
+
+
+def test_a_cell_may_have_a_style() -> None:
+    assert "pass" in table_text(40, ["result"], [[Text("pass", style="bold green")]])
+
+
+def test_a_column_without_an_entry_is_left_out_and_an_empty_table_keeps_its_heads() -> None:
+    text = table_text(80, COLUMNS, LINES)
+    assert "with" not in text.split()
+    assert "scale_temperature_quadratic" in text
+    assert (
+        table_text(80, ["serial", "reason"], [["", ""]]).split()[0] == "serial"
+    )  # the first column says what a row is
+    assert {"unit", "why"} <= set(table_text(80, ["unit", "why"], []).split())
+
+
+def test_narrower_gaps_save_a_continuation_of_one_column() -> None:
+    heads = [
+        "slot",
+        "unit",
+        "result",
+        "grade",
+        "fit\nµg",
+        "verify\nµg",
+        "error\nµg",
+        "period\nµg",
+        "N\nµg/√Hz",
+        "B\nµg",
+    ]
+    line = ["0", "TL0001", "pass", "consumer", "352", "474", "595", "731", "10.3", "299"]
+    out = WordConsole(file=io.StringIO(), width=80, force_terminal=True, color_system=None)
+    print_table(heads, [line], out=out)
+    text = out.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+    assert text.count("slot") == 1
+    assert max(map(len, text.splitlines())) <= 80
+    wide = table_text(200, heads, [line])
+    assert "  slot   unit     result" in wide

@@ -1,0 +1,98 @@
+"""Every verdict lists the dwells that carry it and what it is without them: in the text, in the document and on the page."""
+
+import json
+import sys
+from dataclasses import replace
+
+import pytest
+from root_process import ROOT
+from typer.testing import CliRunner
+
+from pipelines.cli import app
+from pipelines.cli.text.diagnosis_text import print_diagnosis
+
+sys.path.insert(0, str(ROOT / "benchmarks" / "worlds"))
+
+from noise import Noise
+from tables import FAULTS, NULLS
+from world import World, make
+
+SEED = 5_500_000
+STATION = World(units=3, hidden=(("level_error", 3.0),))
+
+
+@pytest.mark.parametrize(
+    ("world", "scope", "name"),
+    [
+        (STATION, "station", "level_error"),
+        (replace(FAULTS["pose_0.1deg"], units=3), "data", "wrong_pose"),
+        pytest.param(replace(FAULTS["slip_0.2mrad"], units=3), "data", "table_slip", marks=pytest.mark.slow),
+    ],
+    ids=["station effect", "one pose", "table from a time on"],
+)
+def test_dwells_that_carry_a_verdict_stand_in_text_document_and_page(tmp_path, capsys, world, scope, name):
+    made = make(world, SEED)
+    made.dwells.to_parquet(tmp_path / "dwells.parquet")
+    page = tmp_path / "page.html"
+    given = ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(page), "--json"]
+    document = json.loads(CliRunner().invoke(app, given).stdout)
+    (group,) = document["classes"]
+    assert (group["scope"], name in group["effects"]) == (scope, True)
+    assert document["influence"] == group["influence"]
+    # what concerns all units is carried by whole dwells
+    assert len(group["influence"]) in {3, 6, 9}
+    without = group["without_influence"]
+    assert without["dwells"] == len(group["influence"])
+    if name == "wrong_pose":  # one dwell in all units: nothing is left of it without them
+        assert {row["dwell"] for row in group["influence"]} == set(made.told.dwells)
+        assert without["p_value"] > 1e-3
+    else:  # many dwells carry it, and it stands without these
+        assert without["p_value"] < 1e-6
+    first = group["influence"][0]
+    share = f"({100.0 * first['share']:.0f} %)"
+    print_diagnosis(document, data=None, model=None)
+    text = " ".join(capsys.readouterr().out.split())
+    assert (
+        f"dwells with the largest influence on {' or '.join(group['effects'])}: {first['unit']} dwell {first['dwell']} {share}"
+        in text
+    )
+    assert f"without these {without['dwells']} p" in text
+    html = page.read_text(encoding="utf-8")
+    assert (
+        f"{first['unit']} dwell {first['dwell']} {share}"
+        in html.split("Dwells with the largest influence on the verdict")[1]
+    )
+
+
+def test_dwells_left_out_as_tails_are_listed_beside_a_verdict_of_adequate(tmp_path, capsys):
+    made = make(World(units=1, poses=18, noise=Noise(white=200.0, flicker=5.0, tails=3)), SEED + 2)
+    made.dwells.to_parquet(tmp_path / "dwells.parquet")
+    given = ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(tmp_path / "page.html"), "--json"]
+    document = json.loads(CliRunner().invoke(app, given).stdout)
+    assert document["classes"] == []
+    assert document["removed"]["heavy_tails"] is True
+    print_diagnosis(document, data=None, model=None)
+    assert "the tails of the noise of this run may reach as far" in " ".join(capsys.readouterr().out.split())
+    assert "the tails of the noise of this run may reach as far" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_a_converters_fault_in_every_unit_is_no_verdict_on_the_model(tmp_path):
+    made = make(replace(NULLS["lsb5"], units=2, poses=8), SEED)
+    made.dwells.to_parquet(tmp_path / "dwells.parquet")
+    page = tmp_path / "page.html"
+    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(page), "--json"])
+    document = json.loads(done.stdout)
+    assert (document["adequate"], done.exit_code) == (None, 1)
+    assert "every unit (2) has a data fault" in document["reason"]
+    assert "CANNOT BE JUDGED: every unit (2)" in page.read_text(encoding="utf-8")
+
+
+def test_missing_dwells_are_told_in_the_report_and_at_the_terminal(tmp_path):
+    table = make(World(units=2, poses=12), SEED).dwells
+    table = table.drop(index=table.index[(table["unit"] == "W002") & table["dwell"].isin([4, 9])])
+    table.to_parquet(tmp_path / "dwells.parquet")
+    page = tmp_path / "page.html"
+    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "dwells.parquet"), "--report", str(page)])
+    notice = "of 36 dwells of the lot are missing: W002 2 (4, 9); these units are judged by the others"
+    assert notice in " ".join(done.stdout.split())
+    assert notice in page.read_text(encoding="utf-8")

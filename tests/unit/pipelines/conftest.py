@@ -1,0 +1,22 @@
+"""A run of the small recipe that the tests of these rooms only read, and commands on the archive of a test's run."""
+
+from collections.abc import Callable
+
+import pytest
+from capture_double import small_run
+from typer.testing import CliRunner, Result
+
+from pipelines.archive import Run
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return small_run(tmp_path_factory.mktemp("run"))
+
+
+@pytest.fixture
+def typed(run: Run) -> Callable[..., Result]:
+    """A command on the archive of the run that the test has."""
+    from pipelines.cli import app
+
+    return lambda *words: CliRunner().invoke(app, [*words, "--archive", str(run.archive.root)])

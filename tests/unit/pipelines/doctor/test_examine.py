@@ -1,0 +1,412 @@
+"""What doctor finds in a healthy installation, and in one with a single thing broken: the fault and its remedy."""
+
+import base64
+import json
+import os
+import re
+import resource
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from email.utils import formatdate
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from each import each
+from s3_server import CREDENTIALS, s3_bucket
+from served_station import modbus_station, moves_ordered, served_plant, station_file
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive
+from pipelines.archive.signatures import make_key
+from pipelines.cli import app
+from pipelines.doctor import examine as host
+from pipelines.doctor import software
+from pipelines.doctor.archive import archive_checks, key_checks
+from pipelines.doctor.check import PROBE_BYTES, Check, clock_check, offset
+from pipelines.doctor.examine import host_checks, station_checks
+from pipelines.doctor.orchestrator import orchestrator_checks
+from stations.safety.lease_parts import addresses
+from stations.safety.leases import Leases, new_holder
+
+NOBODY = 65534
+KEY = "line:" + "k" * 32
+
+
+@pytest.fixture(autouse=True)
+def own_places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No setting of this machine; a state folder, a configuration and a working folder of the test."""
+    for name in [n for n in os.environ if n.startswith(("PREFECT_", "TUMBLELINE_"))] + ["CREDENTIALS_DIRECTORY"]:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.chdir(tmp_path)
+
+
+def archive_in(folder: Path) -> Archive:
+    archive = Archive(folder)
+    archive.prepare()
+    return archive
+
+
+def states(checks: list[Check]) -> dict[str, str]:
+    return {check.check: check.state for check in checks}
+
+
+def only_fault(checks: list[Check]) -> Check:
+    """The one fault among checks; it says what was found and what to do."""
+    (fault,) = [check for check in checks if check.state == "fault"]
+    assert fault.found
+    assert fault.remedy
+    return fault
+
+
+# the archive and its key
+
+
+def test_a_healthy_archive_is_good_and_holds_nothing_of_the_check_afterwards(tmp_path: Path) -> None:
+    archive_in(tmp_path / "a")
+    before = sorted((tmp_path / "a").rglob("*"))
+    checks = archive_checks(str(tmp_path / "a"), 0.0)
+    assert set(states(checks)) == {"reachable", "format", "writable", "clock", "free space"}
+    assert set(states(checks).values()) == {"good"}
+    assert sorted((tmp_path / "a").rglob("*")) == before
+
+
+def test_a_named_archive_that_is_not_there_is_a_fault_and_the_default_one_is_not(tmp_path: Path) -> None:
+    assert "mount" in only_fault(archive_checks(str(tmp_path / "none"), 1.0)).remedy
+    assert states(archive_checks(None, 1.0)) == {"reachable": "not configured"}
+    assert not (tmp_path / "none").exists()
+    assert not (tmp_path / "archive").exists()
+
+
+def test_an_archive_of_another_format_is_a_fault(tmp_path: Path) -> None:
+    archive_in(tmp_path / "a")
+    (tmp_path / "a" / "archive.json").write_text('{"product": "tumbleline", "format": 99}', encoding="utf-8")
+    fault = only_fault(archive_checks(str(tmp_path / "a"), 0.0))
+    assert (fault.check, fault.found) == ("format", "99")
+
+
+def test_too_little_room_is_a_fault(tmp_path: Path) -> None:
+    archive_in(tmp_path / "a")
+    fault = only_fault(archive_checks(str(tmp_path / "a"), 1e9))
+    assert fault.check == "free space"
+    assert "1e+09 GB" in fault.needed
+
+
+@contextmanager
+def as_nobody() -> Iterator[None]:
+    """A block without the rights of root, where the tests run as root."""
+    root = os.geteuid() == 0
+    if root:
+        os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+
+
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """A folder that every user may enter: those of pytest are for their owner only."""
+    folder = Path(tempfile.mkdtemp(prefix="tumbleline-test-"))
+    folder.chmod(0o755)
+    yield folder
+    shutil.rmtree(folder)
+
+
+@each([(0o555, "writable"), (0o000, "reachable")])
+def test_an_archive_without_permission_to_write_or_to_look_into_it_is_a_fault(
+    case: tuple[int, str], open_folder: Path
+) -> None:
+    folder = open_folder / case[1]
+    archive_in(folder)
+    assert "fault" not in states(archive_checks(str(folder), 0.0)).values()
+    folder.chmod(case[0])
+    try:
+        with as_nobody():
+            fault = only_fault(archive_checks(str(folder), 0.0))
+    finally:
+        folder.chmod(0o755)
+    assert fault.check == case[1]
+    assert "Permission denied" in fault.found
+
+
+FULL = """
+import json, resource, signal, sys
+from pipelines.doctor.archive import archive_checks
+from pipelines.doctor.examine import host_checks
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
+print(json.dumps([archive_checks(sys.argv[1], 0.0), host_checks()]))
+"""
+
+
+@pytest.mark.parametrize(("room", "state"), [(PROBE_BYTES // 2, "fault"), (PROBE_BYTES, "good")])
+def test_a_disk_that_takes_half_a_file_is_a_fault_and_nothing_stays(tmp_path: Path, room: int, state: str) -> None:
+    archive_in(tmp_path / "a")
+    words = [sys.executable, "-c", FULL, str(tmp_path / "a"), str(room)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    of_archive, of_host = json.loads(done.stdout)
+    assert {row[1]: row[2] for row in of_archive}["writable"] == state
+    assert {(row[0], row[1]): row[2] for row in of_host}["state folder", "writable"] == state
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["archive.json"]
+    assert not list((tmp_path / "state").iterdir())
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != room
+    assert signal.SIGXFSZ
+
+
+def test_entries_later_than_now_are_a_fault(tmp_path: Path) -> None:
+    archive_in(tmp_path / "a")
+    (tmp_path / "a" / "runs").mkdir()
+    assert "fault" not in states(archive_checks(str(tmp_path / "a"), 0.0)).values()
+    later = time.time() + 3600.0
+    os.utime(tmp_path / "a" / "runs", (later, later))
+    fault = only_fault(archive_checks(str(tmp_path / "a"), 0.0))
+    assert fault.check == "last entry"
+    assert "clock" in fault.remedy
+
+
+@pytest.mark.slow
+def test_an_object_store_is_written_to_timed_and_left_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in CREDENTIALS.items():
+        monkeypatch.setenv(name, value)
+    with s3_bucket() as query:
+        address = f"s3://factory/archive?{query}"
+        archive_in(address)
+        by_check = states(archive_checks(address, 1.0))
+        assert by_check == dict.fromkeys(("reachable", "format", "writable", "clock"), "good")
+        assert [p.name for p in Archive(address).root.iterdir()] == ["archive.json"]
+    assert only_fault(archive_checks(address, 1.0)).check == "reachable"  # the server is down now
+
+
+def test_a_key_is_private_and_outside_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    archive_in(tmp_path / "a")
+    assert states(key_checks(str(tmp_path / "a"))) == {"present": "warning"}
+    key = tmp_path / "keys" / "signing.key"
+    make_key(key)
+    monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", str(key))
+    assert set(states(key_checks(str(tmp_path / "a"))).values()) == {"good"}
+    key.chmod(0o644)
+    assert only_fault(key_checks(str(tmp_path / "a"))).remedy == f"run: chmod 600 {key}"
+    inside = tmp_path / "a" / "signing.key"
+    make_key(inside)
+    monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", str(inside))
+    assert only_fault(key_checks(str(tmp_path / "a"))).check == "outside the archive"
+
+
+@pytest.mark.parametrize("content", [None, b"no key"])
+def test_a_key_that_cannot_be_used_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content) -> None:
+    if content is not None:
+        (tmp_path / "k").write_bytes(content)
+    monkeypatch.setenv("TUMBLELINE_SIGNING_KEY", str(tmp_path / "k"))
+    assert only_fault(key_checks(None)).check == "present"
+
+
+# the orchestrator
+
+
+@contextmanager
+def server(ahead_s: float = 0.0, ready: int = 200, version: str = "") -> Iterator[str]:
+    """Address of a server that answers as Prefect's does: health and readiness to everybody, the version to the key."""
+    stated = version or metadata.version("prefect")
+
+    class Answers(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            known = self.headers.get("Authorization") == "Basic " + base64.b64encode(KEY.encode()).decode()
+            status = {"/api/health": 200, "/api/ready": ready, "/api/admin/version": 200 if known else 401}
+            self.send_response(status.get(self.path, 404))
+            self.end_headers()
+            self.wfile.write(json.dumps(stated).encode())
+
+        def date_time_string(self, timestamp: float | None = None) -> str:
+            return formatdate((timestamp or time.time()) + ahead_s, usegmt=True)
+
+        def log_message(self, *_args: object) -> None: ...
+
+    httpd = ThreadingHTTPServer(("127.0.0.1", 0), Answers)
+    thread = threading.Thread(target=httpd.serve_forever, args=(0.05,))
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{httpd.server_port}/api"
+    finally:
+        httpd.shutdown()
+        thread.join()
+        httpd.server_close()
+
+
+def of_server(monkeypatch: pytest.MonkeyPatch, key: str = KEY, **changes: object) -> list[Check]:
+    with server(**changes) as address:
+        monkeypatch.setenv("PREFECT_API_URL", address)
+        monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
+        return orchestrator_checks()
+
+
+def test_a_healthy_server_is_good_and_one_of_another_version_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    good = dict.fromkeys(("reachable", "database", "authenticated", "version", "clock"), "good")
+    assert states(of_server(monkeypatch)) == good
+    assert states(of_server(monkeypatch, version="1.0.0")) == good | {"version": "warning"}
+
+
+@each([
+    ({"key": "line:" + "x" * 32}, "authenticated", r"the key is refused \(401\)", "PREFECT_API_AUTH_STRING"),
+    ({"key": ""}, "authenticated", "", ""),
+    ({"ready": 503}, "database", "", ""),
+    ({"ahead_s": 120.0}, "clock", r"\+(9|1[0-4])\d\.\d s", ""),
+    ({"ahead_s": -120.0}, "clock", r"-(9|1[0-4])\d\.\d s", ""),
+])  # fmt: skip
+def test_what_is_wrong_with_a_server_is_named(
+    case: tuple[dict, str, str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes, check, found, remedy = case
+    fault = only_fault(of_server(monkeypatch, **changes))
+    assert fault.check == check
+    assert re.match(found, fault.found)
+    assert remedy in fault.remedy
+    assert "xxxx" not in repr(fault)
+
+
+def test_a_server_that_is_down_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    monkeypatch.setenv("PREFECT_API_URL", f"http://line:secret@127.0.0.1:{port}/api")
+    fault = only_fault(orchestrator_checks())
+    assert fault.check == "reachable"
+    assert "secret" not in repr(fault)
+
+
+def test_an_address_that_is_none_is_a_fault_and_no_address_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert states(orchestrator_checks()) == {"address": "not configured"}
+    monkeypatch.setenv("PREFECT_API_URL", "127.0.0.1:4200")
+    assert only_fault(orchestrator_checks()).check == "address"
+
+
+# a station
+
+
+def test_a_station_that_answers_is_good_and_nothing_moved(tmp_path: Path) -> None:
+    with served_plant() as (port, plant):
+        config = modbus_station(port)
+        path = station_file(tmp_path, config)
+        by_check = states(station_checks(path))
+        assert by_check == {"file": "good", "devices": "good", "lease": "good"}
+        lease = Leases(tmp_path / "state", new_holder(config.name, "run-7"), addresses(config), 10.0)
+        lease.take()
+        try:
+            checks = station_checks(path)
+        finally:
+            lease.release()
+        assert states(checks)["lease"] == "warning"
+        assert any("run-7" in check.found for check in checks)
+        assert moves_ordered(plant) == 0
+
+
+def test_a_station_that_does_not_answer_is_a_fault(tmp_path: Path) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    checks = station_checks(station_file(tmp_path, modbus_station(port)))
+    assert {check.check for check in checks if check.state == "fault"} >= {"table", "chamber", "reader"}
+    assert all(check.remedy for check in checks if check.state == "fault")
+
+
+def test_a_station_file_that_is_wrong_is_a_fault_and_none_is_not(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text("name = 3\n", encoding="utf-8")
+    assert only_fault(station_checks(tmp_path / "s.toml")).check == "file"
+    assert states(station_checks(None)) == {"file": "not configured"}
+
+
+# the host and its software
+
+
+def test_a_state_folder_that_cannot_be_made_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "file" / "state"))
+    fault = only_fault(host_checks())
+    assert (fault.part, fault.check) == ("state folder", "writable")
+
+
+def test_the_clock_is_what_the_kernel_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert host.clock_state() in {None, 0, 1, 2, 3, 4, 5}
+    for state, found in ((0, "good"), (5, "warning"), (None, "not configured")):
+        monkeypatch.setattr(host, "clock_state", lambda state=state: state)
+        assert states(host_checks())["synchronised"] == found
+
+
+def test_a_difference_of_clocks_is_the_least_that_is_sure() -> None:
+    assert offset(100.0, 99.0, 101.0, 0.0) == 0.0
+    assert offset(98.5, 99.0, 101.0, 1.0) == 0.0
+    assert offset(90.0, 99.0, 101.0, 1.0) == -8.0
+    assert offset(110.0, 99.0, 101.0, 1.0) == 9.0
+    assert clock_check("archive", 4.9, "it").state == "good"
+    assert clock_check("archive", -5.1, "it").state == "fault"
+
+
+def test_this_environment_meets_the_requirements() -> None:
+    checks = {check.check: check for check in software.software_checks()}
+    assert checks["libraries"].state == "good"
+    assert {checks[name].state for name in ("Python", "lock")} <= {"good", "warning"}
+    extras = set(metadata.metadata("tumbleline").get_all("Provides-Extra")) - software.DEVELOPMENT - {"recordings"}
+    assert all(extra in checks["optional parts"].found for extra in extras)
+    assert "docs" not in checks["optional parts"].found  # builds the pages of the product, which its users read
+
+
+@each(
+    [
+        ("numpy", None, "numpy", "fault"),
+        ("numpy", "1.0", "numpy", "fault"),
+        ("click", None, "click", "fault"),
+        ("numpy", "99.0", "lock", "warning"),
+    ]
+)
+def test_a_library_that_is_missing_or_of_another_version_is_named(
+    case: tuple[str, str | None, str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name, held, check, state = case
+    version, distributions = metadata.version, metadata.distributions
+
+    class Other:
+        def __init__(self) -> None:
+            self.name, self.version = name, held
+
+    def changed(asked: str) -> str:
+        if asked.lower() != name:
+            return version(asked)
+        if held is None:
+            raise metadata.PackageNotFoundError(asked)
+        return held
+
+    monkeypatch.setattr(software.metadata, "version", changed)
+    monkeypatch.setattr(software.metadata, "distributions", lambda: [*distributions(), *([Other()] if held else [])])
+    rows = {row.check: row for row in software.software_checks()}
+    assert rows[check].state == state
+    assert "pip install" in rows[check].remedy
+
+
+# the command
+
+
+def test_the_command_says_the_remedy_and_leaves_with_one(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["doctor", "--archive", str(tmp_path / "none")], env={"COLUMNS": "160"})
+    assert result.exit_code == 1
+    assert "fault: archive, reachable: " in result.stdout
+    assert "mount its disk or correct the address" in " ".join(result.stdout.split())
+
+
+def test_the_command_of_a_healthy_installation_leaves_with_zero(tmp_path: Path) -> None:
+    archive_in(tmp_path / "a")
+    result = CliRunner().invoke(app, ["doctor", "--archive", str(tmp_path / "a"), "--free-gb", "0", "--json"])
+    document = json.loads(result.stdout)
+    assert (result.exit_code, document["ok"], document["faults"]) == (0, True, 0)
+    assert Path(document["samples"], "recipes", "line-six.toml").is_file()

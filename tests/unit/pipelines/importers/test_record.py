@@ -1,0 +1,146 @@
+"""Recordings as they are read: a time in any unit or as stamps, and an axis that stands still in a dwell."""
+
+import lots
+import numpy as np
+import pandas as pd
+import pytest
+from each import each
+
+from pipelines.diagnosis.diagnose import default_model, diagnose
+from pipelines.importers import clocks
+from pipelines.importers.content import Content
+from pipelines.importers.mapping import build
+from pipelines.importers.record import imported
+from schemas.errors import DataRejected, WrongUse
+
+
+@each(range(25))
+def test_one_frozen_dwell_of_known_pose_is_a_stuck_output(seed: int) -> None:
+    rng = np.random.default_rng([4_401, seed])
+    table = lots.lot(rng, units=1)
+    row, axis = int(rng.integers(1, len(table))), str(rng.choice(list("xyz")))
+    # 1000 equal samples: their mean differs from them, and from the last mean, in the last digits only
+    table.loc[row, f"out_{axis}"] = float(np.mean(np.full(1000, table.loc[row - 1, f"out_{axis}"]) + 1e-17))
+    table.loc[row, f"sd_{axis}"] = 1e-16
+    diagnosis = diagnose(table)
+    assert [(b["fault"], b["dwells"]) for b in diagnosis["blocked_by"]] == [
+        ("stuck_output", [int(table.loc[row, "dwell"])])
+    ]
+
+
+def test_dwells_of_a_file_in_which_an_axis_stands_still_are_refused_or_left_out(rng: np.random.Generator) -> None:
+    out = rng.normal(size=(12, 3))
+    frame = pd.DataFrame(out / np.linalg.norm(out, axis=1, keepdims=True), columns=["ax", "ay", "az"])
+    frame = frame.assign(sx=1e-3, sy=1e-3, sz=1e-3)
+    frame.loc[7, "sy"] = 0.0
+    columns = {"x": "ax", "y": "ay", "z": "az", "sd_x": "sx", "sd_y": "sy", "sd_z": "sz"}
+    content = {"columns": columns, "units": {"output": "g"}, "unit": "A1", "rows": "dwells"}
+    with pytest.raises(DataRejected, match=r"axis y is constant in dwell 'dwell 7' \(row 8\).*1 such dwells"):
+        imported(frame, build(content, "t"), "f.csv")
+    assert len(imported(frame, build({**content, "faulty": "leave-out"}, "t"), "f.csv").dwells) == 11
+    assert len(imported(frame, build({**content, "faulty": "keep"}, "t"), "f.csv").dwells) == 12
+
+
+def test_one_pose_is_judged_by_bias_and_its_temperature(rng: np.random.Generator) -> None:
+    table = lots.lot(rng, units=1)
+    assert default_model(table)[:3] == ["bias", "scale", "misalignment"]
+    one = table.assign(outer_deg=0.0, inner_deg=0.0)
+    assert default_model(one) == ["bias", "bias_temperature"]
+    assert default_model(one.assign(unit_C=25.0)) == ["bias"]
+
+
+CONTENT = {"columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "units": {"output": "g"}, "unit": "A1"}
+N = 600
+
+
+def record(time, name: str = "t") -> pd.DataFrame:
+    rng = np.random.default_rng(8)
+    frame = pd.DataFrame(0.002 * rng.normal(size=(N, 3)) + [0.0, 0.6, 0.8], columns=["ax", "ay", "az"])
+    frame.insert(0, name, time)
+    return frame
+
+
+def seconds(time, claimed: str = "", name: str = "t", **units: str):
+    units_ = {"output": "g"} | ({"time": claimed} if claimed else {})
+    how = build({**CONTENT, "columns": {**CONTENT["columns"], "time": name}, "units": units_}, "t")
+    table = record(time, name)
+    recording = imported(table, how, "f.csv", Content(table, (), units))
+    return recording.samples["time_s"].to_numpy(), recording.remarks
+
+
+STEPS = np.arange(N)
+
+
+@pytest.mark.parametrize(
+    ("time", "name", "stated", "rate"),
+    [
+        (STEPS / 100.0, "t", {}, 100.0),
+        (STEPS * 10, "t", {}, 100.0),
+        (STEPS * 10_000 + 123_456, "t", {}, 100.0),
+        (STEPS * 200_000_000, "t", {}, 5.0),
+        (1.7e9 + STEPS / 100.0, "t", {}, 100.0),
+        (1_700_000_000_000 + STEPS * 10, "t", {}, 100.0),
+        (1_700_000_000_000_000 + STEPS * 1000, "t", {}, 1000.0),
+        (1_700_000_000_000_000_000 + STEPS * 1_000_000, "t", {}, 1000.0),
+        (STEPS * 1, "time_ms", {}, 1000.0),
+        (STEPS * 1000, "timestamp (µs)", {}, 1000.0),
+        (STEPS * 1, "t", {"t": "ms"}, 1000.0),
+    ],
+)
+def test_the_unit_of_a_counter_is_recognised_and_said(time, name: str, stated: dict, rate: float) -> None:
+    times, remarks = seconds(time, name=name, **stated)
+    np.testing.assert_allclose(times, STEPS / rate, rtol=1e-6, atol=1e-6)
+    assert any("time in " in remark and f"{rate:.4g} Hz" in remark for remark in remarks)
+
+
+@each([1, 2, 1000, 500_000])
+def test_steps_that_several_units_allow_are_asked_about(step: int) -> None:
+    with pytest.raises(WrongUse, match=r"steps of .* Hz in .* Hz in .*add --units time="):
+        seconds(STEPS * step)
+
+
+def test_unix_time_in_another_unit_than_claimed_is_refused_and_doubtful_seconds_are_remarked_upon() -> None:
+    for first, step, claimed in ((1_700_000_000_000, 10, "s"), (1_700_000_000_000_000, 10_000, "ms")):
+        with pytest.raises(WrongUse, match=r"Unix time, in .*, but --units time=.* was given"):
+            seconds(first + STEPS * step, claimed)
+    assert any("CHECK THE UNIT OF TIME" in remark for remark in seconds(STEPS * 10_000, "s")[1])
+
+
+STAMPS = pd.Timestamp("2026-03-01T23:59:58") + pd.to_timedelta(STEPS * 10, unit="ms")
+
+
+DATES = (
+    "%Y-%m-%dT{}.%fZ",
+    "%Y-%m-%d {}.%f",
+    "%Y-%m-%d {},%f",
+    "%Y-%m-%dT{}.%f+02:00",
+    "%d.%m.%Y {}.%f",
+    "%Y/%m/%d {}.%f",
+)
+
+
+@each([*DATES, "%d-%b-%Y {}.%f", "{}.%f", "{},%f"])
+def test_stamps_become_seconds_also_over_midnight(form: str) -> None:
+    stamps = [stamp.strftime(form.format("%H:%M:%S")) for stamp in STAMPS]
+    np.testing.assert_allclose(seconds(stamps)[0], STEPS / 100.0, atol=1e-6)
+
+
+def test_day_and_month_that_cannot_be_told_apart_matter_only_where_the_date_changes() -> None:
+    form = "%d/%m/%Y %H:%M:%S.%f"
+    same_day = [stamp.strftime(form) for stamp in STAMPS - pd.Timedelta(hours=1)]
+    np.testing.assert_allclose(seconds(same_day)[0], STEPS / 100.0, atol=1e-6)
+    with pytest.raises(DataRejected, match="day and month are ambiguous"):
+        seconds([stamp.strftime(form) for stamp in STAMPS])
+
+
+def test_a_broken_stamp_is_refused_with_its_row() -> None:
+    stamps = [stamp.isoformat() for stamp in STAMPS]
+    stamps[17] = "2026-13-45"
+    with pytest.raises(DataRejected, match=r"row 18, column 't': found '2026-13-45', a time is needed"):
+        seconds(stamps)
+
+
+def test_a_unit_is_read_from_a_name_and_not_from_a_letter() -> None:
+    assert clocks.recognised(STEPS * 1.0, "time_ms").unit == "ms"
+    assert clocks.recognised(STEPS * 1.0, "s").unit == ""
+    assert clocks.recognised(STEPS * 1.0, "SampleTimeFine").unit == ""

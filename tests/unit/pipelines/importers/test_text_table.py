@@ -1,0 +1,257 @@
+"""Text as devices write it: preambles, integer headers, decimal commas, byte-order marks, units in a line of their own."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import recordings
+from each import each
+
+from inertial.errors import NotIdentified
+from pipelines.importers import files
+from pipelines.importers.clocks import stamps
+from pipelines.importers.inspection import inspect
+from pipelines.importers.mapping import build
+from pipelines.importers.record import imported
+from pipelines.importers.text_table import content
+from pipelines.importers.unit_check import unsigned_bits
+from pipelines.stages.unknown_poses.fit import norms_fitted
+from pipelines.tables.norms import refuse_one_pose
+from schemas.errors import DataRejected
+
+SPLIT = "t;ax;ay;az\n0,01;0,1;0,2;9,8\n0,02;0,1;0,2;9,7\n0,03;0,1;0,2;9,8\n"
+CASES = {
+    "preamble": ("Device: ACC-7\nSerial,1234\nRate,100\n\n" + SPLIT, ["t", "ax", "ay", "az"], [0.01, 0.1, 0.2, 9.8],
+                 "3 lines before the header in line 5 were not read, beginning with 'Device: ACC-7'"),
+    "preamble without a header": ("logger 2.1\nstarted 12:00\n1 2.5 3 4\n2 2.5 3 4\n3 2.5 3 4\n", ["1", "2", "3", "4"],
+                                  [1, 2.5, 3, 4], "2 lines before the first row in line 3"),
+    "integer header": ("0,1,2,3\n0.0,0.1,0.2,9.8\n0.1,0.1,0.2,9.8\n0.2,0.1,0.2,9.8\n", ["0", "1", "2", "3"],
+                       [0.0, 0.1, 0.2, 9.8], "line 1 only numbers the columns"),
+    "index column": (",0,1,2\n0,0.1,0.2,9.8\n1,0.1,0.2,9.8\n2,0.1,0.2,9.8\n", ["column 1", "0", "1", "2"],
+                     [0, 0.1, 0.2, 9.8], "only numbers the columns"),
+    "decimal comma, semicolon": (SPLIT, ["t", "ax", "ay", "az"], [0.01, 0.1, 0.2, 9.8], "decimal comma"),
+    "decimal comma, blanks": ("1,5 2,5 3,5\n2,5 3,25 4\n", ["1", "2", "3"], [1.5, 2.5, 3.5], "decimal comma"),
+    "decimal comma, quoted": ('t,"a, b"\n"0,01","0,98"\n"0,02","0,97"\n', ["t", "a, b"], [0.01, 0.98], "decimal comma"),
+    "names in a comment": ("# t ax ay\n1 2 3.5\n2 3 4.5\n", ["t", "ax", "ay"], [1, 2, 3.5], "columns named by a comment"),
+    "divider at the end": ("t,x,y,\n1,2,3,\n2,3,4,\n", ["t", "x", "y"], [1, 2, 3], ""),
+    "rows that count": ("1 2 3\n2 3 4\n3 4 5\n", ["1", "2", "3"], [1, 2, 3], ""),
+    "exponent of Fortran": ("t x\n0.0D+00 1.5D-01\n1.0D+00 2.5D-01\n", ["t", "x"], [0.0, 0.15], ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_table_is_found_and_what_was_passed_over_is_said(name: str, tmp_path) -> None:
+    text, names, first, remark = CASES[name]
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    content, _ = files.read_content(tmp_path / "a.csv")
+    assert list(content.table.columns) == names
+    np.testing.assert_allclose(content.table.iloc[0].to_numpy(dtype=float), first)
+    assert remark in "; ".join(content.remarks)
+    assert (remark == "") == (content.remarks == ())
+
+
+@pytest.mark.parametrize(
+    ("encoding", "remark"), [("utf-8-sig", ""), ("utf-16", "text in UTF-16"), ("cp1252", "text in Windows-1252")]
+)
+def test_text_of_other_encodings_is_read_and_said(encoding: str, remark: str, tmp_path) -> None:
+    (tmp_path / "a.csv").write_bytes("t;T [°C]\r\n1;20\r\n2;21\r\n".encode(encoding))
+    content, _ = files.read_content(tmp_path / "a.csv")
+    assert list(content.table.columns) == ["t", "T [°C]"]
+    assert dict(content.units) == {"T [°C]": "°C"}
+    assert content.remarks == ((remark,) if remark else ())
+
+
+def test_units_in_a_line_of_their_own_are_units(tmp_path) -> None:
+    (tmp_path / "a.csv").write_text("t;x;y\n[s];[g];[g]\n1;2;3\n2;3;4\n", encoding="utf-8")
+    content, _ = files.read_content(tmp_path / "a.csv")
+    assert dict(content.units) == {"t": "s", "x": "g", "y": "g"}
+    assert len(content.table) == 2
+
+
+def test_a_broken_first_row_stays_a_row(tmp_path) -> None:
+    (tmp_path / "a.csv").write_text("t,x,y\n1,abc,2\n2,3,4\n3,4,5\n4,5,6\n", encoding="utf-8")
+    table, _ = files.read(tmp_path / "a.csv")
+    assert table["x"].tolist() == ["abc", "3", "4", "5"]
+
+
+def test_rows_of_another_width_are_refused_below_a_preamble_too(tmp_path) -> None:
+    (tmp_path / "a.csv").write_text("logger\nt,x,y\n1,2,3\n2,3,4\n3,4,5,6\n4,5,6\n", encoding="utf-8")
+    with pytest.raises(DataRejected, match="rows from line 3 on do not have the 3 columns"):
+        files.read(tmp_path / "a.csv")
+
+
+def test_a_line_break_in_a_quoted_field_of_every_row_is_part_of_the_field() -> None:
+    """It ended in a traceback of the csv library while the other dividers were tried."""
+    rows = "".join(f'0.{k},1.{k},"moved\nagain"\n' for k in range(1, 7))
+    table = content(f"t,x,note\n{rows}", "x.csv").table
+    assert list(table.columns) == ["t", "x", "note"]
+    assert table["x"].tolist() == [1.1, 1.2, 1.3, 1.4, 1.5, 1.6]
+    assert set(table["note"]) == {"moved\nagain"}
+
+
+COUNTS = [[16005, -416, 650], [-12, 1002, 999], [7, -1024, 16384]] * 10
+PLAIN = {"columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "unit": "A1", "units": {"output": "LSB"}}
+
+
+def read(tmp_path: Path, text: str, encoding: str = "utf-8") -> tuple[pd.DataFrame, tuple[str, ...]]:
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    content, _ = files.read_content(tmp_path / "a.csv")
+    return content.table, tuple(content.remarks)
+
+
+def sheet(form: str, divider: str, rows: list[list[float]], *, quoted: bool = False) -> str:
+    def word(value: float) -> str:
+        text = format(value, form)
+        return f'"{text}"' if quoted else text
+
+    lines = [divider.join([f"{0.01 * k:.2f}", *map(word, row)]) for k, row in enumerate(rows)]
+    return "\n".join([divider.join(["t", "ax", "ay", "az"]), *lines]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "remark"),
+    [
+        (sheet(",", ",", COUNTS, quoted=True), "a comma between thousands"),
+        (sheet(",", ";", COUNTS), "a comma between thousands"),
+        (sheet(",.1f", ";", COUNTS).replace(".", "_").replace(",", ".").replace("_", ","), "a point between thousands"),
+        (sheet(",", ";", COUNTS).replace(",", "'"), "an apostrophe between thousands"),
+        (sheet(",", ";", COUNTS).replace(",", "\N{NARROW NO-BREAK SPACE}").replace(".", ","), "a space between thousands"),
+    ],
+)  # fmt: skip
+def test_thousands_with_a_separator_are_counts(text: str, remark: str, tmp_path: Path) -> None:
+    """16,384 in quotes was read as 16.384 and taken for m/s²."""
+    table, remarks = read(tmp_path, text)
+    np.testing.assert_allclose(table[["ax", "ay", "az"]].to_numpy(dtype=float), COUNTS)
+    np.testing.assert_allclose(table["t"], 0.01 * np.arange(len(COUNTS)))
+    assert remark in "; ".join(remarks)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[9.807, 1.204, -2.113], [9.811, 1.206, 2.113]] * 20,  # three decimals, none below one
+        [[0.123, 1.002, -1.004], [1.123, 1.002, -1.004]] * 20,
+    ],
+)
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_three_decimals_are_no_thousands(rows: list[list[float]], decimal: str, tmp_path: Path) -> None:
+    text = sheet(".3f", ";", rows)
+    text = "\n".join(f"{k}{line[line.index(';') :]}" if k else line for k, line in enumerate(text.splitlines()))
+    table, remarks = read(tmp_path, text.replace(".", decimal))
+    np.testing.assert_allclose(table[["ax", "ay", "az"]].to_numpy(dtype=float), rows)
+    assert not any("thousands" in one for one in remarks)
+
+
+@each(["utf-16-le", "utf-16-be"])
+def test_utf_16_without_its_mark_is_read(encoding: str, tmp_path: Path) -> None:
+    table, remarks = read(tmp_path, sheet("d", ",", COUNTS), encoding)
+    assert table["ax"].tolist()[:3] == [16005, -12, 7]
+    assert remarks == (f"text in {encoding.upper()}",)
+
+
+def test_rows_without_their_last_fields_do_not_hide_the_header(tmp_path: Path) -> None:
+    table, remarks = read(tmp_path, "t,x,y,note\n0,1,2\n1,1,2,\n2,1,2,\n3,1,2\n4,1,2,\n5,1,2,\n")
+    assert list(table.columns)[:3] == ["t", "x", "y"]
+    assert len(table) == 6
+    assert remarks == ()
+
+
+def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
+    times = stamps(pd.Series(["59:59,50", "59:59,75", "00:00,00", "00:00,25"], name="t"), "a.csv")
+    np.testing.assert_allclose(times, [0.0, 0.25, 0.5, 0.75])
+
+
+def frame(rng: np.random.Generator, **more: object) -> tuple[recordings.Recording, pd.DataFrame]:
+    one = recordings.recording(rng, **more)  # type: ignore[arg-type]
+    return one, recordings.table(one, t=one.time)
+
+
+def test_a_row_of_a_summary_is_left_out_where_gaps_may_be(rng: np.random.Generator) -> None:
+    """The message asked for `--gaps split`, which was given."""
+    _, table = frame(rng)
+    last = pd.DataFrame({"t": ["mean"], "ax": [0.0], "ay": [0.0], "az": [0.0]})
+    table = pd.concat([table.astype(object), last], ignore_index=True)
+    recording = imported(table, build(PLAIN | {"gaps": "split"}, "t"), "a.csv")
+    assert recording.samples is not None
+    assert len(recording.samples) == len(table) - 1
+
+
+def test_rows_that_stand_there_twice_are_remarked_upon(rng: np.random.Generator) -> None:
+    _, table = frame(rng)
+    twice = pd.concat([table.iloc[:501], table.iloc[500:]], ignore_index=True)
+    assert "CHECK THE ROWS: 1 rows" in "; ".join(imported(twice, build(PLAIN, "t"), "a.csv").remarks)
+    assert "CHECK THE ROWS" not in "; ".join(imported(table, build(PLAIN, "t"), "a.csv").remarks)
+
+
+def test_words_that_lost_their_sign_are_refused_with_what_to_subtract(rng: np.random.Generator, tmp_path: Path) -> None:
+    """They were imported, and the fit said NOT ADEQUATE."""
+    _, table = frame(rng, positions=18)
+    wrong = table.assign(**{name: np.round(table[name]) % 65536.0 for name in ("ax", "ay", "az")})
+    with pytest.raises(DataRejected, match=r"signed words of 16 bits .* subtract 65536"):
+        imported(wrong, build(PLAIN, "t"), "a.csv")
+    wrong.to_csv(tmp_path / "a.csv", index=False)
+    assert any("without their sign" in one for one in inspect([tmp_path / "a.csv"]).document["open"])
+
+
+@pytest.mark.parametrize(
+    ("bits", "zero", "per_g"), [(12, 2048, 400), (12, 2048, 2000), (16, 32768, 4000), (10, 512, 100)]
+)
+def test_a_converter_with_its_zero_in_the_middle_lost_no_sign(
+    rng: np.random.Generator, bits: int, zero: int, per_g: int
+) -> None:
+    force = np.repeat(recordings.FACES, 50, axis=0)
+    counts = np.clip(np.round(zero + per_g * force + rng.normal(0.0, 2.0, force.shape)), 0, 2**bits - 1)
+    assert unsigned_bits(counts) == 0
+
+
+def test_a_sheet_of_positions_is_proposed_as_dwells(tmp_path: Path) -> None:
+    """The proposed command asked for the rate of samples."""
+    (tmp_path / "a.csv").write_text("Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
+    document = inspect([tmp_path / "a.csv"]).document
+    assert document["open"] == []
+    assert "dwell=Position" in document["command"]
+    assert document["command"].endswith("--rows dwells")
+
+
+def test_axes_that_were_not_recognised_stand_in_capitals(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,ax\n" + "".join(f"{0.01 * k:.2f},0.{k}\n" for k in range(20)))
+    document = inspect([tmp_path / "a.csv"]).document
+    assert "x=COLUMN,y=COLUMN,z=COLUMN" in document["command"]
+    assert any("needs three axes" in one for one in document["open"])
+
+
+def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Generator) -> None:
+    """Dwells with times that ran back were refused by the diagnosis as a fault of the data."""
+    one = recordings.recording(rng, directions=recordings.FACES, moves=False)
+    table = recordings.table(one, t=one.time)
+    table["part"] = ""
+    for number, (start, stop) in enumerate(one.spans):
+        table.loc[start : stop - 1, "part"] = f"face {number}"
+        table.loc[start : stop - 1, "t"] -= one.time[start]
+    content = PLAIN | {"columns": {**PLAIN["columns"], "dwell": "part"}}  # type: ignore[dict-item]
+    recording = imported(table[table["part"] != ""].reset_index(drop=True), build(content, "t"), "a.csv")
+    assert recording.dwells is not None
+    assert bool(np.all(np.diff(recording.dwells["time_s"]) > 0.0))
+    assert "the clock restarts 5 times" in "; ".join(recording.remarks)
+
+
+def test_counts_far_from_zero_are_fitted(rng: np.random.Generator) -> None:
+    """100 counts per g about 2048: the outputs change by a tenth of their norm."""
+    force = rng.standard_normal((30, 3))
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    table = pd.DataFrame(
+        2048.0 + 100.0 * force + rng.normal(0.0, 0.01, force.shape), columns=["out_x", "out_y", "out_z"]
+    )
+    table = table.assign(unit="A", dwell=range(30), time_s=np.arange(30) * 10.0, out_unit="LSB")
+    assert norms_fitted(table, None, ("bias", "scale", "misalignment")).fit.fit.coefficients[0, 0, 0] == pytest.approx(
+        2048.0, abs=0.1
+    )
+
+
+def test_a_sensor_that_was_not_turned_is_told_so_and_what_to_do(rng: np.random.Generator) -> None:
+    """A chamber cycle was told to add poses."""
+    still = np.array([0.1, -0.05, -9.7]) + rng.normal(0.0, 0.05, (30, 3))
+    with pytest.raises(NotIdentified, match=r"was not turned.*--face FACE"):
+        refuse_one_pose(still)
+    refuse_one_pose(np.concatenate([still, -still]))

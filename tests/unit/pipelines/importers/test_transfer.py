@@ -1,0 +1,83 @@
+"""A transfer function that was measured elsewhere is judged, kept and refused with the reason."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from each import each
+from scipy import signal
+from typer.testing import CliRunner
+
+from pipelines.archive import Archive
+from pipelines.cli import app
+from pipelines.importers.transfer import import_transfer
+from schemas.errors import DataRejected
+
+HEAD = "frequency_hz,magnitude,phase_deg,magnitude_uncertainty_percent,phase_uncertainty_deg"
+
+
+def written(path: Path, *, low_pass_hz: float = 0.0, top: float = 5000.0, seed: int = 1) -> Path:
+    """A CSV of a 2500 Hz sensor by scipy's own frequency response, 0.2 % and 0.15° a point."""
+    rng = np.random.default_rng(seed)
+    f = np.geomspace(5.0, top, 45)
+    wn = 2.0 * np.pi * 2500.0
+    h = signal.freqs([wn**2], [1.0, 1.4 * wn, wn**2], 2.0 * np.pi * f)[1]
+    if low_pass_hz:
+        b, a = signal.butter(1, 2.0 * np.pi * low_pass_hz, analog=True)
+        h = h * signal.freqs(b, a, 2.0 * np.pi * f)[1]
+    size = 0.3 * np.abs(h) * (1.0 + 0.002 * rng.normal(size=f.size))
+    phase = np.degrees(np.angle(h)) + 0.15 * rng.normal(size=f.size)
+    rows = "\n".join(f"{a:.9g},{b:.9g},{c:.9g},0.2,0.15" for a, b, c in zip(f, size, phase, strict=True))
+    path.write_text(f"{HEAD}\n{rows}\n")
+    return path
+
+
+def test_a_right_model_is_adequate_and_kept(tmp_path: Path) -> None:
+    diagnosis = import_transfer(written(tmp_path / "a.csv"), "S1", archive=str(tmp_path / "archive"))
+    assert diagnosis["adequate"] is True
+    assert diagnosis["parameters"]["natural_hz"]["value"] == pytest.approx(2500.0, rel=0.01)
+    run = Archive(str(tmp_path / "archive")).run(diagnosis["run"])
+    assert len(run.table("procedure_points")) == 45
+    assert run.about["source"]["sha256"]
+
+
+def test_the_missing_pole_is_named_and_the_error_falls(tmp_path: Path) -> None:
+    diagnosis = import_transfer(
+        written(tmp_path / "b.csv", low_pass_hz=6000.0), "S1", archive=str(tmp_path / "archive")
+    )
+    assert diagnosis["adequate"] is False
+    assert "one_pole" in diagnosis["classes"][0]["effects"]
+    assert diagnosis["extended_percent"] < 0.2 * diagnosis["error_percent"]
+    assert diagnosis["left_out"][1] == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_sweep_that_ends_too_soon_gives_an_interval(tmp_path: Path) -> None:
+    diagnosis = import_transfer(written(tmp_path / "c.csv", top=500.0), "S1", archive=str(tmp_path / "archive"))
+    natural = diagnosis["parameters"]["natural_hz"]
+    assert not natural["identified"]
+    assert natural["low"] < 2500.0 < natural["high"]
+    assert diagnosis["next_hz"] == [] or min(diagnosis["next_hz"]) > 100.0
+
+
+@each([
+    ("f,h", "1,2", "column frequency_hz, magnitude"),
+    (HEAD, "1,2,0,0,1", "a value above 0"),
+    (HEAD, "1,2,x,1,1", "a finite number"),
+    (HEAD, "1,2,0,1,1", "1 points"),
+])  # fmt: skip
+def test_a_file_without_units_or_values_is_refused(row: tuple[str, str, str], tmp_path: Path) -> None:
+    head, line, needed = row
+    path = tmp_path / "bad.csv"
+    path.write_text(f"{head}\n{line}\n")
+    with pytest.raises(DataRejected, match=needed):
+        import_transfer(path, "S1", archive=str(tmp_path / "archive"))
+
+
+def test_the_command_prints_a_document_and_says_by_its_status_what_came_of_it(tmp_path: Path) -> None:
+    path, archive = written(tmp_path / "d.csv", low_pass_hz=6000.0), str(tmp_path / "archive")
+    result = CliRunner().invoke(
+        app, ["import", str(path), "--procedure", "sweep", "--unit", "S1", "--archive", archive, "--json"]
+    )
+    assert result.exit_code == 1
+    assert json.loads(result.stdout)["recommended"]

@@ -1,0 +1,298 @@
+"""Recipes: what is accepted, and that what is refused names the key and what to do."""
+
+import os
+import shutil
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from capture_double import recipe_file, small_job
+from each import each
+
+from inertial.poses import NAMED
+from pipelines.jobs.job import Request
+from pipelines.jobs.recipes import load_recipe, read_limits, recipe_names, sample_names
+from pipelines.schedule.steps import steps
+from schemas import own_files
+from schemas.errors import RecipeInvalid, WrongUse
+from schemas.station import load_station
+from stations.plant.preset import load_preset
+from stations.profile_files import load_profile
+
+POSES = 'poses = "nine"'
+LAST_EFFECT = '"scale_temperature"]'
+
+
+@each(sample_names())
+def test_every_built_in_recipe_makes_a_job(name: str) -> None:
+    job = Request(recipe=name).job()
+    assert job.recipe.soak_min_s >= 900.0
+
+
+def test_the_main_job_is_the_one_of_the_figures() -> None:
+    recipe = load_recipe()
+    assert len(recipe.units) == 8
+    assert (len(recipe.poses), len({p.name for p in recipe.verification}), len(recipe.temperatures_C)) == (24, 6, 3)
+    assert [p.name for p in recipe.verification] == [f"v{k}" for k in range(1, 7)] * 3
+    assert recipe.static_record_s == 1200.0
+
+
+REFUSED: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("temperatures_C =", "temperature_C =", ("unknown key 'temperature_C'", "did you mean temperatures_C")),
+    ("local_gravity_m_s2 = 9.8123\n", "", ("local_gravity_m_s2",)),
+    ("9.8123", "1.0", ("local_gravity_m_s2", "9.7")),
+    (POSES, 'poses = "fibonaci24"', ("did you mean fibonacci24",)),
+    ('"misalignment"', '"misalignement"', ("did you mean misalignment",)),
+    ('limits = "consumer"', 'limits = "consumr"', ("did you mean consumer",)),
+    (POSES, "poses = [[70, 0], [90, 90], [80, 180], [90, -90], [85, 45]]",
+     ("fit: poses span 0.34 g on z, the recipe needs 1.4 g; add poses with z up and z down",)),
+    (POSES, 'poses = "twelve"\nspan_min_g = 1.5', ("span 1.41 g",)),
+    ("[0.0, 50.0]", "[0.0, 150.0]", ("temperatures_C", "150 °C", "-40 to 85 °C")),
+    ("[105.0, -100.0]", "[105.0, -1000.0]", ("poses (inner)",)),
+    ("settle_s = 2.0", "settle_s = 2.0\nsoak_min_s = 60.0", ("60 s", "900 s")),
+    ("dwell_s = 1.0", "dwell_s = 0.5", ("50 samples per pose",)),
+    ("[35.0, 15.0]", "[0.2, 15.0]", ("pose v1 lies 0.20° from pose p",)),
+    (LAST_EFFECT, '"scale_temperature", "gravity_value"]', ("gravity_value",)),
+    ("[0.0, 50.0]", "[25.0]", ("bias_temperature",)),
+    ("static_record_s = 30.0", "static_record_s = 0.0", ("needs a static record",)),
+    ("verification = [[35.0, 15.0], [105.0, -100.0]]", "verification = []", ("needs verification poses",)),
+    ('["A1", "A2", "A3"]', '["A1", "A1"]', ("A1 is there twice",)),
+    ("[0.0, 50.0]", "[0.0, 25.0, 25.0]", ("twice in a row",)),
+    ('name = "small"\n', 'name = "small\n', ("line 2",)),
+)  # fmt: skip
+
+
+@each(REFUSED, lambda row: row[1])
+def test_what_is_refused_names_the_key_and_what_to_do(row: tuple[str, str, tuple[str, ...]], tmp_path: Path) -> None:
+    old, new, said = row
+    with pytest.raises(RecipeInvalid) as caught:
+        small_job(tmp_path, (old, new))
+    for words in said:
+        assert words in str(caught.value)
+
+
+@each(
+    [
+        ((), ("A1", "A2", "A1"), "serial A1 is there twice"),
+        ((('units = ["A1", "A2", "A3"]\n', ""),), (), "no unit is named"),
+        ((), ("A1", ""), "serial '' is blank"),
+        (
+            (),
+            tuple(f"S{n}" for n in range(9)),
+            "9 units, the fixture has 8 slots; measure 2 lots.* --units S0,S1,S2,S3,S4,S5,S6,S7, then --units S8$",
+        ),
+    ]
+)
+def test_a_lot_that_cannot_be_measured_is_refused(
+    row: tuple[tuple[tuple[str, str], ...], tuple[str, ...], str], tmp_path: Path
+) -> None:
+    changes, units, said = row
+    with pytest.raises(WrongUse, match=said):
+        small_job(tmp_path, *changes, units=units)
+
+
+def test_names_close_recipes() -> None:
+    with pytest.raises(RecipeInvalid, match="did you mean production"):
+        load_recipe("produktion")
+
+
+def test_a_short_soak_is_measured_where_somebody_answers_for_it(tmp_path: Path) -> None:
+    small_job(tmp_path, ("settle_s = 2.0", "settle_s = 2.0\nsoak_min_s = 60.0\nallow_short_soak = true"))
+
+
+@each(NAMED)
+def test_accepts_every_named_plan(plan: str, tmp_path: Path) -> None:
+    assert small_job(tmp_path, (POSES, f'poses = "{plan}"')).recipe.poses
+
+
+def test_takes_poses_as_angles(tmp_path: Path) -> None:
+    angles = "poses = [[0, 0], [180, 0], [90, 0], [90, 90], [90, 180], [90, -90]]"
+    job = small_job(tmp_path, (POSES, angles))
+    assert [pose.name for pose in job.recipe.poses] == ["p1", "p2", "p3", "p4", "p5", "p6"]
+    assert np.isclose(job.recipe.poses[3].inner_deg, 90.0)
+
+
+def test_takes_the_model_from_a_file(tmp_path: Path) -> None:
+    model = '[model]\nname = "line"\nversion = 2\neffects = ["bias", "scale"]\n'
+    change = '[[change]]\nversion = 2\neffect = "scale"\nby = "QA"\nat = 2026-01-02\nwhy = "needed"\n'
+    (tmp_path / "line.toml").write_text(model + change, encoding="utf-8")
+    effects = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
+    limits = '[figures]\nresidual_rms_ug = { max = 1e5, unit = "µg" }\n'
+    (tmp_path / "wide.toml").write_text('name = "wide"\n' + limits, encoding="utf-8")
+    changes = (effects, 'model = "line.toml"'), ('limits = "consumer"', 'limits = "wide.toml"')
+    recipe = small_job(tmp_path, *changes).recipe
+    assert (recipe.model_name, recipe.model_version, recipe.effects) == ("line", 2, ["bias", "scale"])
+
+
+def test_the_capture_is_shared_by_recipes_that_differ_in_the_model_only(tmp_path: Path) -> None:
+    one = small_job(tmp_path)
+    other = small_job(tmp_path, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
+    hotter = small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 51.0]"))
+    assert one.capture_id == other.capture_id
+    assert one.capture_id != hotter.capture_id
+
+
+def test_a_fresh_measurement_is_a_capture_of_its_own(tmp_path: Path) -> None:
+    path = recipe_file(tmp_path)
+    assert Request(recipe=path).job().capture_id != Request(recipe=path, repeat=1).job().capture_id
+
+
+SOAKS = """
+[[soaks]]
+temperature_C = 25.0
+poses = [1, 3, 5, 1]
+
+[[soaks]]
+temperature_C = -10.0
+poses = [2, 4, 6, 8]
+verification = []
+
+[[soaks]]
+temperature_C = 25.0
+"""
+
+
+def in_soaks() -> list[tuple[str, str]]:
+    return [("temperatures_C = [0.0, 50.0]\n", ""), ('limits = "consumer"', 'limits = "consumer"' + SOAKS)]
+
+
+def test_a_recipe_may_say_soak_by_soak_which_poses_are_measured(tmp_path: Path) -> None:
+    recipe = load_recipe(recipe_file(tmp_path, *in_soaks()))
+    assert recipe.temperatures_C == [25.0, -10.0, 25.0]
+    assert [p.name for p in recipe.poses_at(0)] == ["p1", "p3", "p5", "p1"]
+    assert (recipe.verification_at(1), recipe.verification_at(2)) == ([], recipe.verification)
+    records = [s for s in steps(recipe) if s.kind != "allan"]
+    assert len(records) == 4 + len(recipe.verification) + 4 + len(recipe.poses) + len(recipe.verification)
+    assert len(steps(recipe)) == recipe.planned_records
+
+
+def test_refuses_soaks_that_name_a_pose_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(RecipeInvalid, match="soak 2 names poses 10, there are 9"):
+        load_recipe(recipe_file(tmp_path, *in_soaks(), ("8]", "10]")))
+
+
+def test_a_temperature_may_come_again(tmp_path: Path) -> None:
+    assert small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 25.0, 50.0, 25.0, 0.0]")).recipe.temperatures_C[-1] == 0.0
+
+
+SAMPLES = files("schemas") / "samples"
+RECIPE = SAMPLES.joinpath("production.toml").read_text("utf-8")
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's folder; the working folder is another one."""
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    return tmp_path / "config" / "tumbleline"
+
+
+def put(folder: Path, kind: str, name: str, text: str) -> Path:
+    path = folder / kind / f"{name}.toml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_recipe_is_found_in_the_working_folder_before_that_of_the_user(home: Path) -> None:
+    put(home, "recipes", "my", RECIPE.replace("dwell_s = 10.0", "dwell_s = 20.0"))
+    assert load_recipe("my").dwell_s == 20.0
+    put(Path(), "recipes", "my", RECIPE.replace("dwell_s = 10.0", "dwell_s = 30.0"))
+    assert load_recipe("my").dwell_s == 30.0
+    assert "my" in recipe_names()
+
+
+def test_a_shadowed_file_of_other_content_is_told_once_and_the_same_content_is_not(
+    home: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, mine in (("other", "dwell_s = 20.0"), ("same", "dwell_s = 10.0")):
+        put(home, "recipes", name, RECIPE.replace("dwell_s = 10.0", mine))
+        put(Path(), "recipes", name, RECIPE)
+        load_recipe(name)
+        load_recipe(name)
+    said = capsys.readouterr().err
+    assert said.count("has other content and is not used") == 1
+    assert str(home / "recipes" / "other.toml") in said
+
+
+def test_limits_a_station_a_profile_and_a_preset_are_found(home: Path) -> None:
+    put(home, "limits", "mine", SAMPLES.joinpath("limits-consumer.toml").read_text("utf-8"))
+    assert read_limits("mine").figures
+    station = files("stations").joinpath("simulated.toml").read_text("utf-8")
+    put(home, "stations", "line", station.replace('name = "simulated"', 'name = "line"').replace("watlow_f4t", "oven"))
+    assert load_station(Path("line")).name == "line"
+    profile = files("stations").joinpath("profiles", "watlow_f4t.toml").read_text("utf-8")
+    put(home, "profiles", "oven", profile.replace('name = "watlow_f4t"', 'name = "oven"'))
+    assert load_profile("oven").adapter == "watlow_f4t"
+    preset = files("stations.plant").joinpath("presets", "adxl355.toml").read_text("utf-8")
+    put(home, "presets", "quiet", preset.replace('name = "ADXL355"', 'name = "quiet"'))
+    assert load_preset("quiet").output_unit == "LSB"
+
+
+def test_a_name_means_one_file(home: Path) -> None:
+    path = put(home, "recipes", "production", RECIPE)
+    with pytest.raises(RecipeInvalid, match=r"'production' is built in, and .*production\.toml has the same name"):
+        load_recipe("production")
+    path.unlink()
+    put(home, "presets", "adxl355", "name = 'adxl355'")
+    with pytest.raises(RecipeInvalid, match="is built in"):
+        load_preset("ADXL355")
+
+
+def test_a_name_that_is_a_path_is_not_searched(home: Path) -> None:
+    put(home, "recipes", "my", RECIPE)
+    assert own_files.own_file("recipes", "../recipes/my") is None
+    with pytest.raises(RecipeInvalid, match="did you mean my"):
+        load_recipe("mmy")
+
+
+def test_a_preset_whose_name_differs_from_its_file_is_refused(home: Path) -> None:
+    put(home, "presets", "quiet", 'name = "loud"\n')
+    with pytest.raises(RecipeInvalid, match="key 'name': 'loud', 'quiet' as in the name of the file is needed"):
+        load_preset("quiet")
+
+
+def test_the_file_that_is_used_is_reported_once(home: Path) -> None:
+    path = put(home, "recipes", "my", RECIPE)
+    lines: list[str] = []
+    own_files.report_to(lines.append)
+    load_recipe("my")
+    load_recipe("my")
+    own_files.report_to(lambda _line: None)
+    assert lines == [f"recipe 'my': {path}"]
+
+
+def test_a_changed_preset_of_ones_own_is_measured_anew(home: Path) -> None:
+    built_in = Request().job()
+    assert "own_files" not in built_in.about
+    preset = files("stations.plant").joinpath("presets", "adxl355.toml").read_text("utf-8").replace("ADXL355", "quiet")
+    path = put(home, "presets", "quiet", preset)
+    put(home, "recipes", "my", RECIPE.replace('device = "adxl355"', 'device = "quiet"').replace("ADXL355", "quiet"))
+    first = Request("my").job()
+    assert first.capture_id != built_in.capture_id
+    assert set(first.about["own_files"]) == {"presets/quiet"}
+    path.write_text(preset + "\n# the same figures, another file\n", encoding="utf-8")
+    assert Request("my").job().capture_id != first.capture_id
+    shutil.rmtree(home)
+    assert Request().job().capture_id == built_in.capture_id
+    assert os.environ["XDG_CONFIG_HOME"]
+
+
+def test_a_relative_folder_of_the_configuration_is_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CONFIG_HOME", "config")
+    assert own_files.folders("limits")[1] == tmp_path / ".config" / "tumbleline" / "limits"
+
+
+def test_a_file_with_the_bare_name_of_a_built_in_recipe_or_limits_is_not_taken_in_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("production", "consumer"):
+        Path(name).write_text("name = 'other'\n", encoding="utf-8")
+    with pytest.raises(RecipeInvalid, match="'production' is built in, and production has the same name"):
+        load_recipe("production")
+    with pytest.raises(RecipeInvalid, match="'consumer' is built in"):
+        read_limits("consumer")

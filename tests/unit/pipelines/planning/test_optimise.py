@@ -1,0 +1,97 @@
+"""Parts of the search for a cheaper recipe: how many dwells, how far the poses reach, and what the textbook plan is worth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from root_process import ROOT
+
+from inertial.frames import force_from_angles
+from inertial.noise.dwells import DwellNoise, dwell_covariance
+from pipelines.jobs.model_files import STARTING_MODEL
+from pipelines.jobs.recipes import load_recipe
+from pipelines.planning.dwell_counts import FEWEST, fewest_dwells, smallest_passing
+from pipelines.planning.plan import identified, plan_context
+from pipelines.planning.requirement import Requirement, candidates, temperature_choices
+from pipelines.planning.soak_orders import mirrored, orders
+from pipelines.planning.textbook import reference_errors, textbook
+from pipelines.planning.timed_design import PlanDesign, TimedDesign, spanned
+from pipelines.schedule.timing import spent
+from schemas.station import load_station
+from stations.plant.preset import load_preset
+
+STATION = load_station()
+NOISE = DwellNoise(25e-6, 300e-6, 4e-6)
+ANALOGUE = ROOT / "deploy" / "recipes" / "analogue.toml"
+
+
+@pytest.fixture(scope="module")
+def timed():
+    base = load_recipe().model_copy(update={"effects": list(STARTING_MODEL), "static_record_s": 0.0})
+    against = plan_context(textbook(base, (-10.0, 60.0)), STATION, NOISE)
+    requirement = Requirement(reference_errors(against, base), (), (-10.0, 60.0), candidates(STATION))
+    return TimedDesign(base, STATION, NOISE, requirement, slowest=float(against.state.time[-1]))
+
+
+def test_no_soak_has_a_dwell_too_many(timed: TimedDesign) -> None:
+    made, allowed = PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 1.4)
+    design = fewest_dwells(timed, made, allowed)
+    assert design is not None
+    assert np.all(timed.ratio_and_seconds(design)[0] <= allowed)
+    assert len(set(design.counts)) > 1
+    for soak, count in enumerate(design.counts):
+        fewer = list(design.counts)
+        fewer[soak] -= 1
+        assert count == FEWEST or np.any(timed.ratio_and_seconds(replace(design, counts=tuple(fewer)))[0] > allowed)
+
+
+def test_no_number_of_dwells_is_given_where_none_is_enough(timed: TimedDesign) -> None:
+    assert fewest_dwells(timed, PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 0.05)) is None
+    assert smallest_passing(lambda n: n >= 7, 1, 20) == 7
+    assert smallest_passing(lambda n: n >= 7, 1, 6) is None
+
+
+def test_the_table_of_flicker_gives_the_covariance_of_dwells(timed: TimedDesign) -> None:
+    time = np.sort(np.random.default_rng(3).uniform(900.0, 8000.0, 40)).round(1) + 20.0 * np.arange(40)
+    exact = dwell_covariance(time, 2.0, NOISE, slowest=timed.slowest)
+    assert timed.covariance(time, 2.0) == pytest.approx(exact, rel=1e-4)
+
+
+def test_a_plan_that_reaches_too_little_is_widened_by_few_poses():
+    force = force_from_angles(*np.radians(candidates(STATION)).T)
+    flat = np.flatnonzero(np.abs(force[:, 2]) < 0.4)[:8].astype(np.intp)
+    fixed = np.zeros(8, dtype=bool)
+    fixed[[0, 7]] = True
+    choice = spanned(force, flat, fixed, 1.4)
+    assert np.ptp(force[flat], axis=0).min() < 1.4 <= np.ptp(force[choice], axis=0).min()
+    assert np.array_equal(choice[fixed], flat[fixed])
+
+
+def test_what_the_textbook_plan_cannot_identify_is_wanted_as_the_recipe_knows_it():
+    recipe = load_recipe(str(ANALOGUE))
+    noise = DwellNoise(280e-6)
+    against = plan_context(textbook(recipe, recipe.temperatures_C), STATION, noise)
+    errors = reference_errors(against, recipe)
+    own = identified(plan_context(recipe, STATION, noise)).errors
+    assert errors[:, -1] == pytest.approx(own[:, -1])
+    assert np.all(errors[:, :-1] < own[:, :-1])
+
+
+def test_orders_without_coming_back_may_be_one_soak_and_those_upside_down_are_known():
+    sequences = orders((), STATION, 900.0, optional=temperature_choices((-10.0, 60.0)), back=False)
+    assert sequences[0] == (25.0,)
+    assert (-10.0, 60.0) in sequences
+    assert mirrored((25.0, -10.0, 60.0)) == (25.0, 60.0, -10.0)
+
+
+def test_wander_alone_forbids_the_bias_of_a_qa700_in_six_tenths_of_the_textbooks_time():
+    """A device read without a pause from power-on, at one temperature, all else known: no recipe knows more."""
+    part = load_preset("qa700")
+    noise = DwellNoise(1e-6 * part.noise_density_ug, 1e-6 * part.bias_instability_ug, 1e-6 * part.rate_random_walk_ug)
+    base = load_recipe().model_copy(update={"effects": list(STARTING_MODEL), "static_record_s": 0.0})
+    against = plan_context(textbook(base, (-10.0, 60.0)), STATION, noise)
+    time = np.arange(6.0, 0.6 * 60.0 * spent(against.activities).total, 12.0)
+    covariance = dwell_covariance(time, 12.0, noise, slowest=float(against.state.time[-1]))
+    best = 1e6 / np.sqrt(np.linalg.inv(covariance).sum())
+    assert best == pytest.approx(23.0, abs=0.1)
+    assert 1e6 * identified(against).errors[0, 0] == pytest.approx(22.1, abs=0.1)

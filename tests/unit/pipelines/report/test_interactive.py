@@ -1,0 +1,243 @@
+"""The report: complete, offline, and readable; its figures can be zoomed, and stay pictures where it would become too large."""
+
+import base64
+import gzip
+import hashlib
+import json
+import re
+from importlib.resources import files
+
+import numpy as np
+import pandas as pd
+import pytest
+from each import each
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipelines.archive import Run
+from pipelines.drawing import Chart, ColourScale, Plot, PlotAxis, Trace, svg_text
+from pipelines.drawing.mollweide import sphere
+from pipelines.drawing.ticks import date_ticks, linear_ticks, log_ticks
+from pipelines.report import interactive as module
+from pipelines.report import make_report, render
+from pipelines.report.interactive import BUNDLE, BUNDLE_SHA256, figure_of, interactive
+from pipelines.report.numbers import significant, with_uncertainty
+from pipelines.report.run_pictures import lot_chart
+
+
+@pytest.fixture(scope="module")
+def page(run: Run) -> str:
+    return render(run)
+
+
+def test_opens_without_a_network(page: str) -> None:
+    assert not re.findall(r'(?:src|href)="(?!#)', page.replace('xlink:href="#', ""))
+    assert not re.findall(r"url\((?!#)", page)
+
+
+def test_shows_every_unit_with_plots_figures_and_coefficients(page: str) -> None:
+    for unit in ("A1", "A2", "A3"):
+        assert f'id="{unit}"' in page
+    assert page.count("<svg") == 2 + 2 * 3
+    assert "Allan deviation" in page
+    assert "scale_temperature" in page
+
+
+def test_names_rule_limits_gravity_and_provenance(page: str, run: Run) -> None:
+    for words in ("ILAC-G8:09/2019 guarded acceptance", "9.8123 m/s²", run.id, str(run.about["capture"])):
+        assert words in page
+
+
+def test_has_no_number_longer_than_its_uncertainty_supports(page: str) -> None:
+    text = re.sub(r"<(svg|style)\b.*?</\1>", "", page, flags=re.DOTALL)
+    cells = re.findall(r'<td class="n"[^>]*>(.*?)</td>', text, flags=re.DOTALL)
+    assert (
+        max(len(re.findall(r"\d", re.sub(r"<[^>]*>", " ", cell).split("±")[0])) for cell in cells if "…" not in cell)
+        <= 10
+    )
+
+
+@pytest.mark.parametrize(("mean", "red"), [(300.0, False), (1300.0, True)])
+def test_the_limit_is_for_the_mean_of_a_pose_not_for_a_dwell_that_wandered(mean: float, *, red: bool) -> None:
+    dwells = pd.DataFrame(
+        {"unit": "A1", "pose": ["v01", "v01", "v02"], "error_ug": [1400.0, 2.0 * mean - 1400.0, 10.0]}
+    )
+    poses = pd.DataFrame({"unit": "A1", "pose": ["v01", "v02"], "error_ug": [mean, 10.0]})
+    chart = lot_chart(dwells, poses, ["A1"], 1000.0)
+    shown = {trace.name: trace.y.tolist() for trace in chart.plots[0].traces if trace.style == "points"}
+    assert shown.get("mean of a pose, beyond the limit", []) == ([mean] if red else [])
+    assert shown["single dwell"] == [1400.0, 2.0 * mean - 1400.0, 10.0]
+    assert ("beyond the limit" in svg_text(chart)) is red
+
+
+def test_is_made_once(run: Run) -> None:
+    assert not make_report(run)
+    assert make_report(run)
+
+
+def test_rounds_to_the_uncertainty() -> None:
+    assert with_uncertainty(255224.4846, 61.7) == ("255\u202f224", "62")
+    assert with_uncertainty(-0.230123, 0.0361) == ("−0.230", "0.036")
+    assert with_uncertainty(12345.678, 1234.0) == ("12\u202f300", "1\u202f200")
+    assert with_uncertainty(1.0, 0.0) == ("1.000", "")
+
+
+@given(st.floats(min_value=1e-6, max_value=1e9))
+def test_rounded_numbers_stay_close(value: float) -> None:
+    shown = float(significant(value).replace("\u202f", "").replace("−", "-"))
+    assert abs(shown - value) <= 0.0051 * value
+
+
+def test_k_is_printed_as_it_is(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    about = {**run.about, "limits": {**run.about["limits"], "coverage_factor": 2.5}}
+    monkeypatch.setattr(type(run), "about", property(lambda _: about))
+    page = render(run)
+    assert "k = 2.5" in page
+    assert "k = 2)" not in page
+
+
+def test_the_bias_has_an_uncertainty_for_each_of_its_measurands(page: str) -> None:
+    for words in ("mean of the record", "mean of the day after the record", "mean of a day after the next switch-on"):
+        assert page.count(words) >= 3
+    assert "not stated" in page
+
+
+DATA = re.compile(r'<script type="application/json">(.*?)</script>', re.DOTALL)
+PAGE = '<html><head>\n<meta charset="utf-8">\n</head><body>{}\n</body></html>'
+
+
+def chart(name: str = "measured", count: int = 3) -> Chart:
+    x = np.arange(count, dtype=float)
+    points = Trace(name, x, 2.0 * x, texts=tuple(name for _ in x))
+    return Chart(name, (Plot(name, PlotAxis("time / s"), PlotAxis("residual / µg"), (points,)),))
+
+
+def test_the_bundle_is_the_one_of_its_makers() -> None:
+    folder = files("pipelines.drawing") / "vendor"
+    text = gzip.decompress((folder / f"{BUNDLE}.gz").read_bytes())
+    assert b"plotly.js (cartesian - minified) v4.1.1" in text[:200]
+    assert hashlib.sha256(text).hexdigest() == BUNDLE_SHA256
+    assert "Permission is hereby granted" in (folder / "plotly-LICENSE.txt").read_text()
+
+
+def test_the_policy_of_a_report_admits_its_two_scripts_and_no_other(page: str) -> None:
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
+    assert policy is not None
+    assert page.index("Content-Security-Policy") < page.index("<style>")
+    (own,) = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
+    (packed,) = re.findall(r'<script type="text/plain" id="plotly">(.*?)</script>', page, flags=re.DOTALL)
+    known = [own.encode(), gzip.decompress(base64.b64decode(packed))]
+    hashes = [f"'sha256-{base64.b64encode(hashlib.sha256(one).digest()).decode()}'" for one in known]
+    assert f"default-src 'none'; script-src {' '.join(hashes)};" in policy[1]
+    assert "unsafe-eval" not in policy[1]
+    assert "http" not in policy[1]
+
+
+def test_every_figure_has_its_picture_and_the_same_numbers_for_the_script(page: str, run: Run) -> None:
+    figures = re.findall(r'<div class="figure">(<svg.*?</svg>).*?</script></div>', page, flags=re.DOTALL)
+    data = [json.loads(text) for text in DATA.findall(page)]
+    assert len(figures) == len(data) == 1 + 2 * 3
+    residuals = run.table("residuals")
+    wanted = residuals[(residuals["unit"] == "A1") & (residuals["axis"] == "x")]["residual_ug"].to_numpy()
+    model = next(one for one in data if one["layout"]["meta"]["title"] == "Model and measurement")
+    drawn = [
+        np.frombuffer(base64.b64decode(trace["y"]["bdata"]), "<f4")
+        for trace in model["data"]
+        if trace["name"] == "residual"
+    ]
+    assert any(one.size == wanted.size and np.allclose(np.sort(one), np.sort(wanted), rtol=1e-5) for one in drawn)
+    labels = {
+        axis["title"]["text"]
+        for name, axis in model["layout"].items()
+        if "axis" in name and axis.get("title", {}).get("text")
+    }
+    picture = next(one for one in figures if 'aria-label="Model and measurement"' in one)
+    assert labels
+    assert all(label in picture for label in labels - {"temperature of the soak / °C"})
+
+
+def test_a_report_is_the_same_every_time(page: str, run: Run) -> None:
+    assert render(run) == page
+    assert len(page.encode()) < module.MOST_BYTES
+
+
+def test_figures_that_would_make_it_too_large_stay_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    small, large = figure_of(chart("small")), figure_of(chart("large", 20_000))
+    content = PAGE.format(small + large)
+    bundle = len(interactive(content).encode()) - len(content.encode())
+    monkeypatch.setattr(module, "MOST_BYTES", bundle + len(content.encode()) - 1)
+    partly = interactive(content)
+    assert len(partly.encode()) <= module.MOST_BYTES
+    assert len(DATA.findall(partly)) == 1
+    assert partly.count("<svg") == 2
+    monkeypatch.setattr(module, "MOST_BYTES", bundle)
+    never = interactive(content)
+    assert "<script" not in never
+    assert never.count("<svg") == 2
+
+
+def test_a_page_without_figures_has_no_script() -> None:
+    assert interactive(PAGE.format("<p>none</p>")) == PAGE.format("<p>none</p>")
+
+
+def test_a_name_becomes_no_markup() -> None:
+    text = figure_of(chart("</script><script>alert(1)</script><img src=x onerror=alert(2)>"))
+    assert "<img" not in text
+    assert text.count("<script") == 1
+    assert text.count("</script") == 1
+
+
+def test_points_lie_at_their_places_in_the_picture() -> None:
+    axis = PlotAxis("x", low=0.0, high=10.0)
+    points = Trace("p", np.array([0.0, 5.0, 10.0, 11.0]), np.array([0.0, 5.0, 10.0, 5.0]))
+    text = svg_text(Chart("c", (Plot("", axis, PlotAxis("y", low=0.0, high=10.0), (points,)),), height=300))
+    (path,) = re.findall(r'<path d="([^"]*)" stroke="#0072b2" stroke-width="6"', text)[-1:]
+    places = [tuple(map(float, one)) for one in re.findall(r"M([\d.]+) ([\d.]+)h", path)]
+    assert len(places) == 3  # what lies outside of the axes is not drawn
+    (left, low), (middle, half), (right, high) = places
+    assert middle == pytest.approx(0.5 * (left + right), abs=0.1)
+    assert half == pytest.approx(0.5 * (low + high), abs=0.1)
+    assert low > high
+    (frame,) = re.findall(r'<path d="M([\d.]+) ([\d.]+)v([\d.]+)h([\d.]+)" stroke="#8a8f98"', text)
+    assert (left, low) == pytest.approx((float(frame[0]), float(frame[1]) + float(frame[2])), abs=0.1)
+
+
+def test_all_marks_are_drawn_and_missing_values_are_left_out() -> None:
+    x, bad = np.arange(4.0), np.array([1.0, np.nan, 3.0, 2.0])
+    traces = (
+        *(
+            Trace(s, x, bad, symbol=s, error=0.1 + x)
+            for s in ("circle", "triangle-up", "triangle-down", "square", "diamond")
+        ),
+        Trace("line", x, bad, "line", dashed=True),
+        Trace("band", x, bad - 1.0, "band", high=bad + 1.0),
+        Trace("bars", x, bad * 0.0 + 1.0, "bars"),
+        Trace("cells", x, x[:2], "density", counts=np.arange(8.0).reshape(2, 4)),
+        Trace("names", x[:1], x[:1], "labels", texts=("<+x>",)),
+    )
+    colours = Trace("coloured", 0.2 * x, 0.2 * x, colour=bad)
+    scale = ColourScale("mean / µg", 1.0, 3.0)
+    text = svg_text(Chart("c", (Plot("a", PlotAxis("x"), PlotAxis("y"), traces), sphere("b", (colours,))), 2, scale))
+    assert "nan" not in text
+    assert "&lt;+x&gt;" in text
+    for colour in ("#2166ac", "#b2182b", "#999999"):  # both ends, and a missing value
+        assert f'stroke="{colour}"' in text
+    assert "mean / µg" in text
+
+
+@each([(-12.3, 41.0), (0.0, 1.0), (249_000.0, 251_000.0), (-3e-7, 2e-7), (5.0, 5.5)])
+def test_ticks_are_round_and_inside(ends: tuple[float, float]) -> None:
+    low, high = ends
+    ticks = linear_ticks(low, high, 6)
+    values = np.array([value for value, _ in ticks])
+    assert 2 <= values.size <= 8
+    assert values.min() >= low - 1e-9 * (high - low)
+    assert values.max() <= high + 1e-9 * (high - low)
+    assert len({label for _, label in ticks}) == values.size  # no two ticks look the same
+    assert np.allclose(np.diff(values), values[1] - values[0])
+
+
+def test_ticks_of_decades_and_dates() -> None:
+    assert [label for _, label in log_ticks(0.02, 15.0)] == ["0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10"]
+    assert [label for _, label in log_ticks(1e-6, 1e6)][:2] == ["10⁻⁶", "10⁻⁵"]
+    assert {label[:4] for _, label in date_ticks(20_000.0, 20_400.0, 8)} <= {"2024", "2025"}

@@ -1,0 +1,312 @@
+"""Runs of the archive again: only what changed, into a new run, the same bytes from the same code."""
+
+import json
+import shutil
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from capture_double import CaptureDouble, small_job, small_run
+from each import each
+
+from pipelines.archive import Archive, Run, code_hash
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.integrity import verify
+from pipelines.jobs.model_change import ModelChange, change_from_options
+from pipelines.rerun import steps
+from pipelines.rerun.buffered_run import BufferedRun
+from pipelines.rerun.partition import Batch, run_again
+from pipelines.rerun.reproduce import LEFT_OUT, SAME, check
+from pipelines.rerun.rerun import RerunOutcome, again
+from pipelines.rerun.selection import selected
+from schemas.errors import DataRejected, WrongUse
+
+LARGER = "bias,scale,misalignment,bias_temperature,scale_temperature,third_order"
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return small_run(tmp_path_factory.mktemp("rerun"))
+
+
+@pytest.fixture
+def run(original: Run, tmp_path: Path) -> Run:
+    """A run of its own in an archive of its own."""
+    shutil.copytree(original.archive.root, tmp_path / "archive")
+    return Archive(tmp_path / "archive").run(original.id)
+
+
+def hashes(run: Run) -> dict[str, str]:
+    return {name: run.manifest(name)["sha256"] for name in run.tables()}
+
+
+def computed(outcome: RerunOutcome) -> list[str]:
+    return [name for name, how in outcome.stages.items() if how == "computed"]
+
+
+def other_code(monkeypatch: pytest.MonkeyPatch, *stages: str) -> None:
+    """As if the code of these stages had been changed."""
+    monkeypatch.setattr(steps, "code_hash", lambda m: "f" * 64 if m in stages else code_hash(m))
+
+
+def files_of(run: Run) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in run.path.iterdir() if path.suffix in {".parquet", ".json"}}
+
+
+def test_nothing_is_done_where_nothing_changed(run: Run) -> None:
+    before = files_of(run)
+    outcome = again(run.archive, run.id, ModelChange())
+    assert outcome.new == run.id
+    assert set(outcome.stages.values()) == {"there"}
+    assert files_of(run) == before
+
+
+def test_other_limits_only_grade_again(run: Run) -> None:
+    before = files_of(run)
+    outcome = again(run.archive, run.id, change_from_options(limits="industrial"))
+    new = run.archive.run(outcome.new)
+    assert outcome.new != run.id
+    assert computed(outcome) == ["grade"]
+    assert new.about["rerun_of"] == run.id
+    assert [(b["stage"], b["what"], b["to"]) for b in new.about["because"]] == [("grade", "limits", "industrial")]
+    assert new.about["limits"]["name"] == "industrial"
+    assert files_of(run) == before
+
+
+def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
+    outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
+    new = run.archive.run(outcome.new)
+    assert computed(outcome) == ["fit", "verify", "noise", "budget", "procedures", "grade"]
+    assert "third_order" in set(new.table("coefficients")["effect"])
+    assert new.manifest("dwells")["taken_from"] == run.id
+    assert outcome.because[0]["what"] == "model"
+
+
+def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    other_code(monkeypatch, "verify")
+    outcome = again(run.archive, run.id, ModelChange())
+    assert computed(outcome) == [
+        "verify"
+    ]  # its tables come out with the same bytes, so the key of the grade is the same
+    assert [b["what"] for b in outcome.because] == ["code"]
+    assert hashes(run.archive.run(outcome.new)) == hashes(run)
+
+
+def test_what_a_rerun_makes_of_tables_that_it_made_itself_has_the_same_bytes(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other_code(monkeypatch, "reduce", "fit", "verify", "noise", "grade")
+    outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
+    assert outcome.stages["reduce"] == "computed"
+    assert check(run.archive, outcome.new).same
+
+
+def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_path: Path) -> None:
+    effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]
+    listed = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
+    (tmp_path / "first").mkdir()
+    job = small_job(tmp_path / "first", (listed, f"effects = {json.dumps(effects)}"))
+    first = Runner(job, Archive(tmp_path / "first" / "archive"), measure=CaptureDouble())
+    for stage in ORDER[:-1]:
+        first.stage(stage)
+    outcome = again(run.archive, run.id, change_from_options(effects=",".join(effects)))
+    assert hashes(run.archive.run(outcome.new)) == hashes(first.run)
+    assert outcome.new == first.run.id
+
+
+@pytest.mark.parametrize("trouble", [KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect")])
+def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
+    run: Run, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
+) -> None:
+    change = change_from_options(effects=LARGER)
+    before = sorted(run.archive.root.rglob("*"))
+
+    def unplugged(*_args: object) -> None:
+        raise trouble
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pipelines.chain.chain.verify_tables", unplugged)
+        with pytest.raises(type(trouble)):
+            again(run.archive, run.id, change)
+    assert sorted(run.archive.root.rglob("*")) == before
+    assert run.archive.run("latest").id == run.id
+    outcome = again(run.archive, run.id, change)
+    assert outcome.stages["verify"] == "computed"
+    assert verify(run.archive, keys={}).checked.findings == []
+
+
+@pytest.mark.parametrize("change", [{"effects": LARGER}, {"limits": "industrial"}])
+def test_a_rerun_is_finished_in_the_list_and_for_verify(run: Run, change: dict[str, str]) -> None:
+    new = again(run.archive, run.id, change_from_options(**change)).new
+    assert {info.id: info.finished for info in run.archive.runs()}[new]
+    report = verify(run.archive, keys={})
+    assert report.checked.findings == []
+    assert [remark for remark in report.checked.remarks if new in remark] == []
+
+
+def test_a_rerun_that_only_takes_over_is_sealed_too(run: Run) -> None:
+    """Interrupted by an older version before it was sealed: all stages are there, the chain does not name it."""
+    change = change_from_options(effects=LARGER)
+    new = run.archive.run(again(run.archive, run.id, change).new)
+    (new.path / "sealed.json").unlink()
+    shutil.rmtree(run.archive.root / "chain")
+    assert set(again(run.archive, run.id, change).stages.values()) == {"there"}
+    assert (new.path / "sealed.json").is_file()
+
+
+def test_two_reruns_at_once_leave_one_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    change, real = change_from_options(effects=LARGER), BufferedRun.begin
+    others: list[str] = []
+
+    def meanwhile(self: BufferedRun, about: dict) -> None:
+        real(self, about)
+        if not others:
+            others.append("")
+            others[0] = again(run.archive, run.id, change).new
+
+    monkeypatch.setattr(BufferedRun, "begin", meanwhile)
+    assert again(run.archive, run.id, change).new == others[0]
+    assert verify(run.archive, keys={}).checked.findings == []
+
+
+def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipelines.jobs.job.ANALYSIS_KEYS", set())
+    outcome = again(run.archive, run.id, change_from_options(limits="industrial"))
+    assert run.archive.run(outcome.new).about["capture"] == run.about["capture"]
+
+
+def test_without_raw_samples_it_begins_at_the_dwells(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.rmtree(run.archive.root / "captures")
+    other_code(monkeypatch, "reduce", "grade")
+    outcome = again(run.archive, run.id, ModelChange())
+    assert outcome.stages["reduce"] == "kept"
+    assert [(b["stage"], b["what"]) for b in outcome.because] == [("grade", "code")]
+
+
+def test_refuses_another_model_where_the_static_record_is_gone(run: Run) -> None:
+    shutil.rmtree(run.archive.root / "captures")
+    with pytest.raises(DataRejected, match="static record is not in the archive"):
+        again(run.archive, run.id, change_from_options(effects=LARGER))
+
+
+def test_refuses_a_capture_that_is_not_finished(run: Run) -> None:
+    capture = run.archive.root / "captures" / run.about["capture"]
+    (capture / "complete.json").unlink()
+    with pytest.raises(DataRejected, match=r"its capture has \d+ records and is not finished"):
+        again(run.archive, run.id, ModelChange())
+
+
+def test_one_run_that_cannot_be_run_again_does_not_stop_the_others(run: Run) -> None:
+    broken = run.archive.root / "runs" / "broken"
+    broken.mkdir()
+    about = {**run.about, "recipe": {**run.about["recipe"], "dwell_s": -1.0}}
+    (broken / "run.json").write_text(json.dumps(about))
+    outcomes = run_again(Batch(run.archive.address, ("broken", run.id)))
+    assert "run broken: key 'dwell_s': found -1.0" in outcomes[0].error
+    assert not outcomes[1].error
+
+
+def test_the_same_code_gives_the_same_bytes_and_a_check_writes_nothing(original: Run) -> None:
+    before = sorted(str(path) for path in original.archive.root.rglob("*"))
+    comparison = check(original.archive, original.id)
+    assert comparison.same
+    assert set(comparison.tables.values()) == {SAME}
+    assert set(comparison.tables) == set(original.tables())
+    assert sorted(str(path) for path in original.archive.root.rglob("*")) == before
+
+
+def test_a_check_names_the_table_and_the_size_of_what_differs(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = steps.BY_NAME["verify"].call
+
+    def moved(job: object, own: Run) -> dict[str, pd.DataFrame]:
+        made = real(job, own)
+        made["verification"].loc[3, "error_ug"] += 0.5
+        return made
+
+    changed = [
+        stage if stage.name != "verify" else type(stage)(**{**vars(stage), "call": moved}) for stage in steps.STAGES
+    ]
+    monkeypatch.setattr(steps, "STAGES", tuple(changed))
+    comparison = check(run.archive, run.id)
+    assert not comparison.same
+    assert comparison.differences == [
+        d for d in comparison.differences if d.startswith("verification: error_ug in 1 of ")
+    ]
+    assert "by at most 0.5" in comparison.differences[0]
+
+
+def test_a_check_says_what_it_could_not_check(run: Run) -> None:
+    shutil.rmtree(run.archive.root / "captures")
+    comparison = check(run.archive, run.id)
+    assert comparison.tables["dwells"] == LEFT_OUT
+    assert comparison.tables["coefficients"] == SAME
+
+
+def test_chooses_runs_by_what_they_are(run: Run) -> None:
+    again(run.archive, run.id, change_from_options(limits="industrial"))
+    archive = run.archive
+    assert [e.id for e in selected(archive, ["all"])] == [run.id]
+    assert [e.id for e in selected(archive, ["device:ADXL355", "unit:A2"])] == [run.id]
+    assert [e.id for e in selected(archive, ["since:2020-01-01", "until:2999-12-31"])] == [run.id]
+    assert len(selected(archive, ["small"])) == 2
+
+
+@each([
+    (["colour:red"], "'colour:red' is not known"), (["device:"], "says nothing after the colon"),
+    (["since:yesterday"], "'yesterday' is no date"), (["station:elsewhere"], "station: simulated"),
+    (["smale"], "no run is called 'smale'; known: small-"),
+    (["until:1999-12-31"], "none of 1 runs is until:1999-12-31; measured"),
+])  # fmt: skip
+def test_says_why_a_selection_names_nothing(row: tuple[list[str], str], original: Run) -> None:
+    with pytest.raises(WrongUse, match=row[1]):
+        selected(original.archive, row[0])
+
+
+@pytest.fixture
+def imported(tmp_path: Path) -> Run:
+    """Six faces of one unit as another's recording, kept as an import."""
+    from pipelines.diagnosis.import_document import import_document
+
+    rng = np.random.default_rng(3)
+    faces = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
+    frames = [
+        pd.DataFrame(np.array(up) + 0.01 + rng.normal(0.0, 1e-3, (200, 3)), columns=["x", "y", "z"]).assign(face=face)
+        for face, up in faces.items()
+    ]
+    table = pd.concat(frames, ignore_index=True)
+    table.assign(t=0.01 * table.index).to_csv(tmp_path / "six.csv", index=False)
+    how: dict[str, object] = {
+        "columns": {"time": "t", "x": "x", "y": "y", "z": "z", "dwell": "face"},
+        "units": {"output": "g", "time": "s"},
+        "unit": "SN1",
+        "poses": {face: face for face in faces},
+        "local_gravity_m_s2": 9.80665,
+    }
+    archive = tmp_path / "imports"
+    return Archive(archive).run(
+        import_document([tmp_path / "six.csv"], how, "test", "", str(archive), None, nullcontext)["run"]
+    )
+
+
+def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:
+    outcome = again(imported.archive, imported.id, ModelChange())
+    new = imported.archive.run(outcome.new)
+    assert outcome.because[0]["what"] == "not fitted yet"
+    bias = new.table("coefficients").query("effect == 'bias'")
+    assert bias["value"].to_numpy() == pytest.approx(0.01, abs=5e-4)
+    assert check(new.archive, new.id).same
+    assert again(new.archive, new.id, ModelChange()).new == new.id
+
+
+def test_imported_dwells_are_graded_where_limits_are_named(imported: Run, tmp_path: Path) -> None:
+    limits = tmp_path / "limits.toml"
+    limits.write_text('name = "plain"\n[figures]\nzero_g_offset_mg = { max = 5.0, unit = "mg" }\n')
+    outcome = again(imported.archive, imported.id, change_from_options(limits=str(limits)))
+    grades = imported.archive.run(outcome.new).table("grades")
+    assert grades["outcome"].tolist() == ["fail"]
+    assert "zero_g_offset_mg fail" in grades["reasons"].iloc[0]

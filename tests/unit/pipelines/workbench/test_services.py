@@ -1,0 +1,303 @@
+"""Work of the workbench: jobs that end, are shared and are told of after a crash; lots whose questions are answered once."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from capture_double import recipe_file
+
+from pipelines.archive import Archive
+from pipelines.jobs.model_files import read_model
+from pipelines.workbench.services import jobs as job_table
+from pipelines.workbench.services import lots, models, sources, stations, uploads
+from pipelines.workbench.services.jobs import Jobs
+from pipelines.workbench.services.work import done_in_process
+from pipelines.workbench.settings import WorkbenchSettings
+from schemas.errors import TumblelineError, WrongUse
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> WorkbenchSettings:
+    return WorkbenchSettings(archive=str(tmp_path / "archive"), folder=tmp_path / "bench", token="t")
+
+
+def ended(table: Jobs, name: str) -> job_table.BackgroundJob:
+    end = time.monotonic() + 60.0
+    while (job := table.get(name)).state not in job_table.ENDED:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return job
+
+
+def test_two_that_want_the_same_share_a_job_and_a_failure_is_a_sentence(tmp_path: Path) -> None:
+    table = Jobs(tmp_path / "jobs.json", workers=1)
+    request = {"recipe": str(tmp_path / "none.toml"), "effects": [], "station": "", "archive": str(tmp_path)}
+    first, second = table.submit("plan", "a plan", request), table.submit("plan", "a plan", request)
+    assert first is second
+    job = ended(table, first.id)
+    assert job.state == "failed"
+    assert "none.toml" in job.problem
+    assert table.result("plan", request) is None
+    assert table.submit("plan", "a plan", request).id == first.id  # a failure can be tried again
+    table.close()
+
+
+def test_a_stopped_job_ends_its_process_and_the_next_one_runs(tmp_path: Path) -> None:
+    table = Jobs(tmp_path / "jobs.json", workers=1)
+    request = {"recipe": "production", "effects": [], "station": "", "archive": str(tmp_path)}
+    job = table.submit("plan", "a plan", request)
+    end = time.monotonic() + 60.0
+    while table.get(job.id).state == "waiting":
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert table.stop(job.id).state == "stopped"
+    other = table.submit("plan", "another", {**request, "recipe": str(tmp_path / "none.toml")})
+    assert ended(table, other.id).state == "failed"
+    assert table.get(job.id).state == "stopped"
+    assert table.result("plan", request) is None
+    table.close()
+
+
+def test_what_a_dead_server_was_at_is_interrupted_and_never_running(tmp_path: Path) -> None:
+    place = tmp_path / "jobs.json"
+    running = {"id": "a", "kind": "plan", "title": "t", "state": "running"}
+    place.write_text(json.dumps({"jobs": [running, {**running, "id": "b", "state": "done"}]}))
+    table = Jobs(place, workers=1)
+    assert table.get("a").state == "interrupted"
+    assert table.get("b") is None
+    place.write_text("no json")
+    assert Jobs(place, workers=1).all() == []
+
+
+def test_a_defect_in_work_is_said_and_does_not_end_the_process(capsys: pytest.CaptureFixture[str]) -> None:
+    state, text = done_in_process("diagnose", {}, lambda *_: None)
+    assert state == "failed"
+    assert "defect" in text
+    assert "Traceback" in capsys.readouterr().err
+
+
+def lot_of(settings: WorkbenchSettings, **state: object) -> str:
+    place = settings.folder / "lots" / "abc"
+    place.mkdir(parents=True)
+    (place / "request.json").write_text(
+        json.dumps({"recipe": "r", "seats": [[0, "A1"], [3, "A2"]], "units": ["A1", "A2"]})
+    )
+    (place / "state.json").write_text(
+        json.dumps({"phase": "asks", "number": 2, "since": time.time(), "pid": os.getpid(), **state})
+    )
+    return "abc"
+
+
+def test_a_question_is_answered_once_and_by_its_number(settings: WorkbenchSettings) -> None:
+    name = lot_of(settings)
+    with pytest.raises(lots.Stale):
+        lots.answer(settings, name, 1, "go")
+    lots.answer(settings, name, 2, "go")
+    with pytest.raises(lots.Stale, match="another page"):
+        lots.answer(settings, name, 2, "stop")
+    assert json.loads((settings.folder / "lots" / name / "answer-2.json").read_text()) == {"answer": "go"}
+    with pytest.raises(WrongUse):
+        lots.answer(settings, "../abc", 2, "go")
+
+
+def test_a_lot_whose_process_is_gone_is_interrupted(settings: WorkbenchSettings) -> None:
+    gone = os.fork()
+    if gone == 0:
+        os._exit(0)
+    os.waitpid(gone, 0)
+    name = lot_of(settings, pid=gone)
+    (lot,) = lots.lots(settings)
+    assert lot.id == name
+    assert lot.phase == "interrupted"
+    assert lot.ended
+    assert lot.slots == ((0, "A1", ""), (3, "A2", ""))
+
+
+@pytest.mark.parametrize("units", [["A1", "A1"], ["<script>"], ["A" * 65]])
+def test_a_lot_with_a_serial_that_cannot_be_moves_nothing(settings: WorkbenchSettings, units: list[str]) -> None:
+    with pytest.raises(TumblelineError):
+        lots.start(settings, "production", units, list(range(len(units))), [], 0)
+    assert not (settings.folder / "lots").exists()
+
+
+@pytest.fixture
+def two(settings: WorkbenchSettings, monkeypatch: pytest.MonkeyPatch) -> WorkbenchSettings:
+    """Two stations; the processes that would measure are not started."""
+    monkeypatch.setattr(lots.subprocess, "Popen", lambda *_, **__: None)
+    text = (files("stations") / "simulated.toml").read_text(encoding="utf-8")
+    settings.folder.mkdir(parents=True)
+    places = [settings.folder / f"{name}.station" for name in ("left", "right")]
+    for place in places:
+        place.write_text(text.replace('name = "simulated"', f'name = "{place.stem}"'))
+    return replace(settings, stations=tuple(places))
+
+
+def test_each_station_measures_one_lot_at_a_time(two: WorkbenchSettings) -> None:
+    left, right = stations.stations(two)
+    assert (left.name, right.name, left.simulated) == ("left", "right", True)
+    recipe = recipe_file(two.folder)
+    first = lots.start(two, recipe, ["A1"], [0], [], 0, left.file)
+    second = lots.start(two, recipe, ["B1"], [2], [], 0, right.file)
+    assert (first.station, second.station) == (left.address, right.address)
+    assert first.id != second.id
+    with pytest.raises(WrongUse, match=f"has lot {first.id}"):
+        lots.start(two, recipe, ["A2"], [0], [], 0, left.file)
+    assert lots.start(two, recipe, ["A1"], [0], [], 0, left.file).id == first.id  # the same lot, pressed twice
+    assert stations.named(stations.stations(two), "") == left
+    with pytest.raises(WrongUse, match="middle"):
+        stations.named(stations.stations(two), "middle")
+
+
+def test_a_paused_lot_keeps_its_station_and_a_stopped_one_makes_room(two: WorkbenchSettings) -> None:
+    left = stations.stations(two)[0]
+    recipe = recipe_file(two.folder)
+    lot = lots.start(two, recipe, ["A1"], [0], [], 0, left.file)
+    lots.pause(two, lot.id)
+    place = two.folder / "lots" / lot.id
+    lots.write_state(place, {"phase": "stopped", "since": time.time()})  # what its process writes after the safe state
+    paused = lots.state_of(place)
+    assert (paused.phase, paused.ended, paused.idle) == ("paused", False, True)
+    with pytest.raises(WrongUse, match="paused"):
+        lots.start(two, recipe, ["A2"], [0], [], 0, left.file)
+    assert lots.again(two, lot.id).phase == "starting"
+    lots.pause(two, lot.id)
+    lots.write_state(place, {"phase": "stopped", "since": time.time()})
+    assert lots.stop(two, lot.id).phase == "stopped"
+    assert lots.start(two, recipe, ["A2"], [0], [], 0, left.file).phase == "starting"
+    with pytest.raises(lots.Stale):
+        lots.pause(two, lot.id)
+
+
+def test_lots_are_paused_and_waited_for_when_the_service_ends(settings: WorkbenchSettings) -> None:
+    script = (
+        "import json, pathlib, signal, sys, time\n"
+        "place = pathlib.Path(sys.argv[1]) / 'state.json'\n"
+        "def safe(*_):\n"
+        "    place.write_text(json.dumps({**json.loads(place.read_text()), 'phase': 'stopped'}))\n"
+        "    sys.exit(0)\n"
+        "signal.signal(signal.SIGTERM, safe)\n"
+        "print('ready', flush=True)\n"
+        "time.sleep(60)\n"
+    )
+    place = settings.folder / "lots" / "abc"
+    with subprocess.Popen([sys.executable, "-c", script, str(place)], stdout=subprocess.PIPE) as process:
+        name = lot_of(settings, pid=process.pid, phase="measuring")
+        assert process.stdout.readline() == b"ready\n"
+        assert lots.pause_all(settings) == []
+        assert process.wait(10.0) == 0
+    assert lots.state_of(place).phase == "paused"
+    assert name == "abc"
+
+
+def test_a_model_is_saved_version_by_version_with_its_formulas(settings: WorkbenchSettings) -> None:
+    start, formulas = ["bias", "scale"], ["humid = humidity_pct - 45"]
+    place, version = models.save(settings, "line-1", start, ["third_order", "humid"], formulas, "seen twice", "run-7")
+    assert version == 3
+    model = read_model(place)
+    assert model.model.effects == ["bias", "scale", "third_order", "humid"]
+    assert [change.why for change in model.change][1:] == ["seen twice", "seen twice"]
+    assert (
+        models.save(settings, "line-1", start, ["third_order", "humid", "second_order"], formulas, "more", "run-8")[1]
+        == 4
+    )
+    with pytest.raises(WrongUse, match="already"):
+        models.save(settings, "line-1", start, ["third_order"], [], "again", "run-8")
+    for name, why in (("../x", "a reason"), ("ok", "  "), ("", "a reason")):
+        with pytest.raises(WrongUse):
+            models.save(settings, name, start, ["third_order"], [], why, "")
+
+
+def test_only_files_of_the_folder_are_sources(settings: WorkbenchSettings, tmp_path: Path) -> None:
+    settings.folder.mkdir()
+    frame = pd.DataFrame({"unit": ["U"], "dwell": [0]})
+    for name in ("dwells.csv", "fresh.csv", "dwells-history.csv"):
+        frame.to_csv(settings.folder / name)
+    frame.to_csv(tmp_path / "other.csv")
+    (settings.folder / "link.csv").symlink_to(tmp_path / "other.csv")
+    assert [one.label for one in sources.sources(settings)] == ["dwells.csv", "fresh.csv"]
+    assert sources.twin(settings, str(settings.folder / "dwells.csv")) == str(settings.folder / "fresh.csv")
+    for name in (str(tmp_path / "other.csv"), str(settings.folder / "link.csv"), f"{settings.folder}/../other.csv"):
+        with pytest.raises(WrongUse):
+            sources.resolve(settings, name, "source")
+
+
+def test_an_uploaded_file_stays_in_its_folder_whatever_it_is_called(settings: WorkbenchSettings) -> None:
+    def keep(name: str, content: bytes) -> str:
+        part = uploads.part_of(settings)
+        part.write_bytes(content)
+        return uploads.keep(settings, name, part)
+
+    first = keep("../../etc/a<b>.csv", b"1")
+    assert Path(first).parent == settings.folder / "uploads"
+    assert keep("../../etc/a<b>.csv", b"1") == first
+    assert keep("a<b>.csv", b"2") != first
+    for name in ("a.exe", "", ".."):
+        with pytest.raises(WrongUse):
+            keep(name, b"1")
+    with pytest.raises(WrongUse):
+        uploads.resolve(settings, "/etc/passwd")
+
+
+def test_a_run_that_was_added_is_in_the_next_answer_and_an_unchanged_archive_is_not_looked_at_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pipelines.workbench.services import index as shared
+
+    looked: list[int] = []
+    look = shared.up_to_date
+
+    def counted(archive: Archive) -> object:
+        looked.append(1)
+        return look(archive)
+
+    monkeypatch.setattr(shared, "up_to_date", counted)
+    archive = Archive(str(tmp_path / "archive"))
+    recent = shared.RecentIndex(str(tmp_path / "archive"))
+    question = "SELECT run FROM runs ORDER BY run"
+    assert recent.ask(question).rows == []
+    names = []
+    for number in range(3):
+        names.append(archive.open_run(f"lot{number}", {"recipe": {"name": "r"}, "lot": {"units": []}}, number).id)
+        assert [name for (name,) in recent.ask(question).rows] == names
+    before = len(looked)
+    for _ in range(5):
+        recent.ask(question)
+    assert len(looked) == before
+    monkeypatch.setattr(shared, "USABLE_S", 0.0)  # old
+    recent.ask(question)
+    assert len(looked) == before + 1
+
+
+def test_a_search_in_memory_gives_what_the_files_of_the_archive_give(tmp_path: Path) -> None:
+    from benchmarks.generated_archive import write_archive
+    from pipelines.audit.sql import ask
+    from pipelines.workbench.questions import history_question, newest_question, units_question, yield_question
+    from pipelines.workbench.services.index import RecentIndex
+    from pipelines.workbench.state import UnitsPage
+
+    archive = tmp_path / "archive"
+    write_archive(archive, 6, years=2.0, seed=3, workers=1)
+    recent = RecentIndex(str(archive))
+    pages = [
+        UnitsPage(), UnitsPage(search="3", order="unit"), UnitsPage(outcome="fail", order="station", page=2),
+        UnitsPage(station="line-1", since="2022-01-01", order="outcome"),
+        UnitsPage(search="no'such"), UnitsPage(search="RUN"), UnitsPage(search="100%_µ!"),
+    ]  # fmt: skip
+    questions = [question(page) for page in pages for question in (units_question, yield_question)]
+    unit = str(recent.ask(units_question(UnitsPage())).rows[0][0])
+    for question in (*questions, newest_question(12), history_question(unit)):
+        answer = recent.of_unit(unit, question) if "coefficients" in question else recent.ask(question)
+        wanted = ask(Archive(str(archive)), question)
+        assert answer.columns == wanted.columns
+        assert answer.rows == wanted.rows if "ORDER BY" in question else sorted(answer.rows) == sorted(wanted.rows)
+    with pytest.raises(WrongUse):
+        recent.ask("DELETE FROM units")
+    assert recent.ask("SELECT count(*) FROM units").rows[0][0] > 0
+    assert recent.of_unit(unit, history_question(unit)).rows
