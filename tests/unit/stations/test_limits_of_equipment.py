@@ -1,0 +1,169 @@
+"""Largest values of test equipment: a loose reference cable, motion beyond an exciter, absolute maxima of a station's file."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from small_station import lot_of
+
+from schemas.errors import OperatorNeeded, RecipeInvalid, StationRefused
+from schemas.fault import FaultOrder
+from schemas.motion import Motion
+from schemas.profile import Profile
+from schemas.safety import Suspenders
+from schemas.station import Soak, StationConfig, load_station, with_faults
+from schemas.station_devices import Device, Equipment
+from schemas.vibration_profile import load_vibration_profile
+from stations import open_station
+from stations.plant.families.scpi_generator import Generator
+from stations.profile_files import profile_of
+from stations.safety.suspenders import Watched
+
+
+def station_of(role: str, profile: str, faults: list[FaultOrder] | None = None, **maximum: float) -> StationConfig:
+    own = Equipment(**{role: Device(profile=profile, device_id=241, link="ascii", maximum=maximum)})
+    return with_faults(load_station().model_copy(update={"equipment": own}), faults or [])
+
+
+def drives(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The amplitudes in V of all bursts of the simulated generator."""
+    amplitudes: list[float] = []
+    begin = Generator._begin
+
+    def noted(self: Generator) -> None:
+        amplitudes.append(self._set["SOUR1:VOLT"])
+        begin(self)
+
+    monkeypatch.setattr(Generator, "_begin", noted)
+    return amplitudes
+
+
+def test_a_loose_reference_cable_does_not_raise_the_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    volts = drives(monkeypatch)
+    station = station_of("exciter", "scpi_exciter", [FaultOrder(kind="reference_cable_off")])
+    with open_station(station, lot_of(1), roles=["exciter"]) as opened:
+        exciter = opened.equipment["exciter"]
+        with pytest.raises(OperatorNeeded, match="check the cable of the reference sensor"):
+            exciter.sine(160.0, 30.0, 2, 0.1, [0])
+        assert exciter.values.text("output") == "0"
+    assert len(volts) == 2
+    assert max(volts) <= 10.0 * volts[0] * (1.0 + 1e-12)
+
+
+def test_a_cable_that_comes_loose_during_the_level_loop_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    volts = drives(monkeypatch)
+    station = station_of("exciter", "scpi_exciter", [FaultOrder(kind="reference_cable_off", at_s=2.0)])
+    with open_station(station, lot_of(1), roles=["exciter"]) as opened:
+        exciter = opened.equipment["exciter"]
+        exciter.sine(160.0, 2.0, 2, 0.1, [0])
+        opened.clock.sleep(max(0.0, 3.0 - opened.clock.now()))
+        before = len(volts)
+        with pytest.raises(OperatorNeeded, match="reference"):
+            exciter.sine(160.0, 30.0, 2, 0.1, [0])
+    assert max(volts[before:]) <= 0.2 * (1.0 + 1e-12)
+
+
+def test_the_drive_rises_tenfold_at_most_and_not_beyond_the_station_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    volts = drives(monkeypatch)
+    with open_station(station_of("exciter", "scpi_exciter"), lot_of(1), roles=["exciter"]) as opened:
+        opened.equipment["exciter"].sine(160.0, 30.0, 2, 0.1, [0])
+    rises = [b / a for a, b in pairwise(volts)]
+    assert max(rises) <= 10.0 * (1.0 + 1e-9)
+    volts.clear()
+    with (
+        open_station(station_of("exciter", "scpi_exciter", amplitude=0.5), lot_of(1), roles=["exciter"]) as opened,
+        pytest.raises(OperatorNeeded, match=r"at most 0\.5 V is allowed"),
+    ):
+        opened.equipment["exciter"].sine(160.0, 30.0, 2, 0.1, [0])
+    assert max(volts) <= 0.5
+
+
+@pytest.mark.parametrize("profile", ["vibration_controller", "scpi_exciter"])
+@pytest.mark.parametrize(
+    ("frequency", "level", "text"),
+    [(8.0, 5.0, "displacement"), (30.0, 31.0, "velocity"), (500.0, 51.0, "acceleration")],
+)
+def test_motion_beyond_the_exciter_is_refused_before_it_moves(profile, frequency, level, text):
+    with open_station(station_of("exciter", profile), lot_of(1), roles=["exciter"]) as opened:
+        exciter = opened.equipment["exciter"]
+        with pytest.raises(OperatorNeeded, match=rf"peak {text} .* at most .* is allowed"):
+            exciter.sine(frequency, level, 2, 0.1, [0])
+
+
+def test_the_station_file_narrows_the_motion_of_a_random_profile() -> None:
+    with (
+        open_station(
+            station_of("exciter", "vibration_controller", displacement_mm=0.1), lot_of(1), roles=["exciter"]
+        ) as opened,
+        pytest.raises(OperatorNeeded, match=r"peak displacement .* mm, at most 0\.1 mm"),
+    ):
+        opened.equipment["exciter"].random("mil_std_810_truck_vertical", 1.04, 2, 2.0, [0])
+
+
+def test_motion_of_a_flat_profile_agrees_with_its_closed_form() -> None:
+    points = load_vibration_profile("flat_20_2000").breakpoints
+    flat = [(f, 0.04) for f, _ in points]
+    g, w1, w2 = 9.80665, 2.0 * math.pi * flat[0][0], 2.0 * math.pi * flat[-1][0]
+    level = math.sqrt(0.04 * (flat[-1][0] - flat[0][0]))
+    rms_mm = 1e3 * g * math.sqrt(0.04 / (2.0 * math.pi) * (w1**-3 - w2**-3) / 3.0)
+    assert Motion(displacement_mm=3.0 * rms_mm * 1.01).beyond_random(flat, level) == ""
+    assert "displacement" in Motion(displacement_mm=3.0 * rms_mm * 0.99).beyond_random(flat, level)
+    assert Motion().beyond_sine(1.0, 50.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("role", "profile", "name", "value"),
+    [
+        ("shock_machine", "arm_release_shock", "peak", 100.0),
+        ("centrifuge", "acutrol_3000", "rate", 500.0),
+        ("step_generator", "scpi_step_generator", "amplitude", 1.0),
+    ],
+)
+def test_a_maximum_of_the_station_file_bounds_every_order(role: str, profile: str, name: str, value: float) -> None:
+    with open_station(station_of(role, profile, **{name: value}), lot_of(1), roles=[role]) as opened:
+        values = opened.equipment[role].values
+        values.write(name, value)
+        with pytest.raises(StationRefused, match="is allowed"):
+            values.write(name, 1.01 * value)
+
+
+def test_a_maximum_of_no_order_is_refused_with_what_looks_like_it() -> None:
+    device = Device(profile="arm_release_shock", device_id=9, link="ascii", maximum={"peek": 100.0})
+    with pytest.raises(RecipeInvalid, match="peak"):
+        profile_of(device)
+    own: Profile = profile_of(device.model_copy(update={"maximum": {"peak": 1e9}}))
+    assert own.command("peak").maximum == 50000.0  # the profile's own is smaller
+
+
+def test_a_supply_keeps_below_the_absolute_maximum_of_the_devices() -> None:
+    with open_station(load_station(), lot_of(1), roles=["power_supply"]) as opened:
+        with pytest.raises(StationRefused, match="states no absolute maximum"):
+            opened.equipment["power_supply"].set_voltage(4.5)  # less than half above 3.3 V, more than a fifth
+        opened.equipment["power_supply"].set_voltage(3.9)
+    with open_station(
+        station_of("power_supply", "scpi_supply", voltage=3.6), lot_of(1), roles=["power_supply"]
+    ) as opened:
+        with pytest.raises(StationRefused, match=r"at most 3\.6 V is allowed"):
+            opened.equipment["power_supply"].set_voltage(3.7)
+        opened.equipment["power_supply"].set_voltage(3.5)
+
+
+def test_the_monitor_holds_the_absolute_maximum_while_a_procedure_sets_the_supply() -> None:
+    watched = Watched(Suspenders(), Soak(), {0: 3.3}, supply_ratio=1.2, most_V=3.6)
+    assert "at most 3.6 V is allowed" in watched._supply(0, 3.96)
+    assert Watched(Suspenders(), Soak(), {0: 3.3}, supply_ratio=1.2)._supply(0, 3.96) == ""
+
+
+def test_a_station_of_hardware_states_the_absolute_maximum_of_its_supply() -> None:
+    content = load_station().model_dump()
+    content |= {"kind": "modbus", "simulation": None, "uncertainty": None}
+    for device in content["devices"].values():
+        device["host"] = "192.0.2.1"
+    supply = {"profile": "scpi_supply", "device_id": 9, "link": "ascii", "host": "192.0.2.1"}
+    with pytest.raises(ValueError, match=r"maximum\.voltage: missing"):
+        StationConfig.model_validate(content | {"equipment": {"power_supply": supply}})
+    StationConfig.model_validate(content | {"equipment": {"power_supply": supply | {"maximum": {"voltage": 3.6}}}})
+
+
+def test_a_device_without_maximum_is_written_as_before() -> None:
+    assert "maximum" not in Device(profile="scpi_supply", device_id=9).model_dump()
