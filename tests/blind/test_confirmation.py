@@ -1,11 +1,12 @@
 """What a fresh run and dwells left out confirm in worlds that nobody prepared, and that no fault of a run is confirmed."""
 
 import re
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
 import pytest
-from made_worlds import Noise, World, force_of, make
+from made_worlds import BASE, Noise, World, force_of, make
 from truth import Spec, make_run
 
 from pipelines.diagnosis.compare import compare
@@ -33,7 +34,6 @@ def test_a_parameter_has_one_value_and_an_interval_that_holds_it(effect: str, pa
         assert low < high
 
 
-BASE = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 SEED = 5_500_000
 
 
@@ -43,20 +43,25 @@ def progress(world: World, effect: str, seed: int, *, fresh: bool = True) -> dic
     return compare(made.dwells, [*BASE, effect], made.history, *again, before=BASE)["progress"]
 
 
-def test_a_cubic_is_confirmed_where_units_come_up_elsewhere():
-    evidence = progress(World(units=2, turn_on=300.0, hidden=(("third_order", 2.0),)), "third_order", SEED)
-    assert evidence["confirmed"] is True
-    assert evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
-    assert evidence["fall_ug"] > 3.0 * evidence["fall_u_ug"] > 0.0
-
-
-@pytest.mark.parametrize(("units", "seed"), [(1, 63_103), (1, 63_107), (8, 63_102)])
-def test_a_curve_over_temperature_is_confirmed_where_units_come_up_elsewhere(units, seed):
+CURVE = "bias_temperature_quadratic"
+CONFIRMED = [  # units, g by which they come up elsewhere, hidden effect, seed, whether by a fresh run
+    (2, 300.0, "third_order", SEED, True),
     # 300 µg more or less hide what the effect takes off the error of the fresh run, unless the run has a bias of its own
-    world = World(units=units, turn_on=300.0, hidden=(("bias_temperature_quadratic", 2.0),))
-    evidence = progress(world, "bias_temperature_quadratic", seed)
-    assert (evidence["confirmed"], evidence["rises"]) == (True, None)
-    assert evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
+    *((units, 300.0, CURVE, seed, True) for units, seed in ((1, 63_103), (1, 63_107), (8, 63_102))),
+    *(
+        (4, turn_on, effect, SEED + 5, True)
+        for effect, turn_on in (("cross_coupling", 300.0), ("second_order", 300.0), (CURVE, 0.0))
+    ),
+    *((4, 0.0, effect, SEED + 6, False) for effect in ("third_order", "cross_coupling")),
+]
+
+
+@pytest.mark.parametrize(("units", "turn_on", "effect", "seed", "fresh"), CONFIRMED)
+def test_effects_that_are_there_are_confirmed(units, turn_on, effect, seed, fresh):
+    evidence = progress(World(units=units, turn_on=turn_on, hidden=((effect, 2.0),)), effect, seed, fresh=fresh)
+    assert (evidence["confirmed"], evidence["reason"], evidence["rises"]) == (True, None, None)
+    assert effect == CURVE or evidence["fall_ug"] > 2.0 * evidence["fall_u_ug"] > 0.0
+    assert not fresh or evidence["part"] == pytest.approx(1.0, abs=4.0 * evidence["part_u"])
 
 
 @pytest.mark.parametrize("effect", ["bias_temperature_quadratic", "aging_log", "thermal_hysteresis", "step_change"])
@@ -64,22 +69,6 @@ def test_slow_effects_that_are_not_there_are_not_confirmed(effect):
     world = World(units=2, noise=Noise(walk=4.0))
     assert progress(world, effect, SEED)["confirmed"] is not True
     assert progress(world, effect, SEED, fresh=False)["confirmed"] is None
-
-
-@pytest.mark.parametrize(
-    ("effect", "turn_on"), [("cross_coupling", 300.0), ("second_order", 300.0), ("bias_temperature_quadratic", 0.0)]
-)
-def test_effects_that_are_there_are_confirmed_by_a_fresh_run(effect, turn_on):
-    evidence = progress(World(units=4, turn_on=turn_on, hidden=((effect, 2.0),)), effect, SEED + 5)
-    assert (evidence["confirmed"], evidence["reason"]) == (True, None)
-    assert evidence["fall_ug"] > 2.0 * evidence["fall_u_ug"] > 0.0
-
-
-@pytest.mark.parametrize("effect", ["third_order", "cross_coupling"])
-def test_dwells_left_out_of_a_run_without_faults_confirm_an_effect_that_stands_out_in_all_of_them(effect):
-    evidence = progress(World(units=4, hidden=((effect, 2.0),)), effect, SEED + 6, fresh=False)
-    assert (evidence["confirmed"], evidence["reason"]) == (True, None)
-    assert evidence["fall_ug"] > 2.0 * evidence["fall_u_ug"] > 0.0
 
 
 def slipped(dwells: pd.DataFrame) -> None:
@@ -114,6 +103,13 @@ def warming(dwells: pd.DataFrame) -> None:
         dwells[f"out_{name}"] *= 1.0 + size[place, k] * np.exp(-since / 2400.0)
 
 
+def spoilt(units: int, spoil: Callable[[pd.DataFrame], None], effect: str, *, fresh: bool) -> dict:
+    made = make(World(units=units), SEED + 7)
+    spoil(made.dwells)
+    again = (made.fresh, made.fresh_history) if fresh else (None, None)
+    return compare(made.dwells, [*BASE, effect], made.history, *again, before=BASE)["progress"]
+
+
 @pytest.mark.parametrize(
     ("units", "spoil", "effect", "reason"),
     [
@@ -126,10 +122,7 @@ def warming(dwells: pd.DataFrame) -> None:
     ],
 )
 def test_dwells_left_out_of_one_run_do_not_confirm_what_imitates_its_fault(units, spoil, effect, reason):
-    made = make(World(units=units), SEED + 7)
-    dwells = made.dwells.copy()
-    spoil(dwells)
-    evidence = compare(dwells, [*BASE, effect], made.history, before=BASE)["progress"]
+    evidence = spoilt(units, spoil, effect, fresh=False)
     assert evidence["log_density"] > 4.0  # it predicts what is left out
     assert evidence["confirmed"] is None
     assert re.search(reason, evidence["reason"]), evidence["reason"]
@@ -140,9 +133,4 @@ def test_dwells_left_out_of_one_run_do_not_confirm_what_imitates_its_fault(units
 
 
 def test_what_imitates_a_slip_is_not_confirmed_by_a_fresh_run():
-    made = make(World(units=1), SEED + 7)
-    dwells = made.dwells.copy()
-    slipped(dwells)
-    model = [*BASE, "cross_coupling"]
-    evidence = compare(dwells, model, made.history, made.fresh, made.fresh_history, before=BASE)["progress"]
-    assert evidence["confirmed"] is False
+    assert spoilt(1, slipped, "cross_coupling", fresh=True)["confirmed"] is False

@@ -2,7 +2,8 @@
 
 import pytest
 from truth import case
-from world_table import NOISES, OWN_NOISE, POSES, Blind, Case, Row, World, rows
+from world_row import Blind, Case, Row, World
+from world_table import NOISES, OWN_NOISE, POSES, rows
 
 from pipelines.diagnosis.diagnose import diagnose
 

@@ -8,24 +8,20 @@ def outcomes(name: str, *hits: bool) -> dict[tuple[str, ...], dict[str, bool]]:
     return {("worlds", "hidden", "w", str(k)): {name: hit} for k, hit in enumerate(hits)}
 
 
-def test_a_row_that_loses_more_cases_than_chance_would_is_worse() -> None:
-    table, worse = rows(outcomes("exact", *[False] * 12, True), outcomes("exact", *[True] * 13))
-    assert worse
-    assert (table[0]["verdict"], table[0]["better"], table[0]["worse"]) == ("WORSE", 0, 12)
-
-
-def test_a_mistake_that_became_rarer_is_better() -> None:
-    table, worse = rows(outcomes("physics named", *[False] * 12), outcomes("physics named", *[True] * 12))
-    assert not worse
-    assert (table[0]["verdict"], table[0]["better"]) == ("BETTER", 12)
+def test_a_row_is_worse_or_better_by_more_cases_than_chance_would_change() -> None:
+    for name, before, after, verdict in (
+        ("exact", [*[False] * 12, True], [True] * 13, ("WORSE", 0, 12)),
+        ("physics named", [False] * 12, [True] * 12, ("BETTER", 12, 0)),
+    ):
+        (row,), worse = rows(outcomes(name, *before), outcomes(name, *after))
+        assert worse == (verdict[0] == "WORSE")
+        assert (row["verdict"], row["better"], row["worse"]) == verdict
 
 
 def test_a_few_cases_that_changed_are_no_verdict_and_a_missing_one_is_not_compared() -> None:
-    other = outcomes("exact", True, True, True)
-    del other["worlds", "hidden", "w", "2"]
-    table, worse = rows(outcomes("exact", False, True, False), other)
+    ((row,), worse) = rows(outcomes("exact", False, True, False), outcomes("exact", True, True))
     assert not worse
-    assert (table[0]["verdict"], table[0]["n"], table[0]["other n"], table[0]["p"]) == ("", 3, 2, 1.0)
+    assert (row["verdict"], row["n"], row["other n"], row["p"]) == ("", 3, 2, 1.0)
 
 
 def test_a_wrong_effect_that_is_confirmed_counts_against() -> None:

@@ -45,15 +45,6 @@ def switched_off(state: State, off: float, count: int = 30) -> State:
     return extended(state, [first, *(SequenceStep(*(DOWN, UP)[k % 2], 25.0) for k in range(count - 1))])
 
 
-def test_a_device_that_was_off_for_long_is_cold_and_one_that_was_off_for_a_moment_is_not():
-    run = run_of()
-    for off, expected in ((1e6, 1.0), (1e-3, math.exp(-(900.0 + 40 * 20.0) / 500.0))):
-        state = switched_off(run, off)
-        cold = coldness(state, 500.0)
-        assert cold[0, :40] == pytest.approx(1.0)
-        assert cold[0, 40:] == pytest.approx(expected, abs=0.02)
-
-
 # how cold a device was when it was switched on again depends on all cycles before, in their order: no warm-up after a cycle
 @pytest.mark.parametrize(
     ("name", "powered", "off"),
@@ -95,13 +86,8 @@ def test_coldness_through_two_cycles_is_that_of_a_body_that_warms_and_cools():
 
 
 def test_warm_up_begins_again_and_ageing_goes_on():
-    run = run_of()
-    assert [begins_again(run, e) for e in ("warm_up", "aging_log", "aging_linear", "scale")] == [
-        True,
-        False,
-        False,
-        False,
-    ]
+    asked = ("warm_up", "aging_log", "aging_linear", "scale")
+    assert [begins_again(run_of(), name) for name in asked] == [True, False, False, False]
 
 
 def test_what_ageing_counts_from_is_asked_only_where_the_power_was_switched():
@@ -127,22 +113,19 @@ def test_steps_after_a_history_begin_when_it_ends_where_the_station_still_stands
     assert np.all(np.diff(between.history.time) > 0.0)
 
 
-def lot_with(state: State, bias: np.ndarray, rng: np.random.Generator) -> Lot:
-    """A lot of ideal devices but for a bias by dwell, with a microgram of noise."""
-    units, n = state.time.shape
-    output = state.force + bias[..., None] + 1e-6 * rng.standard_normal((units, n, 3))
-    return Lot(state, output, np.full((units, n, 3), 1e-6), np.broadcast_to(np.eye(3), (units, 3, 3)))
+def diagnosed(state: State, bias: np.ndarray, rng: np.random.Generator):
+    """The diagnosis of ideal devices but for a bias by dwell, with a microgram of noise."""
+    shape = (*state.time.shape, 3)
+    output = state.force + bias[..., None] + 1e-6 * rng.standard_normal(shape)
+    lot = Lot(state, output, np.full(shape, 1e-6), np.broadcast_to(np.eye(3), (shape[0], 3, 3)))
+    return diagnose(lot, ["bias", "scale", "misalignment"], np.random.default_rng(1))
 
 
 def test_a_jump_of_the_bias_at_a_power_on_is_nothing_that_is_missing(rng):
     state = switched_off(run_of(), 600.0)
     jumps = 200e-6 * rng.standard_normal((3, 1)) * (np.arange(state.time.shape[-1]) >= 40)
-    diagnosis = diagnose(lot_with(state, jumps, rng), ["bias", "scale", "misalignment"], np.random.default_rng(1))
-    assert diagnosis.adequate
     same = replace(state, power_off=None, memory={})
-    assert not diagnose(
-        lot_with(same, jumps, rng), ["bias", "scale", "misalignment"], np.random.default_rng(1)
-    ).adequate
+    assert [diagnosed(one, jumps, rng).adequate for one in (state, same)] == [True, False]
 
 
 @pytest.mark.parametrize("truth", ["warm_up", "aging_log"])
@@ -164,10 +147,7 @@ def test_what_happens_after_a_power_on_parts_warm_up_from_ageing(truth, rng):
         passed = (time - time[0, 0] + 300.0)[..., None]
         warming = 60e-6 * np.log(times[1] / times[0]) * np.sum(1.0 - np.exp(-passed / times), axis=-1)
     turn_on = 100e-6 * rng.standard_normal((3, 1)) * (np.arange(time.shape[-1]) >= 40)
-    diagnosis = diagnose(
-        lot_with(state, warming + turn_on, rng), ["bias", "scale", "misalignment"], np.random.default_rng(1)
-    )
-    assert [n.effects.ids for n in diagnosis.named] == [(truth,)]
+    assert [n.effects.ids for n in diagnosed(state, warming + turn_on, rng).named] == [(truth,)]
 
 
 def test_power_is_switched_only_where_the_station_can_and_the_devices_say_since_when_they_have_it():
@@ -193,18 +173,21 @@ def test_a_power_order_reaches_the_recipe_the_minutes_and_the_words(tmp_path):
     assert what(run_of(), told) == "Switching the units off for 10 min: warm_up restarts, aging_log continues"
 
 
-def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did(rng):
-    import pandas as pd
-
-    state = run_of(20, 2)
-    rows = pd.DataFrame(
+def dwells_of(state: State, noise: float, rng: np.random.Generator) -> pd.DataFrame:
+    units, n = state.time.shape
+    output = state.force + noise * rng.standard_normal(state.force.shape)
+    return pd.DataFrame(
         {
-            "unit": np.repeat(["A", "B"], 20), "dwell": np.tile(np.arange(20), 2), "time_s": state.time.ravel(),
-            "since_power_s": state.since_power.ravel(),
+            "unit": np.repeat(list("ABC")[:units], n), "dwell": np.tile(np.arange(n), units), "time_s": state.time.ravel(),
+            "since_power_s": state.since_power.ravel(), "n": 100, "kind": "dwell", "pose": "p", "out_unit": "g", "slot": 0,
             **{f"force_{a}": state.force[..., i].ravel() for i, a in enumerate("xyz")},
-            **{f"out_{a}": state.force[..., i].ravel() + 1e-5 * rng.standard_normal(40) for i, a in enumerate("xyz")},
+            **{f"out_{a}": output[..., i].ravel() for i, a in enumerate("xyz")}, **{f"sd_{a}": 1e-5 for a in "xyz"},
         }
     )  # fmt: skip
+
+
+def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did(rng):
+    rows = dwells_of(run_of(20, 2), 1e-5, rng)
     assert measured(rows).state.power_off is None
     rows["power_off_s"] = np.where(rows["dwell"] == 12, 300.0, np.where(rows["dwell"] < 12, np.nan, 0.0))
     measured_state = measured(rows).state
@@ -212,19 +195,12 @@ def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did
     assert not measured_state.covariates
 
 
-def test_warm_up_after_a_power_off_is_the_same_for_a_fit_as_for_a_diagnosis():
+def test_warm_up_after_a_power_off_is_the_same_for_a_fit_as_for_a_diagnosis(rng):
     """Off for 600 s: the columns of both, against a body that warms and cools step by step."""
     run, tau, off = switched_off(run_of(units=1), 600.0), 900.0, 600.0
-    n = run.time.shape[-1]
-    table = pd.DataFrame(
-        {"unit": "A", "dwell": range(n), "time_s": run.time[0], "since_power_s": run.since_power[0], "n": 100,
-         "power_off_s": run.power_off[0], "kind": "dwell", "pose": "p", "out_unit": "g", "slot": 0,
-         **{f"force_{a}": run.force[0, :, i] for i, a in enumerate("xyz")},
-         **{f"out_{a}": run.force[0, :, i] for i, a in enumerate("xyz")}, **{f"sd_{a}": 1e-5 for a in "xyz"}}
-    )  # fmt: skip
-    fitted, judged = lot_arrays(table).state, measured(table).state
+    table = dwells_of(run, 0.0, rng).assign(power_off_s=run.power_off[0])
     warm_up = catalogue.get("warm_up")
-    by_fit, other = (warm_up.columns(state, 0, tau=tau)[0, :, 0] for state in (fitted, judged))
+    by_fit, other = (warm_up.columns(one.state, 0, tau=tau)[0, :, 0] for one in (lot_arrays(table), measured(table)))
     np.testing.assert_array_equal(by_fit, other)
     # on since 1680 s when it goes off: e^(-1680/900) is lacking then, and all but the rest of its warmth is gone after 600 s
     on = float(run.time[0, 40] - run.since_power[0, 40] - off - (run.time[0, 0] - run.since_power[0, 0]))

@@ -16,15 +16,8 @@ def test_the_root_is_that_of_scipy(place: float, steep: float) -> None:
     assert root(rises, 1e-9, 1.0) == optimize.brentq(rises, 1e-9, 1.0)
 
 
-@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-1.0, 0.0)])
-def test_a_root_at_an_end_is_found(low: float, high: float) -> None:
-    assert root(lambda x: x, low, high) == 0.0
-
-
-def test_without_a_change_of_sign_there_is_no_root() -> None:
+def test_roots_at_ends_and_at_jumps_are_found_and_without_a_change_of_sign_there_is_none() -> None:
+    assert [root(lambda x: x, *ends) for ends in ((0.0, 1.0), (-1.0, 0.0))] == [0.0, 0.0]
+    assert root(lambda x: -1.0 if x < 0.3 else 1.0, 0.0, 1.0) == pytest.approx(0.3, abs=4e-12)
     with pytest.raises(ValueError, match="no change of sign"):
         root(lambda x: x + 2.0, 0.0, 1.0)
-
-
-def test_a_function_that_jumps_has_its_root_at_the_jump() -> None:
-    assert root(lambda x: -1.0 if x < 0.3 else 1.0, 0.0, 1.0) == pytest.approx(0.3, abs=4e-12)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from schemas.errors import RecipeInvalid
-from schemas.model import load_model
+from schemas.model import load_model, parse_model
 
 GOOD = """
 [model]
@@ -28,14 +28,8 @@ why = "residuals follow the force"
 """
 
 
-def write(folder: Path, text: str) -> Path:
-    path = folder / "model.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def test_reads_versions_and_who_changed_them(tmp_path: Path) -> None:
-    model = load_model(write(tmp_path, GOOD))
+def test_reads_versions_and_who_changed_them() -> None:
+    model = parse_model(GOOD, "model")
     assert model.model.effects == ["bias", "scale"]
     assert [change.by for change in model.change] == ["A. Tester", "A. Tester"]
 
@@ -49,9 +43,9 @@ def test_reads_versions_and_who_changed_them(tmp_path: Path) -> None:
         ("version = 1\n", "version = 2\n", "do not rise"),
     ],
 )
-def test_refuses_what_does_not_fit_together(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_refuses_what_does_not_fit_together(old: str, new: str, message: str) -> None:
     with pytest.raises(RecipeInvalid, match=message):
-        load_model(write(tmp_path, GOOD.replace(old, new)))
+        parse_model(GOOD.replace(old, new), "model")
 
 
 def test_names_a_file_that_is_not_there(tmp_path: Path) -> None:

@@ -50,13 +50,9 @@ def shock_of(hidden: str, size: float, rng: np.random.Generator, signs=(1.0, -1.
 
 
 HIDDEN = {
-    "filter_of_unit": 350.0,
-    "filter_of_reference": 350.0,
-    "ac_coupled_reference": 2.0,
-    "zero_shift": 0.05,
-    "third_order": 5e-6,
-    "mounting_resonance": 400.0,
-}
+    "filter_of_unit": 350.0, "filter_of_reference": 350.0, "ac_coupled_reference": 2.0, "zero_shift": 0.05,
+    "third_order": 5e-6, "mounting_resonance": 400.0,
+}  # fmt: skip
 
 
 SLOW = {"mounting_resonance": pytest.mark.slow}

@@ -50,12 +50,9 @@ def test_a_creep_is_what_a_strain_behind_the_force_misses(way: float) -> None:
     assert np.abs(columns - true).max() < 0.01 * np.abs(true).max()
 
 
-def test_coefficients_without_the_way_are_those_of_moves_that_take_no_time() -> None:
+def test_without_the_way_or_recorded_angles_a_move_takes_no_time() -> None:
     state = run_of(np.radians([0.0, 90.0, 180.0, 90.0]), np.radians([0.0, 90.0, 0.0, -90.0]))
-    assert np.array_equal(CREEP.columns(state, 1, tau=TAU), CREEP.columns(state, 1, tau=TAU, way=0.0))
-
-
-def test_where_the_angles_are_not_recorded_a_move_takes_no_time() -> None:
-    state = run_of(np.radians([0.0, 90.0, 180.0]), np.radians([0.0, 90.0, 0.0]))
+    still = CREEP.columns(state, 1, tau=TAU, way=0.0)
     bare = State(force=state.force, time=state.time, since_move=state.since_move)
-    assert np.array_equal(CREEP.columns(bare, 0, tau=TAU, way=1.0), CREEP.columns(bare, 0, tau=TAU, way=0.0))
+    assert np.array_equal(CREEP.columns(state, 1, tau=TAU), still)
+    assert np.array_equal(CREEP.columns(bare, 1, tau=TAU, way=1.0), CREEP.columns(bare, 1, tau=TAU, way=0.0))

@@ -1,8 +1,7 @@
 """A model with one more term is kept by the term's values: what is asked of it with an equal term is what was asked first."""
 
-import pandas as pd
 import pytest
-from made_worlds import Noise, World, make
+from made_worlds import BASE, Noise, World, make
 
 from inertial import effects as catalogue
 from inertial.criticism.examination import ExaminedRun
@@ -12,51 +11,30 @@ from inertial.estimation.noise_shares import Shares
 from inertial.estimation.term import Term
 from pipelines.tables.dwells import lot_of, measured
 
-MODEL = ("bias", "scale", "misalignment", "bias_temperature", "scale_temperature")
-PPM = 500.0
-FROM = 36
+TERM, EQUAL = (Term(GainStep(), (("unit", 1.0), ("dwell", 36.0))) for _ in range(2))
 
 
-def dwells_with_a_gain_step(units: int, seed: int) -> tuple[pd.DataFrame, pd.DataFrame, str]:
-    """A lot whose last unit reads by :data:`PPM` more from the dwell half-way on; its temperatures; the unit."""
-    made = make(World(units=units, noise=Noise(white=25.0, flicker=30.0)), 5_700_000 + seed)
-    dwells = made.dwells.copy()
-    unit = max(dwells["unit"].unique())
-    later = (dwells["unit"] == unit) & (dwells["dwell"] >= FROM)
-    assert 0.3 < later.sum() / (dwells["unit"] == unit).sum() < 0.7
-    dwells.loc[later, ["out_x", "out_y", "out_z"]] *= 1.0 + 1e-6 * PPM
-    return dwells, made.history, unit
+def base_model() -> Model:
+    """Of a lot whose last unit reads 500 ppm more from the dwell half-way on."""
+    made = make(World(units=2, noise=Noise(white=25.0, flicker=30.0)), 5_700_023)
+    later = (made.dwells["unit"] == made.dwells["unit"].max()) & (made.dwells["dwell"] >= 36)
+    made.dwells.loc[later, ["out_x", "out_y", "out_z"]] *= 1.0 + 500e-6
+    return ExaminedRun(lot_of(measured(made.dwells, made.history), square=False), BASE).model()
 
 
-def model_and_term() -> tuple[Model, Term]:
-    dwells, history, _ = dwells_with_a_gain_step(2, 23)
-    base = ExaminedRun(lot_of(measured(dwells, history), square=False), MODEL).model()
-    return base, Term(GainStep(), (("unit", 1.0), ("dwell", float(FROM))))
-
-
-def equal(term: Term) -> Term:
-    return Term(GainStep(), tuple(dict(term.values).items()))
-
-
-def test_the_size_of_an_equal_term_is_its_size() -> None:
-    base, term = model_and_term()
-    first = base.with_term(term)
-    again = base.with_term(equal(term))
-    assert again is first
-    assert 1e6 * again.shared_sizes(equal(term)) == pytest.approx([PPM], rel=0.2)
+def test_a_model_with_an_equal_term_is_the_same_and_less_it_does_not_hold_it() -> None:
+    base = base_model()
+    richer = base.with_term(TERM)
+    assert base.with_term(EQUAL) is richer
+    assert 1e6 * richer.shared_sizes(EQUAL) == pytest.approx([500.0], rel=0.2)
+    assert [t.effect.id for t in richer.without_term(EQUAL).terms] == [t.effect.id for t in base.terms]
     with pytest.raises(KeyError, match="gain_step: not a term of the model"):
-        base.shared_sizes(term)
-
-
-def test_a_model_less_an_equal_term_does_not_hold_it() -> None:
-    base, term = model_and_term()
-    richer = base.with_term(term)
-    assert [t.effect.id for t in richer.without_term(equal(term)).terms] == [t.effect.id for t in base.terms]
+        base.shared_sizes(TERM)
 
 
 @pytest.mark.parametrize("shares", [Shares(1.0, 0.0), Shares(3.0, 10.0), Shares(0.1, 100.0)])
 def test_terms_that_are_added_in_turn_leave_what_they_leave_together(shares: Shares) -> None:
-    base, _ = model_and_term()
+    base = base_model()
     terms = [Term(catalogue.get(name)) for name in ("third_order", "aging_linear", "second_order")]
     in_turn = base
     for place, term in enumerate(terms):

@@ -11,34 +11,10 @@ from stations.plant.preset import load_preset
 SERIES = 250
 
 
-def drawn_means(preset, starts, duration, rate=10.0):
-    """Means (dwells, series) of the plant's noise in µg, which knows nothing of the covariance under test."""
-    noise = UnitNoise(preset, [np.random.default_rng([7, k]) for k in range(SERIES)])
-    before, means = 0.0, []
-    for start in starts:
-        noise.jump(start - before)
-        means.append(noise.sample(round(duration * rate), rate).mean(axis=0))
-        before = start + duration
-    return 1e6 * np.stack(means).reshape(len(starts), -1)
-
-
 def noise_of(preset, rate=10.0):
     return DwellNoise(
         1e-6 * preset.sampled_density_ug(rate), 1e-6 * preset.bias_instability_ug, 1e-6 * preset.rate_random_walk_ug
     )
-
-
-@pytest.mark.parametrize("name", ["SF1500", "ADXL355", "analogue"])
-def test_differences_of_dwells_scatter_as_the_covariance_says(name):
-    preset = load_preset(name)
-    starts = np.cumsum([900.0, 20.0, 20.0, 20.0, 1500.0, 20.0, 20.0])
-    means = drawn_means(preset, starts, 10.0)
-    covariance = 1e12 * dwell_covariance(starts + 5.0, 10.0, noise_of(preset))
-    pairs = [(i, j) for i in range(7) for j in range(i)]
-    said = np.sqrt([covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j] for i, j in pairs])
-    scatter = np.array([np.std(means[i] - means[j]) for i, j in pairs])
-    assert scatter == pytest.approx(said, rel=0.12)
-    assert np.mean(scatter / said) == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_error_of_a_dwell_is_the_allan_deviation_at_its_length():

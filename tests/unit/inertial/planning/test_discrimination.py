@@ -46,16 +46,6 @@ def test_separations_are_what_a_fit_of_the_wrong_rival_leaves():
     assert lot == pytest.approx(8.0 * separations)
 
 
-def test_six_faces_do_not_part_a_cubic_from_an_odd_quadratic():
-    assert np.all(discrimination().ratio_to_required(normal(columns(poses.plan("eighteen")))) > 1.0)
-    assert discrimination().separations(normal(columns(poses.plan("six")))).max() < 1e-6
-
-
-def test_a_plan_that_does_not_determine_the_model_parts_nothing():
-    rows = columns(np.repeat(poses.plan("six")[:2], 6, axis=0))
-    assert np.all(np.isinf(discrimination().ratio_to_required(normal(rows))))
-
-
 def test_exchanges_part_rivals_half_as_far_again_as_spread_directions():
     angles = poses.fibonacci(60)
     rows, n = columns(angles), 24
@@ -73,3 +63,10 @@ def test_exchanges_part_rivals_half_as_far_again_as_spread_directions():
         for plan in (start, exchanged(slots, start, discrimination().objective))
     )
     assert after > 1.5 * before
+
+
+def test_plans_that_do_not_part_the_rivals_or_determine_the_model_say_so():
+    assert np.all(discrimination().ratio_to_required(normal(columns(poses.plan("eighteen")))) > 1.0)
+    assert discrimination().separations(normal(columns(poses.plan("six")))).max() < 1e-6
+    two = columns(np.repeat(poses.plan("six")[:2], 6, axis=0))
+    assert np.all(np.isinf(discrimination().ratio_to_required(normal(two))))

@@ -38,8 +38,7 @@ def test_the_next_version_keeps_comments_and_says_who_when_and_why():
     text, model = extended(COMMENTED, step("third_order", run="run-7"), "model line.toml")
     assert "# Of line 3." in text
     assert "# to begin with" in text
-    assert model.model.version == 2
-    assert model.model.effects == ["bias", "scale", "third_order"]
+    assert (model.model.version, model.model.effects) == (2, ["bias", "scale", "third_order"])
     last = model.change[-1]
     assert (last.version, last.effect, last.by, last.at, last.why, last.run) == (
         2, "third_order", "A. Tester", NOW, "the residuals say so", "run-7",
