@@ -39,19 +39,9 @@ def test_means_what_it_says(text, means, state):
 
 
 NOT_ALLOWED = [
-    "__import__('os').system('true')",
-    "f.__class__",
-    "(lambda: f)()",
-    "[f for f in f]",
-    "f if f else f",
-    "f and fj",
-    "'f'",
-    "f @ fj",
-    "True * f",
-    "f * 1e999",
-    "f[0]",
-    "exp(f, x=2)",
-]
+    "__import__('os').system('true')", "f.__class__", "(lambda: f)()", "[f for f in f]", "f if f else f", "f and fj",
+    "'f'", "f @ fj", "True * f", "f * 1e999", "f[0]", "exp(f, x=2)",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(

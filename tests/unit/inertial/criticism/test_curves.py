@@ -53,7 +53,7 @@ def test_columns_across_the_axes_are_products_of_forces() -> None:
     assert not np.any(own.reshape(2, 3, problem.n, -1)[np.repeat(before[:, None], 3, axis=1)])
 
 
-@each([1500.0, 1800.0, 1860.0])
+@each([1500.0, 1780.0, 1800.0, 1830.0, 1860.0, 3000.0])
 def test_an_effect_that_died_away_long_ago_leaves_the_range_of_numbers_quietly(shift: float) -> None:
     made = make(World(units=4), SEED + 80)
     dwells = made.dwells.assign(since_power_s=made.dwells["since_power_s"] + shift)

@@ -55,10 +55,7 @@ HIDDEN = {
 }  # fmt: skip
 
 
-SLOW = {"mounting_resonance": pytest.mark.slow}
-
-
-@pytest.mark.parametrize("hidden", [pytest.param(name, marks=SLOW.get(name, ())) for name in HIDDEN])
+@pytest.mark.parametrize("hidden", HIDDEN)
 def test_a_hidden_effect_of_a_shock_is_named_and_a_fresh_shock_is_predicted_better(hidden: str, rng) -> None:
     diagnosis = diagnose_shock(shock_of(hidden, HIDDEN[hidden], rng))
     assert diagnosis.adequate is False

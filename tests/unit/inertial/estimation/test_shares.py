@@ -36,8 +36,8 @@ def test_an_axis_that_wanders_by_itself_has_shares_of_its_own(seed: int) -> None
 
 
 def test_equal_axes_have_the_shares_of_their_lot() -> None:
-    runs = [run_of(NULLS[name], SEED + seed) for name in ("B30", "K4", "white") for seed in range(2)]
-    assert [run.model().noise.shares.own for run in runs] == [()] * 6
+    runs = [run_of(NULLS[name], SEED + seed) for name in ("B30", "K4", "white") for seed in range(3)]
+    assert [run.model().noise.shares.own for run in runs] == [()] * 9
 
 
 def test_plausible_shares_are_those_that_the_likelihood_leaves_with_weights_that_add_up() -> None:

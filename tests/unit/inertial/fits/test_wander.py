@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from posed import posed
 
 from inertial import poses
 from inertial.errors import NotIdentified
@@ -49,9 +50,7 @@ ERROR = np.full((UNITS, DWELLS, 3), WHITE)
 
 @pytest.fixture
 def plan() -> State:
-    angles = np.radians(poses.plan("fibonacci24"))
-    force = np.tile(force_from_angles(angles[:, 0], angles[:, 1]), (2, 1))
-    return State(force=force, time=np.arange(float(DWELLS)) * 30.0)
+    return posed(np.tile(poses.plan("fibonacci24"), (2, 1)), 30.0)
 
 
 def outputs(rng: np.random.Generator, plan: State, flicker: float, walk: float) -> np.ndarray:
@@ -85,13 +84,8 @@ def test_refuses_a_reading_without_error(plan: State, rng: np.random.Generator) 
         fit_lot_with_wander(EFFECTS, plan, outputs(rng, plan, 0.0, 0.0), error)
 
 
-def turned(plan: State) -> State:
-    angles = np.radians(np.tile(poses.plan("fibonacci24"), (2, 1)))
-    return State(force=plan.force, time=plan.time, outer=angles[:, 0], inner=angles[:, 1])
-
-
 def test_parameters_of_the_station_are_found_within_their_errors(plan: State, rng: np.random.Generator) -> None:
-    state, tilt = turned(plan), 1e-3
+    state, tilt = plan, 1e-3
     lean = force_from_angles(state.outer, state.inner, up=(tilt, 0.0, np.sqrt(1.0 - tilt**2)))
     out = outputs(rng, plan, 1e-4, 0.0) + (lean - plan.force)
     fit = fit_lot_with_wander((*EFFECTS, "level_error"), state, out, ERROR).fit

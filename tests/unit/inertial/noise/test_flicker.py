@@ -9,7 +9,6 @@ from inertial import poses
 from inertial.frames import force_from_angles
 from inertial.noise import generate
 from inertial.noise.flicker import constants_of_means, flicker_kernel, flicker_of_means, summed, time_constants
-from inertial.noise.measurands import between_means
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.stages.fit import fit
 
@@ -86,16 +85,6 @@ def test_flicker_of_means_is_the_sum_of_its_processes_whatever_their_ratio(halve
     near = (gap > 0.0) & (gap <= 0.5 * duration)  # dwells that would overlap are one
     made = summed(gap, constants, duration)
     np.testing.assert_allclose(made[~near], expected[~near], rtol=1e-11)
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "gap", "u"),
-    [(10.0, 10.0, 0.0, 0.939437), (9000.0, 10.0, 0.0, 1.576869), (9000.0, 10.0, 86400.0, 2.142937),
-     (18000.0, 3600.0, 31557600.0, 2.494491)],
-)  # fmt: skip
-def test_flicker_between_two_means_agrees_with_sums_of_processes(first, second, gap, u):
-    # found by sums of Ornstein-Uhlenbeck processes to 1e-4, in a computation of its own
-    assert np.sqrt(between_means(first, second, gap)) == pytest.approx(u, abs=2e-5)
 
 
 def test_processes_by_squares_are_those_by_exponentials() -> None:

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from posed import posed
 
-from inertial import design, frames, poses
+from inertial import design, poses
 from inertial.planning.discrimination import Discrimination
 from inertial.planning.pose_exchange import PlanSlots, exchanged
-from inertial.state import State
 
 MODEL = ("bias", "scale", "misalignment", "third_order", "odd_quadratic")
 BASE, CUBIC, ODD = (0, 1, 2, 3), (4,), (5,)
@@ -16,9 +16,7 @@ ERROR = 1e-5
 
 
 def columns(angles):
-    outer, inner = np.radians(angles).T
-    state = State(force=frames.force_from_angles(outer, inner), time=20.0 * np.arange(len(angles)))
-    return design.local_columns(design.split(MODEL)[0], state, {})
+    return design.local_columns(design.split(MODEL)[0], posed(angles), {})
 
 
 def discrimination(size=3e-5, wanted=50.0):

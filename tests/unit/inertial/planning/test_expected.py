@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from posed import posed
 
-from inertial import frames, poses
+from inertial import poses
 from inertial.errors import NotIdentified
 from inertial.fits.linear import fit_lot
 from inertial.fits.wander import fit_lot_with_wander
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.planning.expected import expected_errors
-from inertial.state import State
 from stations.plant.noise import UnitNoise
 from stations.plant.preset import load_preset
 
@@ -18,11 +18,9 @@ UNITS, DWELL_S, RATE = 100, 5.0, 10.0
 
 
 def course(soaks=(25.0, 60.0, -10.0, 25.0), per_soak=18):
-    angles = np.radians(np.tile(poses.plan("fibonacci24")[:per_soak], (len(soaks), 1)))
+    angles = np.tile(poses.plan("fibonacci24")[:per_soak], (len(soaks), 1))
     time = np.arange(len(angles)) * 14.0 + 1500.0 * (1 + np.arange(len(angles)) // per_soak)
-    return State(
-        force=frames.force_from_angles(angles[:, 0], angles[:, 1]), time=time, temperature=np.repeat(soaks, per_soak)
-    )
+    return posed(angles, time=time, temperature=np.repeat(soaks, per_soak))
 
 
 def drawn(preset, state):
@@ -63,13 +61,7 @@ def test_white_noise_alone_gives_the_errors_of_the_weighted_fit():
 
 
 def test_parameters_of_the_station_gain_with_every_unit():
-    angles = np.radians(poses.plan("twenty_six"))
-    state = State(
-        force=frames.force_from_angles(angles[:, 0], angles[:, 1]),
-        time=20.0 * np.arange(26),
-        outer=angles[:, 0],
-        inner=angles[:, 1],
-    )
+    state = posed(poses.plan("twenty_six"))
     model = ("bias", "scale", "misalignment", "level_error")
     one, nine = (expected_errors(model, state, 1e-10 * np.eye(26), units=units) for units in (1, 9))
     assert one.shared_errors == pytest.approx(3.0 * nine.shared_errors)

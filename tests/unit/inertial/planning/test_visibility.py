@@ -1,8 +1,9 @@
 """Values of an effect's parameters at which a plan cannot see it are listed, though it sees the effect at others."""
 
 import numpy as np
+from posed import posed
 
-from inertial import frames, poses
+from inertial import poses
 from inertial.planning.visibility import visibilities
 from inertial.state import History, State
 
@@ -11,20 +12,12 @@ MODEL = ("bias", "scale", "misalignment", "bias_temperature")
 
 def soaked(soaks: tuple[float, ...]) -> State:
     """Six faces at every soak, an hour each, with the temperature between them."""
-    angles = np.radians(np.tile(poses.plan("six"), (len(soaks), 1)))
     time = 3600.0 * np.repeat(np.arange(len(soaks)), 6) + 2000.0 + 30.0 * np.tile(np.arange(6), len(soaks))
-    warm = np.repeat(np.array(soaks), 6)
     grid = np.arange(0.0, 3600.0 * len(soaks), 60.0)
     hour = 3600.0 * np.arange(len(soaks))
     reached = np.interp(grid, np.ravel(np.stack([hour + 1500.0, hour + 2400.0], axis=1)), np.repeat(soaks, 2))
-    return State(
-        force=frames.force_from_angles(angles[:, 0], angles[:, 1]),
-        time=time,
-        temperature=warm,
-        outer=angles[:, 0],
-        inner=angles[:, 1],
-        history=History(grid, reached),
-    )
+    six = np.tile(poses.plan("six"), (len(soaks), 1))
+    return posed(six, time=time, temperature=np.repeat(np.array(soaks), 6), history=History(grid, reached))
 
 
 def hysteresis(soaks: tuple[float, ...]):
