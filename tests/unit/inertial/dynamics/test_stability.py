@@ -19,13 +19,15 @@ from inertial.dynamics.warm_up import entered
 from inertial.errors import NotIdentified
 from pipelines.stages.bias_stability import bias_stability
 
+AT = np.arange(36)
+WALK = 100.0 * (np.minimum.outer(AT, AT) + np.where(np.equal.outer(AT, AT), 1 / 3, 0.5))
+"""Covariance of 36 means of 100 s of a walk of one unit per √s."""
+
 
 @pytest.mark.parametrize("walk", [0.0, 1.0])
 def test_the_stability_of_the_static_record_has_the_freedoms_of_its_noise(walk, rng):
-    at, held, runs = np.arange(36), 0, 200
-    covariance = np.eye(36) + 100.0 * walk**2 * (
-        np.minimum.outer(at, at) + np.where(np.equal.outer(at, at), 1 / 3, 0.5)
-    )
+    held, runs = 0, 200
+    covariance = np.eye(36) + walk**2 * WALK
     true = float(np.sqrt((np.trace(covariance) - covariance.mean() * 36.0) / 35.0))
     for _ in range(runs):
         found = bias_stability(10.0 * rng.normal(size=3600) + walk * np.cumsum(rng.normal(size=3600)), 1.0)
@@ -59,14 +61,10 @@ def expected(white: float, density: np.ndarray, walk: float) -> tuple[float, flo
     mean = np.array([np.sin(100.0 * np.pi * x) / (100.0 * np.sin(np.pi * x)) for x in f]) ** 2
     lag = np.array([np.sum(density * mean * np.cos(200.0 * np.pi * f * j)) for j in range(36)]) * f[0]
     covariance = lag[np.abs(np.subtract.outer(np.arange(36), np.arange(36)))] + np.eye(36) * white**2 / 100.0
-    at = np.arange(36)
-    covariance = covariance + 100.0 * walk**2 * (
-        np.minimum.outer(at, at) + np.where(np.equal.outer(at, at), 1 / 3, 0.5)
-    )
+    covariance = covariance + walk**2 * WALK
     spread = np.trace(covariance) / 36.0 - np.mean(covariance)
-    return float(np.sqrt(36.0 / 35.0 * spread)), float(
-        np.sqrt(lag[0] - lag[1] + white**2 / 100.0 + 100.0 / 3.0 * walk**2)
-    )
+    allan = lag[0] - lag[1] + white**2 / 100.0 + 100.0 / 3.0 * walk**2
+    return float(np.sqrt(36.0 / 35.0 * spread)), float(np.sqrt(allan))
 
 
 @pytest.mark.parametrize(
@@ -79,10 +77,9 @@ def test_the_intervals_of_an_hour_hold_the_process(white, flicker, walk, shown, 
     records = records + walk * np.cumsum(rng.normal(size=records.shape), axis=1)
     sd, allan = expected(white, density, walk)
     # as a static record has them, to a quarter; what is not there has a limit
-    ends = [
-        (size, 0.7 * size, 1.4 * size) if size else (np.nan, 0.0, 0.02) for size in (flicker * np.sqrt(np.pi), walk)
-    ]
-    identified = IdentifiedNoise(ends[0], ends[1]) if shown == "by a static record" else None
+    sizes = (flicker * np.sqrt(np.pi), walk)
+    known = [(size, 0.7 * size, 1.4 * size) if size else (np.nan, 0.0, 0.02) for size in sizes]
+    identified = IdentifiedNoise(*known) if shown == "by a static record" else None
     stabilities = [stability(one, 1.0, identified) for one in records]
     for name, true in (("sd_100s", sd), ("allan_100s", allan), ("drift_h", 0.0)):
         ends = np.array([getattr(one, f"{name}_interval") for one in stabilities])

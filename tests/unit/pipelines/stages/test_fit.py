@@ -93,40 +93,26 @@ def lot(
     return pd.concat(dwells, ignore_index=True), pd.concat(history, ignore_index=True)
 
 
-def test_finds_the_time_constant_of_a_lag_with_its_error(rng: np.random.Generator) -> None:
+def test_a_lag_is_found_with_its_error_and_verified_by_what_came_before_each_dwell(rng: np.random.Generator) -> None:
     dwells, history = lot(rng)
-    rows = fit(dwells, history, LAG)["coefficients"]
-    tau = rows[(rows["effect"] == "thermal_lag") & (rows["name"] == "tau")].iloc[0]
+    fitted = fit(dwells, history, LAG)
+    rows = fitted["coefficients"]
+    tau = rows[rows["name"] == "tau"].iloc[0]
     assert tau["value"] == pytest.approx(TAU, rel=0.03)
     assert 0.0 < tau["standard_error"] < 0.05 * TAU
     assert abs(tau["value"] - TAU) < 5.0 * tau["standard_error"] + 2.0
-    size = rows[rows["name"] == "kL"]["value"]
-    np.testing.assert_allclose(size, LAGGING, rtol=0.1)
-
-
-def test_verification_with_a_lag_uses_what_came_before_each_dwell(rng: np.random.Generator) -> None:
-    dwells, history = lot(rng)
-    fitted = fit(dwells, history, LAG)
+    np.testing.assert_allclose(rows[rows["name"] == "kL"]["value"], LAGGING, rtol=0.1)
     tables = [fitted[name] for name in ("coefficients", "covariance", "predictions")]
-    rows = verify(dwells, history, *tables)["verification"]
-    ratio = rows["error_ug"] / rows["uncertainty_ug"]
-    assert 0.8 < np.std(ratio) < 1.25
-    assert rows["error_ug"].abs().max() < 5.0 * 1e6 * WHITE
-
-
-def test_calibration_with_a_time_constant_for_each_axis_is_read_as_it_was_written(rng: np.random.Generator) -> None:
-    dwells, history = lot(rng)
-    fitted = fit(dwells, history, LAG)
-    table = fitted["coefficients"]
-    one = table[table["name"] == "tau"]
-    split = pd.concat(
-        [
-            table[table["name"] != "tau"],
-            *(one.assign(axis=a, value=v) for a, v in zip("xyz", (1.0, 2.0, 3.0), strict=True)),
-        ]
-    )
-    ordered = split.sort_values(["unit"], kind="stable")
-    assert read_calibration(ordered, fitted["covariance"]).nonlinear["thermal_lag"]["tau"] == (1.0, 2.0, 3.0)
+    verified = verify(dwells, history, *tables)["verification"]
+    assert 0.8 < np.std(verified["error_ug"] / verified["uncertainty_ug"]) < 1.25
+    assert verified["error_ug"].abs().max() < 5.0 * 1e6 * WHITE
+    # a time constant for each axis is read as it was written
+    own = [
+        rows[rows["name"] == "tau"].assign(axis=axis, value=value)
+        for axis, value in zip("xyz", (1.0, 2.0, 3.0), strict=True)
+    ]
+    written = pd.concat([rows[rows["name"] != "tau"], *own]).sort_values(["unit"], kind="stable")
+    assert read_calibration(written, fitted["covariance"]).nonlinear["thermal_lag"]["tau"] == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize(("unit", "per_g"), [("g", 1.0), ("m/s^2", 9.80665)])
