@@ -5,10 +5,6 @@ import numpy as np
 from inertial.correction import correct, remaining_step
 from inertial.state import State
 
-LINEAR = ("bias", "scale", "misalignment")
-THERMAL = (*LINEAR, "bias_temperature", "scale_temperature")
-
-
 EFFECTS = ["bias", "scale", "third_order"]
 COEFFICIENTS = np.tile([0.01, 1.0, 1e-3], (3, 1))  # each axis, in g
 
