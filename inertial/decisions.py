@@ -205,7 +205,7 @@ by more than half of it in 17 of 17, by more than it in 13 of 17, by more than t
 """
 
 JUMPS_RARE = 9.2
-"""Price, in chi-square, of every further jump of a single axis that takes the place of an effect together with others.
+"""Price, in chi-square, of a jump of a single axis, and of every further one that takes the place of an effect with others.
 
 Derived: 2·ln 100, an axis in a hundred jumps by itself. `python benchmarks/worlds noises --runs 10`.
 """

@@ -53,6 +53,7 @@ class State:
         answer to
     output_run : (..., n, 3), g, what bias and scale factor add to the output by their run with temperature, where it is known
     covariates : further recorded quantities by name, (..., n)
+    reference : °C, what ``theta`` counts from
     """
 
     force: Array
@@ -72,6 +73,7 @@ class State:
     output_run: Array | None = None
     covariates: Mapping[str, Array] = field(default_factory=dict[str, Array])
     history: History | None = None
+    reference: float = T_REFERENCE
     memory: dict[tuple[object, ...], Array] = field(
         default_factory=dict[tuple[object, ...], Array], repr=False, compare=False
     )
@@ -97,18 +99,18 @@ class State:
         """Specific force along the sensor's own axis, (..., n), g; along the fixture's where the misalignment is not known."""
         return (self.force if self.felt is None else self.felt)[..., axis]
 
-    def converted(self, axis: int) -> Array:
+    def converted(self, axis: int, run: float = 1.0) -> Array:
         """What the electronics of an axis has at its input, (..., n), g: the force along it, and the run with temperature.
 
-        The steps of a converter, a limit or a threshold stand elsewhere in a warm unit.
+        The steps of a converter, a limit or a threshold stand elsewhere in a warm unit; those of a mechanism (``run`` 0) do not.
         """
         along = self.along(axis)
-        return along if self.output_run is None else along + self.output_run[..., axis]
+        return along if self.output_run is None else along + run * self.output_run[..., axis]
 
     @cached_property
     def theta(self) -> Array | None:
-        """Temperature above 25 °C, (..., n), K."""
-        return None if self.temperature is None else self.temperature - T_REFERENCE
+        """Temperature above the reference, (..., n), K."""
+        return None if self.temperature is None else self.temperature - self.reference
 
     @cached_property
     def temperature_rate(self) -> Array | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.hand_turned import EFFECTS as HAND
 from benchmarks.strangers import KINDS
 
 HERE = Path(__file__).resolve().parents[1]
@@ -58,6 +59,7 @@ def beds() -> list[Bed]:
         *(Bed("worlds", bed, names, runs) for bed, (names, runs) in _worlds().items()),
         *(Bed("blind", name, (name,), runs) for name, runs in BLIND.items()),
         *(Bed("recordings", name, (name,), runs) for name, runs in {"nulls": 60, "bad": 40, "hidden": 40}.items()),
+        *(Bed("hand", f"hand_{name}", (name,), 40) for name in HAND),
         *(Bed("dynamic", test, names, 6) for test, names in DYNAMIC.items()),
     ]
     strange: dict[str, list[str]] = {}
@@ -85,7 +87,7 @@ def generators() -> list[Path]:
     """Files that make the truths: where one changes, lots are made anew."""
     folders = (HERE / "worlds", HERE / "strangers", HERE.parent / "tests" / "blind")
     files = [path for folder in folders for path in sorted(folder.glob("*.py")) if not path.name.startswith("test_")]
-    files = [*files, HERE / "made_recordings.py", HERE / "shock_and_spin.py"]
+    files = [*files, HERE / "made_recordings.py", HERE / "hand_turned.py", HERE / "shock_and_spin.py"]
     for path in files:
         ast.parse(path.read_text("utf-8"))  # a generator that is being edited is no truth
     return files

@@ -139,6 +139,17 @@ def recordings(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
     return judged
 
 
+def hand(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
+    """One unit turned by hand, with an effect of ten times the noise."""
+    module = _loaded(ROOT / "benchmarks" / "hand_turned.py", "hand_turned")
+    sys.path.insert(0, str(product))
+
+    def judged(bed: str, name: str, seed: int) -> Outcome:
+        return module.judged(name, kept(lots, f"{name} {seed}", lambda: module.make(name, seed)))
+
+    return judged
+
+
 def dynamic(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
     """Shocks and centrifuges with a hidden effect, and without."""
     sys.path.insert(0, str(product))
@@ -182,7 +193,7 @@ def strangers(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
     return judged
 
 
-FAMILIES = {each.__name__: each for each in (worlds, blind, recordings, dynamic, strangers)}
+FAMILIES = {each.__name__: each for each in (worlds, blind, recordings, hand, dynamic, strangers)}
 
 
 def main() -> None:

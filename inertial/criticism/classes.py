@@ -3,13 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from inertial import decisions
 from inertial.criticism.field import Candidates
 from inertial.criticism.jumps import Jumps, jumps_instead
 from inertial.criticism.search import Rival, judge, judge_refined, ranked, scanned, size_of
 from inertial.decisions import CLASS_WIDTH
 from inertial.estimation.alternative import Handling
+from inertial.estimation.candidate import Candidate
 from inertial.estimation.model import Model
+from inertial.estimation.penalty import price
 from inertial.estimation.term import Term
 
 __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
@@ -17,6 +21,9 @@ __all__ = ["CLASS_WIDTH", "EffectClass", "Member", "class_of"]
 
 _MOST = 9
 """Rivals whose own noise is estimated."""
+
+_AXES, _FEWEST = 3, 3
+"""Axes of a unit, and units from which coefficients can be said to be alike."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +40,21 @@ class EffectClass:
 
     log_p : log probability of the same reduction by noise
     size : RMS of the effect beyond the part that the rest of the model absorbs, g
+    alike : whether coefficients that are the same in all units explain as much as a sensor's own
     """
 
     members: tuple[Member, ...]
     log_p: float
     size: float
+    alike: bool = False
+
+    @property
+    def scope(self) -> str:
+        """Where the cause is: "data", "sensor", "slot", "station", or "sensor or station" where the lot cannot tell."""
+        if self.of_data:
+            return "data"
+        scopes = {m.term.effect.scope for m in self.physics} | ({"station"} if self.alike else set())
+        return "sensor or station" if {"sensor", "station"} <= scopes else self.simplest.effect.scope
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -76,7 +93,24 @@ def class_of(field: Candidates, model: Model, term: Term) -> EffectClass:
         judged = _with_jumps(judged, jumps)
     best = judged[0]
     members = tuple(Member(r.term, r.cost - best.cost) for r in judged if r.cost < best.cost + CLASS_WIDTH)
-    return EffectClass(members, best.log_p, size_of(rest, best.term))
+    return EffectClass(members, best.log_p, size_of(rest, best.term), _alike(rest, best.term))
+
+
+def _alike(model: Model, term: Term) -> bool:
+    """Whether coefficients that all units share explain as much as coefficients of every unit, each at its price.
+
+    What a table, a fixture or a reference does is the same in every unit; sensors of one design can have it alike, too.
+    """
+    units = model.problem.lot.state.time.shape[0]
+    if units < _FEWEST or model.problem.lot.radial or term.shared:
+        return False
+    space, own = model.at(model.with_term(term).noise), term.candidate(model.problem)
+    by_axis = np.eye(_AXES)[np.arange(space.q.shape[0]) % _AXES]
+    columns = np.einsum("bngp,ba->bngap", own.of_blocks, by_axis)
+    common = space.gain(Candidate(columns.reshape(*columns.shape[:3], -1), shared=True))
+    each = space.gain(own)
+    scores = [float(g.drop[0]) - price(float(g.drop[0]), float(g.rank[0])) for g in (common, each)]
+    return scores[0] > scores[1] - CLASS_WIDTH
 
 
 def _with_jumps(judged: list[Rival], jumps: Jumps) -> list[Rival]:

@@ -146,11 +146,11 @@ def _named(problem: Problem, base: Model, classes: Sequence[EffectClass]) -> tup
     """Errors after each class is added to those before it."""
     named: list[Named] = []
     model = base
-    before = left_out(base) if classes else None
     terms = [_first(group) for group in classes]
+    before = left_out(base, also=terms) if classes else None
     for group, first in zip(classes, terms, strict=True):
         model = model.with_term(first)
-        after = left_out(model)
+        after = left_out(model, also=terms)
         errors = worst(before, after) if before is not None else (float("nan"), float("nan"))
         rest = Model(problem, [*base.terms, *(t for t in terms if t is not first)], near=base.noise)
         left = rms_of(residuals_of(problem, estimate(model))) if problem.lot.radial else fit_rms(problem, model.terms)

@@ -15,7 +15,7 @@ from inertial.criticism.influence import CarriedEvidence, carried_by
 from inertial.criticism.jumps import jumps_instead
 from inertial.criticism.left_out import LeftOut, left_out
 from inertial.criticism.lot_part import LotPart, part_of
-from inertial.criticism.search import Rival, SearchResult, judge, search
+from inertial.criticism.search import Rival, SearchResult, convincing, judge, search
 from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
 from inertial.data_errors.handling import alternatives
 from inertial.decisions import CLASS_WIDTH, RISES
@@ -62,8 +62,10 @@ class Named:
     def predicts(self) -> bool:
         """Whether the prediction of unfitted dwells is no worse with it: only then it is recommended for a model.
 
-        If dwells left out cannot judge it (NaN), it is not recommended.
+        Where no dwells left out can judge it (NaN), its evidence decides: it was named by it.
         """
+        if np.isnan(self.heldout_before) or np.isnan(self.heldout_after):
+            return True
         return bool(self.heldout_after <= (1.0 + RISES) * self.heldout_before)
 
 
@@ -145,11 +147,25 @@ def examined(lot: Lot, effects: Sequence[str]) -> "tuple[ExaminedRun, EffectSear
         whole = Problem(run.lot, slope=searched.base.problem.slope)
         kept = bad_dwells(replaced(Model(whole, searched.model.terms, near=searched.model.noise)))
         same = {(d.unit, d.dwell) for d in kept} == {(d.unit, d.dwell) for d in run.removed}
-        if same and not _placed_again(run, searched.model):
+        if same and not _placed_again(run, searched.model) and not _dropped(run, searched):
             break
         run.removed = kept
         searched = mended(run)
     return run, searched
+
+
+def _dropped(run: ExaminedRun, searched: "EffectSearch") -> bool:
+    """Whether a handling error explains nothing any more beside what was found after it; then it is taken out."""
+    for one in run.handled if len(run.handled) + len(searched.result.added) > 1 else ():
+        if one.term is None:
+            continue
+        rest = searched.model.without_term(one.term)
+        if convincing(searched.field, rest, judge(searched.field, rest, one.term)):
+            continue
+        run.handled = [other for other in run.handled if other is not one]
+        run.beside = [term for term in run.beside if term is not one.term]
+        return True
+    return False
 
 
 def _placed_again(run: ExaminedRun, model: Model) -> bool:

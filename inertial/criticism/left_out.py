@@ -7,8 +7,13 @@ other dwells is biased under wander: both sides of a fold share it, and every sl
 Handling errors of the run (a unit moved, the table slipped) are facts of this run and no part of the model: they keep the
 coefficients of all dwells in every fold, as corrections of the readings do. Without that a fold on one side of a change would
 extrapolate it. The term that is judged is predicted by the other dwells alone, also where it is a handling error.
+
+The state of a memory before the first dwell is a fact of the run, too, and shows in few dwells, often in the first alone. The
+dwells of a fold that alone determine it are fitted in that fold, with and without the effect; all others are left out: their
+outputs, not the path of poses and temperatures through them, which is known.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -37,12 +42,16 @@ _UNDETERMINED = 1e-7
 _SURELY = 1e-4
 """Lower bound of the same ratio above which the eigenvalues of no block need be looked at."""
 
+_ALONE = 0.9
+"""Share of the sum of squares of a column in one fold, from which on the other dwells do not determine its coefficient."""
+
 
 @dataclass(frozen=True)
 class LeftOut:
     """A model on dwells left out, by kind of fold.
 
-    missed : by kind, (blocks, n) g, NaN where a dwell is missing or its fold cannot judge the model
+    missed : by kind, (blocks, n) g, NaN where a dwell is missing, its fold cannot judge the model, or it determines the state
+        of a memory before the first dwell
     density : by kind, log density of what was left out; kinds with a fold that cannot judge the model are omitted
     """
 
@@ -55,30 +64,50 @@ class LeftOut:
         return max((_rms(self.missed[k]) for k in usable), default=float("nan"))
 
 
-def left_out(model: Model, judged: Term | None = None) -> LeftOut:
+def left_out(model: Model, judged: Term | None = None, also: Sequence[Term] = ()) -> LeftOut:
     """The prediction of dwells left out: poses in six folds, soaks one by one, six stretches of time.
 
     Parameters
     ----------
     judged : the term that is judged; the other handling errors of the model have their coefficients of all dwells
+    also : terms of the models that this one is compared with: the same dwells are left out for all
     """
     if model.problem.n > LONGEST:
         return _without_wander(model, judged)
     parts = _Parts(model, judged)
+    begun = _begun(model.problem, {term.key: term for term in (*model.terms, *also)}.values())
     missed: dict[Kind, Array] = {}
     density: dict[Kind, float] = {}
     for kind, fold in _folds(model.problem).items():
         whole = np.full((model.problem.blocks, model.problem.n), np.nan)
         total, sound = 0.0, True
         for k in range(int(fold.max()) + 1):
-            predicted = parts.predicted(fold == k)
+            out = (fold == k) & ~_alone(begun, fold == k)
+            predicted = parts.predicted(out)
             sound &= predicted is not None
             if predicted is not None:
-                whole[:, fold == k], total = predicted[0], total + predicted[1]
+                whole[:, out], total = predicted[0], total + predicted[1]
         missed[kind] = whole
         if sound:
             density[kind] = total
     return LeftOut(missed, density)
+
+
+def _begun(problem: Problem, terms: Iterable[Term]) -> Array:
+    """Columns (n, k) of the states of memories before the first dwell, each of unit length; of every block."""
+    # a memory at rest has no unknown state
+    columns = [problem.start(t.effect, t.keywords) for t in terms if not t.rest]
+    flat = [np.moveaxis(each, 1, 0).reshape(problem.n, -1) for each in columns]
+    joined = np.concatenate([np.zeros((problem.n, 0)), *flat], axis=1)
+    size = np.linalg.norm(joined, axis=0)
+    return joined[:, size > 0.0] / size[size > 0.0]
+
+
+def _alone(begun: Array, fold: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Dwells (n,) of a fold that alone determine a column (n, k) of unit length."""
+    inside = np.where(fold[:, None], begun, 0.0)
+    within = inside[:, np.sum(inside**2, axis=0) > _ALONE]
+    return np.any(within**2 > (1.0 - _ALONE) / len(fold), axis=1)
 
 
 def _without_wander(model: Model, judged: Term | None) -> LeftOut:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from inertial import decisions
 from inertial.criticism.field import Candidates
 from inertial.criticism.whole_dwell import only_tilted
-from inertial.decisions import MATERIAL, NAMED_BELOW, REMAINDER
+from inertial.decisions import CLASS_WIDTH, JUMPS_RARE, MATERIAL, NAMED_BELOW, REMAINDER
 from inertial.estimation.alternative import Handling, OfOneDwell
 from inertial.estimation.likelihood import Ratio, likelihood_ratio, weighed
 from inertial.estimation.model import Model
@@ -92,7 +92,9 @@ def search(
         chosen.append(best.term)
         model = model.with_term(best.term)
         if len(chosen) > 1:
-            model, chosen = _reexamine(field, base, model, chosen)
+            model, chosen, instead_of = _reexamine(field, base, model, chosen)
+            if instead_of is not None:
+                return SearchResult(model, tuple(chosen), ladder, (instead_of,))
     if len(chosen) > len(start):
         model, chosen = _replaced_by_two(field, base, model, chosen)
     return SearchResult(model, tuple(chosen), ladder)
@@ -116,9 +118,11 @@ def anything(field: Candidates, model: Model) -> bool:
 
 def convincing(field: Candidates, model: Model, rival: Rival) -> bool:
     """Whether a rival is significant over all tests, exceeds its price, and is large enough to matter."""
-    if rival.log_p + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
+    effect = rival.term.effect
+    rare = JUMPS_RARE if isinstance(effect, Handling) and effect.of_one_axis else 0.0
+    if rival.log_p + 0.5 * rare + np.log(max(field.looks, 1)) > np.log(NAMED_BELOW):
         return False
-    if -rival.cost < np.log(max(field.problem.count, 1)):
+    if -rival.cost - rare < np.log(max(field.problem.count, 1)):
         return False
     return size_where_it_acts(model, rival.term) > MATERIAL * model.with_term(rival.term).scatter()
 
@@ -278,13 +282,25 @@ def ranked(rivals: Sequence[Rival]) -> list[Rival]:
     return sorted((r.at(shared) for r in own), key=lambda r: r.cost)
 
 
-def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:
-    """Each chosen effect again beside the others: kept, replaced by a better one, or removed."""
+def _reexamine(
+    field: Candidates, base: Model, model: Model, chosen: list[Term]
+) -> tuple[Model, list[Term], Term | None]:
+    """Each chosen effect again beside the others: kept, replaced by a better one, or removed.
+
+    The last of what is returned is a handling error that is beyond the class of the effect whose place it takes.
+    """
     for term in tuple(chosen):
         if len(chosen) < 2:
             break
         rest = model.without(term.effect.id)
-        rivals = [r for r in contest(field, rest, finalists=_AGAIN) if not isinstance(r.term.effect, Handling)]
+        every = contest(field, rest, finalists=_AGAIN)
+        rivals = [r for r in every if not isinstance(r.term.effect, Handling)]
+        ahead = min((r.cost for r in rivals), default=0.0) - CLASS_WIDTH
+        handled = next(
+            (r for r in every[:1] if r.cost < ahead and r not in rivals and convincing(field, rest, r)), None
+        )
+        if handled is not None:
+            return rest, [t for t in chosen if t is not term], handled.term
         best = next((r for r in rivals if convincing(field, rest, r)), None)
         best = None if best is None else _parent_first(field, rest, best)
         others = [t for t in chosen if t is not term]
@@ -293,7 +309,7 @@ def _reexamine(field: Candidates, base: Model, model: Model, chosen: list[Term])
             continue
         chosen = [*others, term if best.term.effect.id == term.effect.id else best.term]
         model = Model(field.problem, [*base.terms, *chosen], near=model.noise)
-    return model, chosen
+    return model, chosen, None
 
 
 def _replaced_by_two(field: Candidates, base: Model, model: Model, chosen: list[Term]) -> tuple[Model, list[Term]]:

@@ -52,6 +52,16 @@ class Nonlinear:
         return np.linspace(self.low, self.high, self.points)
 
 
+MECHANISM, CONVERTER = 0.0, 1.0
+
+
+def place(state: State) -> tuple[Nonlinear, ...]:
+    """Where a threshold or limit acts, in the mechanism or in the electronics behind it; nothing where that is the same."""
+    if state.output_run is None:
+        return ()
+    return (Nonlinear("place", "", MECHANISM, CONVERTER, choices=(MECHANISM, CONVERTER)),)
+
+
 class Effect(ABC):
     """One physical cause of error. A subclass with an ``id`` in a module of this package is found by itself.
 

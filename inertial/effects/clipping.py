@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial.effects.base import CONVERTER, Array, Nonlinear, SensorEffect, place, stack
 from inertial.state import State
 
 
@@ -22,8 +22,14 @@ class Clipping(SensorEffect):
     sharp: ClassVar[bool] = True
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("full_scale", "g", 0.5, 0.999, "linear", 14),)
 
-    def columns(self, state: State, axis: int, *, full_scale: float, **nonlinear: float) -> Array:
-        f = state.converted(axis)
+    def parameters(self, state: State) -> tuple[Nonlinear, ...]:
+        """Where it acts, too, if the output runs with temperature."""
+        return (*self.nonlinear, *place(state))
+
+    def columns(
+        self, state: State, axis: int, *, full_scale: float, place: float = CONVERTER, **nonlinear: float
+    ) -> Array:
+        f = state.converted(axis, place)
         return stack(state, [np.clip(f, -full_scale, full_scale) - f])
 
     def names(self, axis: int) -> tuple[str, ...]:

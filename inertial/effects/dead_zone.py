@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from inertial.effects.base import Array, Nonlinear, SensorEffect, stack
+from inertial.effects.base import CONVERTER, Array, Nonlinear, SensorEffect, place, stack
 from inertial.state import State
 
 
@@ -22,8 +22,12 @@ class DeadZone(SensorEffect):
     sharp: ClassVar[bool] = True
     nonlinear: ClassVar[tuple[Nonlinear, ...]] = (Nonlinear("width", "g", 1e-5, 0.5, "log", 12),)
 
-    def columns(self, state: State, axis: int, *, width: float, **nonlinear: float) -> Array:
-        return stack(state, [-np.clip(state.converted(axis), -width, width)])
+    def parameters(self, state: State) -> tuple[Nonlinear, ...]:
+        """Where it acts, too, if the output runs with temperature."""
+        return (*self.nonlinear, *place(state))
+
+    def columns(self, state: State, axis: int, *, width: float, place: float = CONVERTER, **nonlinear: float) -> Array:
+        return stack(state, [-np.clip(state.converted(axis, place), -width, width)])
 
     def names(self, axis: int) -> tuple[str, ...]:
         return ("DZ",)

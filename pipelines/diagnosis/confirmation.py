@@ -43,7 +43,7 @@ def progress(
     """
     if fresh is not None:
         return _by_fresh(before, after, out, fresh)
-    return _by_left_out(left_out(before), out, doubt)
+    return _by_left_out(left_out(before, also=after.terms), out, doubt)
 
 
 def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str, Any]:
@@ -54,7 +54,9 @@ def _by_fresh(before: Model, after: Model, out: LeftOut, fresh: Lot) -> dict[str
     if change.confirmed is True:
         # with the coefficients unchanged, less the bias of the day
         left = [without_own_bias(problem, one.terms, residuals_of(problem, one)) for one in (old, new)]
-        rises = _clear_rise("the error on the fresh run", left[0], left[1]) or _rises_left_out(before, out)
+        rises = _clear_rise("the error on the fresh run", left[0], left[1]) or _rises_left_out(
+            left_out(before, also=after.terms), out
+        )
         reason = rises or _unclear(change)
     elif change.confirmed is None:
         reason = "the fresh run does not decide; measure another run"
@@ -141,12 +143,12 @@ def _rise(what: str, before: float, after: float) -> str | None:
     return f"{what} rises from {MICRO * before:.3g} to {MICRO * after:.3g} µg"
 
 
-def _rises_left_out(before: Model, after: LeftOut) -> str | None:
+def _rises_left_out(first: LeftOut, after: LeftOut) -> str | None:
     """A kind of dwells left out of the first run that speaks against the effects, as text; None if there is none.
 
     Its error rises by more than its uncertainty, or it rises and the log density falls by as much as would confirm.
     """
-    first, what = left_out(before), "the error on dwells left out"
+    what = "the error on dwells left out"
     kinds: list[Kind] = [kind for kind in first.density if kind in after.density]
     for kind in kinds:
         old, new = first.missed[kind], after.missed[kind]

@@ -65,7 +65,7 @@ def _fitted_parameters(diagnosis: Diagnosis) -> dict[str, dict[str, Any]]:
 def _class(named: Named, names: Names) -> dict[str, Any]:
     group = named.effects
     simplest = group.simplest
-    scope = "data" if group.of_data else simplest.effect.scope
+    scope = group.scope
     row: dict[str, Any] = {
         "effects": list(group.ids),
         "scope": scope,

@@ -183,7 +183,7 @@ def worded(document: dict[str, Any]) -> dict[str, Any]:
         "faults": faults(document),
         "drivers": drivers(document, None),
         "missing": missing(document),
-        "not_recommended": sentences.why_not_recommended(document),
+        "recommended": sentences.why_recommended(document),
         "influences": sentences.influences(document, None),
         "left_out": sentences.left_out(document),
         "unexplained_title": sentences.UNEXPLAINED,

@@ -7,6 +7,7 @@ from typing import Any
 
 from inertial.counts import degrees_of_freedom
 from inertial.criticism.evidence import FEW_DOF
+from inertial.decisions import ADEQUATE_ABOVE
 from inertial.uncertainty.rounding import chance, equal, short
 from pipelines.tables.sound_lot import SMALL_MISFIT, is_small
 
@@ -25,14 +26,17 @@ def verdict(document: dict[str, Any]) -> str:
             f"CANNOT BE JUDGED: every unit ({len(faulty)}) has a data fault; correct the faults, then judge the model."
         )
     judged = {"adequate": document["adequate"], "reason": document.get("reason"), **error}
-    told = plain_verdict({**judged, "units": len(document["units"]) - len(faulty)})
+    judged["units"] = len(document["units"]) - len(faulty)
+    told, figures = plain_verdict(judged), _figures(judged)
     if document["adequate"] is not False:
         return f"{told}."
     spoilt = [class_text(group) for group in document["classes"] if group["scope"] == "data"]
     named = [" or ".join(group["effects"]) for group in document["classes"] if group["scope"] != "data"]
     if spoilt:
         rest = f"; also missing: {', and '.join(named)}" if named else ""
-        return f"{told}; these figures are without the faults of the data: {'; '.join(spoilt)}{rest}."
+        passes = not named and not document["unexplained"] and error["p_value"] >= ADEQUATE_ABOVE
+        without = f"{'the model is adequate' if passes else 'it is not adequate either'}: {figures}"
+        return f"NOT ADEQUATE: the run has faults of the data: {'; '.join(spoilt)}; without them {without}{rest}."
     if named:
         return f"{told}; missing: {', and '.join(named)}."
     rest = "no recorded quantity explains the residual"
@@ -50,12 +54,15 @@ def plain_verdict(judged: Mapping[str, Any]) -> str:
     """
     if judged["adequate"] is None:
         return f"CANNOT BE JUDGED: {judged['reason']}"
+    if judged["adequate"]:
+        return f"ADEQUATE: {_figures(judged)}"
+    return f"NOT ADEQUATE: {_figures(judged)}{f'; {SMALL_MISFIT}' if is_small(judged) else ''}"
+
+
+def _figures(judged: Mapping[str, Any]) -> str:
     units = judged["units"]
     left = f"residual {short(judged['rms_ug'])} µg rms over {units} unit{'s' if units != 1 else ''}"
-    left += f"; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
-    if judged["adequate"]:
-        return f"ADEQUATE: {left}"
-    return f"NOT ADEQUATE: {left}{f'; {SMALL_MISFIT}' if is_small(judged) else ''}"
+    return f"{left}; noise of the measurement {short(judged['floor_ug'])} µg rms (p {equal(judged['p_value'])})"
 
 
 def class_text(group: dict[str, Any]) -> str:
@@ -176,20 +183,27 @@ def left_out(document: dict[str, Any]) -> list[str]:
     return [text for text in (without_single_dwells(document), tails_left_out(document), counted) if text]
 
 
-def why_not_recommended(document: dict[str, Any]) -> list[str]:
-    """Why effects that are named are not recommended for the model."""
+def why_recommended(document: dict[str, Any]) -> list[str]:
+    """Why effects that are named are not recommended for the model, or are by their evidence alone."""
     lines: list[str] = []
     for group in document["classes"]:
-        if group["scope"] == "data" or set(group["effects"]) & set(document["recommended"]):
+        if group["scope"] == "data":
             continue
-        name, before, after = group["effects"][0], group.get("heldout_before_ug"), group["heldout_after_ug"]
+        added = [name for name in group["effects"] if name in document["recommended"]]
+        if group["scope"] == "sensor or station":
+            lines.append(
+                f"{' or '.join(group['effects'])} can be of the sensors or of the station (table, fixture, reference): turn the "
+                "units in their seats, or measure them on another station."
+            )
+        name, before, after = (added or group["effects"])[0], group.get("heldout_before_ug"), group["heldout_after_ug"]
         if after is None or before is None:
-            why = "no dwells left out can judge it; a fresh run of the same units decides"
-        elif after > before:
-            why = f"the error on dwells left out rises from {short(before)} to {short(after)} µg"
-        else:
-            continue
-        lines.append(f"{name} is not recommended: {why}.")
+            lines.append(
+                f"{name} is recommended by its evidence alone: no dwells left out can judge it; confirm with a fresh run of the "
+                "same units."
+            )
+        elif not added and after > before:
+            rise = f"rises from {short(before)} to {short(after)} µg"
+            lines.append(f"{name} is not recommended: the error on dwells left out {rise}.")
     return lines
 
 

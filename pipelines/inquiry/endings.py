@@ -41,13 +41,13 @@ def ending_of(joint: JointDiagnosis) -> Ending | None:
 
 
 def _all_identified(document: dict[str, Any]) -> str:
-    """Every class has one effect; effects that cannot be judged by dwells left out are not recommended yet."""
+    """Every class has one effect; those that no dwells left out can judge are told."""
     groups = document["classes"]
     text = f"every class contains one effect: {', '.join(g['effects'][0] for g in groups)}"
     unjudged = [g["effects"][0] for g in groups if g.get("scope") != "data" and g.get("heldout_after_ug", 0.0) is None]
     if not unjudged:
         return text
-    return f"{text}; not recommended yet: {', '.join(unjudged)}, which no dwells left out can judge: confirm with a fresh run"
+    return f"{text}; no dwells left out can judge {', '.join(unjudged)}: confirm with a fresh run"
 
 
 def no_follow_up(joint: JointDiagnosis) -> str:

@@ -86,4 +86,4 @@ def test_a_model_that_fits_beside_faulty_dwells_has_no_misfit() -> None:
     document = {"adequate": False, "error": error, "blocked_by": [], "units": ["SN-1", "SN-2"], "unexplained": None}
     said = verdict({**document, "classes": [group]})
     assert "misfit" not in said
-    assert said.endswith("these figures are without the faults of the data: gain_step (SN-2, dwell 19).")
+    assert "the run has faults of the data: gain_step (SN-2, dwell 19); without them the model is adequate:" in said

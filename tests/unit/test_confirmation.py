@@ -10,7 +10,7 @@ from inertial.criticism.left_out import LeftOut
 from inertial.criticism.reproduced_change import ReproducedChange
 from pipelines.diagnosis import confirmation
 from pipelines.diagnosis.model_history import text_of
-from pipelines.diagnosis.sentences import why_not_recommended
+from pipelines.diagnosis.sentences import why_recommended
 
 ROW = {"removed": []}
 
@@ -23,7 +23,7 @@ def missed(size: float, density: float) -> LeftOut:
 
 @pytest.mark.parametrize(
     ("before", "after", "predicts"),
-    [(10.0, 9.0, True), (10.0, 10.04, True), (10.0, 550.0, False), (10.0, np.nan, False), (np.nan, 9.0, False)],
+    [(10.0, 9.0, True), (10.0, 10.04, True), (10.0, 550.0, False), (10.0, np.nan, True), (np.nan, 9.0, True)],
 )
 def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_worse(
     before: float, after: float, predicts: object
@@ -39,12 +39,15 @@ def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_wo
         (
             None,
             None,
-            [],
-            ["third_order is not recommended: no dwells left out can judge it; a fresh run of the same units decides."],
+            ["third_order"],
+            [
+                "third_order is recommended by its evidence alone: no dwells left out can judge it; "
+                + "confirm with a fresh run of the same units."
+            ],
         ),
     ],
 )
-def test_it_is_said_why_an_effect_is_not_recommended(
+def test_it_is_said_why_an_effect_is_recommended_or_not(
     before: float | None, after: float | None, recommended: list[str], lines: list[str]
 ) -> None:
     fault = {"effects": ["bad_dwell"], "scope": "data", "heldout_after_ug": None}
@@ -54,7 +57,7 @@ def test_it_is_said_why_an_effect_is_not_recommended(
         "heldout_before_ug": before,
         "heldout_after_ug": after,
     }
-    assert why_not_recommended({"classes": [fault, effect], "recommended": recommended}) == lines
+    assert why_recommended({"classes": [fault, effect], "recommended": recommended}) == lines
 
 
 def test_a_gain_in_density_does_not_confirm_an_error_that_rises() -> None:
@@ -115,8 +118,8 @@ def test_a_fresh_run_does_not_confirm_a_fall_within_its_uncertainty(
     monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
     change = ReproducedChange(1.0, 0.1, 2e-4, 1e-4, error, "base")
     monkeypatch.setattr(confirmation, "reproduced_change", lambda *_: change)
-    monkeypatch.setattr(confirmation, "left_out", lambda _: missed(1e-4, 1.0))
-    evidence = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
+    monkeypatch.setattr(confirmation, "left_out", lambda *_, **__: missed(1e-4, 1.0))
+    evidence = confirmation.progress("old", SimpleNamespace(terms=()), missed(0.9e-4, 2.0), "fresh")
     assert evidence["confirmed"] is confirmed
     assert ("not clearly more than its uncertainty" in text_of(ROW, evidence)) is (confirmed is None)
 
@@ -133,8 +136,8 @@ def test_a_fresh_run_does_not_confirm_what_raises_its_error(
     monkeypatch.setattr(
         confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
     )
-    monkeypatch.setattr(confirmation, "left_out", lambda _: missed(1e-4, 1.0))
-    evidence = confirmation.progress("old", "new", missed(0.9e-4, 2.0), "fresh")
+    monkeypatch.setattr(confirmation, "left_out", lambda *_, **__: missed(1e-4, 1.0))
+    evidence = confirmation.progress("old", SimpleNamespace(terms=()), missed(0.9e-4, 2.0), "fresh")
     assert evidence["confirmed"] is confirmed
     assert ("the error on the fresh run rises from 200 to 1.45e+05 µg" in text_of(ROW, evidence)) is (confirmed is None)
 
@@ -156,7 +159,7 @@ def test_a_fresh_run_confirms_where_dwells_left_out_rise_within_their_uncertaint
     before, after = missed(1e-4, 1.0), missed(1e-4, density)
     after.missed["blocks of time"][:, ::2] *= rise * 1.1
     after.missed["blocks of time"][:, 1::2] *= rise / 1.1
-    monkeypatch.setattr(confirmation, "left_out", lambda _: before)
-    evidence = confirmation.progress("old", "new", after, "fresh")
+    monkeypatch.setattr(confirmation, "left_out", lambda *_, **__: before)
+    evidence = confirmation.progress("old", SimpleNamespace(terms=()), after, "fresh")
     assert evidence["confirmed"] is confirmed
     assert bool(evidence["rises"]) is (confirmed is None)

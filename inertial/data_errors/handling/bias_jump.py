@@ -1,5 +1,6 @@
 """The bias of one axis of one unit changed during the run."""
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +12,15 @@ AXES = "xyz"
 
 _EVERY = 160
 """Dwells up to which each is a place."""
+
+
+def every_dwell(lot: "Lot") -> Sequence[int]:
+    """Dwells from which on a bias may have changed.
+
+    A jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it.
+    """
+    n = lot.state.time.shape[1]
+    return range(1, n) if n <= _EVERY else times(lot)
 
 
 class BiasJump(Handling):
@@ -34,14 +44,12 @@ class BiasJump(Handling):
         """Every axis of every unit at every place in time; none where only a norm is known."""
         if lot.radial:
             return []
-        units, n = lot.state.time.shape
-        # a jump that is missed by one dwell explains half of itself, and a step in time between two dwells all of it
-        every = range(1, n) if n <= _EVERY else times(lot)
+        units = lot.state.time.shape[0]
         return [
             {"unit": float(u), "axis": float(axis), "dwell": float(k)}
             for u in range(units)
             for axis in range(len(AXES))
-            for k in every
+            for k in every_dwell(lot)
         ]
 
     def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:

@@ -20,7 +20,7 @@ from pipelines.diagnosis.sentences import (
     undetected,
     unexplained_text,
     verdict,
-    why_not_recommended,
+    why_recommended,
     without_single_dwells,
 )
 
@@ -57,7 +57,7 @@ def print_findings(document: dict[str, Any]) -> None:
     """Print data faults, the drivers that the residual follows, the classes of missing effects, and the dwells that decide."""
     for section in (sections.faults, sections.drivers, sections.missing):
         print_section(section(document))
-    for text in why_not_recommended(document):
+    for text in why_recommended(document):
         console().print(text, soft_wrap=True)
     if text := without_single_dwells(document):
         console().print(text, soft_wrap=True)

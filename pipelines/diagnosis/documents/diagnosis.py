@@ -64,7 +64,7 @@ class EffectClassDocument(TypedDict):
     """Effects that this plan cannot separate; one effect if it is identified."""
 
     effects: Annotated[list[str], "ids, the simplest first"]
-    scope: Literal["sensor", "slot", "station", "data"]
+    scope: Literal["sensor", "slot", "station", "sensor or station", "data"]
     rms_after_ug: Annotated[float, "residual with the effect added, µg"]
     heldout_after_ug: Annotated[
         float | None, "cross-validated residual with the effect added, µg; null: cannot be judged"
