@@ -1,9 +1,13 @@
 """Largest values of test equipment: a loose reference cable, motion beyond an exciter, absolute maxima of a station's file."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
+from typing import Any
 
 import pytest
+from each import each
 from small_station import lot_of
 
 from schemas.errors import OperatorNeeded, RecipeInvalid, StationRefused
@@ -25,6 +29,13 @@ def station_of(role: str, profile: str, faults: list[FaultOrder] | None = None, 
     return with_faults(load_station().model_copy(update={"equipment": own}), faults or [])
 
 
+@contextmanager
+def opened(role: str, profile: str, **maximum: float) -> Iterator[Any]:
+    """The equipment of a role at a station that has nothing else."""
+    with open_station(station_of(role, profile, **maximum), lot_of(1), roles=[role]) as station:
+        yield station.equipment[role]
+
+
 def drives(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The amplitudes in V of all bursts of the simulated generator."""
     amplitudes: list[float] = []
@@ -44,11 +55,11 @@ def test_a_loose_reference_cable_is_found_and_does_not_raise_the_drive(
 ) -> None:
     volts = drives(monkeypatch)
     station = station_of("exciter", "scpi_exciter", [FaultOrder(kind="reference_cable_off", at_s=at_s)])
-    with open_station(station, lot_of(1), roles=["exciter"]) as opened:
-        exciter = opened.equipment["exciter"]
+    with open_station(station, lot_of(1), roles=["exciter"]) as one:
+        exciter = one.equipment["exciter"]
         if at_s:  # it comes loose during the level loop
             exciter.sine(160.0, 2.0, 2, 0.1, [0])
-            opened.clock.sleep(max(0.0, 3.0 - opened.clock.now()))
+            one.clock.sleep(max(0.0, 3.0 - one.clock.now()))
         before = len(volts)
         with pytest.raises(OperatorNeeded, match="check the cable of the reference sensor"):
             exciter.sine(160.0, 30.0, 2, 0.1, [0])
@@ -59,16 +70,14 @@ def test_a_loose_reference_cable_is_found_and_does_not_raise_the_drive(
 
 def test_the_drive_rises_tenfold_at_most_and_not_beyond_the_station_file(monkeypatch: pytest.MonkeyPatch) -> None:
     volts = drives(monkeypatch)
-    with open_station(station_of("exciter", "scpi_exciter"), lot_of(1), roles=["exciter"]) as opened:
-        opened.equipment["exciter"].sine(160.0, 30.0, 2, 0.1, [0])
+    with opened("exciter", "scpi_exciter") as exciter:
+        exciter.sine(160.0, 30.0, 2, 0.1, [0])
     rises = [b / a for a, b in pairwise(volts)]
     assert max(rises) <= 10.0 * (1.0 + 1e-9)
     volts.clear()
-    with (
-        open_station(station_of("exciter", "scpi_exciter", amplitude=0.5), lot_of(1), roles=["exciter"]) as opened,
-        pytest.raises(OperatorNeeded, match=r"at most 0\.5 V is allowed"),
-    ):
-        opened.equipment["exciter"].sine(160.0, 30.0, 2, 0.1, [0])
+    refused = pytest.raises(OperatorNeeded, match=r"at most 0\.5 V is allowed")
+    with opened("exciter", "scpi_exciter", amplitude=0.5) as exciter, refused:
+        exciter.sine(160.0, 30.0, 2, 0.1, [0])
     assert max(volts) <= 0.5
 
 
@@ -78,20 +87,15 @@ def test_the_drive_rises_tenfold_at_most_and_not_beyond_the_station_file(monkeyp
     [(8.0, 5.0, "displacement"), (30.0, 31.0, "velocity"), (500.0, 51.0, "acceleration")],
 )
 def test_motion_beyond_the_exciter_is_refused_before_it_moves(profile, frequency, level, text):
-    with open_station(station_of("exciter", profile), lot_of(1), roles=["exciter"]) as opened:
-        exciter = opened.equipment["exciter"]
-        with pytest.raises(OperatorNeeded, match=rf"peak {text} .* at most .* is allowed"):
-            exciter.sine(frequency, level, 2, 0.1, [0])
+    refused = pytest.raises(OperatorNeeded, match=rf"peak {text} .* at most .* is allowed")
+    with opened("exciter", profile) as exciter, refused:
+        exciter.sine(frequency, level, 2, 0.1, [0])
 
 
 def test_the_station_file_narrows_the_motion_of_a_random_profile() -> None:
-    with (
-        open_station(
-            station_of("exciter", "vibration_controller", displacement_mm=0.1), lot_of(1), roles=["exciter"]
-        ) as opened,
-        pytest.raises(OperatorNeeded, match=r"peak displacement .* mm, at most 0\.1 mm"),
-    ):
-        opened.equipment["exciter"].random("mil_std_810_truck_vertical", 1.04, 2, 2.0, [0])
+    refused = pytest.raises(OperatorNeeded, match=r"peak displacement .* mm, at most 0\.1 mm")
+    with opened("exciter", "vibration_controller", displacement_mm=0.1) as exciter, refused:
+        exciter.random("mil_std_810_truck_vertical", 1.04, 2, 2.0, [0])
 
 
 def test_motion_of_a_flat_profile_agrees_with_its_closed_form() -> None:
@@ -105,20 +109,19 @@ def test_motion_of_a_flat_profile_agrees_with_its_closed_form() -> None:
     assert Motion().beyond_sine(1.0, 50.0) == ""
 
 
-@pytest.mark.parametrize(
-    ("role", "profile", "name", "value"),
+@each(
     [
         ("shock_machine", "arm_release_shock", "peak", 100.0),
         ("centrifuge", "acutrol_3000", "rate", 500.0),
         ("step_generator", "scpi_step_generator", "amplitude", 1.0),
-    ],
+    ]
 )
-def test_a_maximum_of_the_station_file_bounds_every_order(role: str, profile: str, name: str, value: float) -> None:
-    with open_station(station_of(role, profile, **{name: value}), lot_of(1), roles=[role]) as opened:
-        values = opened.equipment[role].values
-        values.write(name, value)
+def test_a_maximum_of_the_station_file_bounds_every_order(row: tuple[str, str, str, float]) -> None:
+    role, profile, name, value = row
+    with opened(role, profile, **{name: value}) as device:
+        device.values.write(name, value)
         with pytest.raises(StationRefused, match="is allowed"):
-            values.write(name, 1.01 * value)
+            device.values.write(name, 1.01 * value)
 
 
 def test_a_maximum_of_no_order_is_refused_with_what_looks_like_it() -> None:
@@ -130,16 +133,14 @@ def test_a_maximum_of_no_order_is_refused_with_what_looks_like_it() -> None:
 
 
 def test_a_supply_keeps_below_the_absolute_maximum_of_the_devices() -> None:
-    with open_station(load_station(), lot_of(1), roles=["power_supply"]) as opened:
+    with open_station(load_station(), lot_of(1), roles=["power_supply"]) as station:
         with pytest.raises(StationRefused, match="states no absolute maximum"):
-            opened.equipment["power_supply"].set_voltage(4.5)  # less than half above 3.3 V, more than a fifth
-        opened.equipment["power_supply"].set_voltage(3.9)
-    with open_station(
-        station_of("power_supply", "scpi_supply", voltage=3.6), lot_of(1), roles=["power_supply"]
-    ) as opened:
+            station.equipment["power_supply"].set_voltage(4.5)  # less than half above 3.3 V, more than a fifth
+        station.equipment["power_supply"].set_voltage(3.9)
+    with opened("power_supply", "scpi_supply", voltage=3.6) as supply:
         with pytest.raises(StationRefused, match=r"at most 3\.6 V is allowed"):
-            opened.equipment["power_supply"].set_voltage(3.7)
-        opened.equipment["power_supply"].set_voltage(3.5)
+            supply.set_voltage(3.7)
+        supply.set_voltage(3.5)
 
 
 def test_the_monitor_holds_the_absolute_maximum_while_a_procedure_sets_the_supply() -> None:
