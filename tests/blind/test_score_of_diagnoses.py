@@ -1,6 +1,7 @@
 """Scores follow their definitions."""
 
 import pytest
+from each import each
 from score import score, table, text, wilson
 from truth import Fault, Hidden, Spec, Truth
 
@@ -38,78 +39,61 @@ def document(*groups, scope="sensor", **extra):
     } | extra
 
 
-def test_truth_inside_a_class_with_company_is_exact():
-    got = score(document(("third_order", "odd_quadratic")), truth(hidden("third_order")))
-    assert got.in_class
-    assert got.exact
-    assert got.mean_class_size == 2.0
+CUBIC, SQUARE = hidden("third_order"), hidden("second_order")
+HUMID = truth(hidden("covariate:humidity_pct"), drivers=("humidity_pct",))
+TIDE = truth(hidden("withheld:tide"), drivers=("time_s", "time"))
+KIP = truth(hidden("cross_coupling", visible=False))
+FLIPPED = truth(faults=(Fault("axis_flip", ("U0002",), (), ("axis_flip",)),))
+BLOCKED = {"fault": "axis_flip", "units": ["U0002"], "dwells": [], "evidence": ""}
 
 
-def test_a_second_class_beside_the_truth_is_not_exact():
-    got = score(document(("third_order",), ("aging_linear",)), truth(hidden("third_order")))
-    assert got.in_class
-    assert not got.exact
+def driven(name):
+    return document(unexplained={"driver": name, "shape": "curve"})
 
 
-def test_two_classes_for_one_truth_are_one_too_many():
-    got = score(document(("third_order",), ("odd_quadratic", "third_order")), truth(hidden("third_order")))
-    assert not got.exact
+SCORES = {
+    "truth in a class with company": (
+        document(("third_order", "odd_quadratic")), truth(CUBIC), {"in_class": True, "exact": True, "mean_class_size": 2.0}
+    ),
+    "a second class beside the truth": (
+        document(("third_order",), ("aging_linear",)), truth(CUBIC), {"in_class": True, "exact": False}
+    ),
+    "two classes for one truth": (
+        document(("third_order",), ("odd_quadratic", "third_order")), truth(CUBIC), {"exact": False}
+    ),
+    "two truths share a class": (
+        document(("second_order", "scale_asymmetry")), truth(SQUARE, hidden("scale_asymmetry")), {"exact": True}
+    ),
+    "one of two is missing": (
+        document(("second_order",)), truth(SQUARE, hidden("backlash", "station")), {"exact": False}
+    ),
+    "named in a null run": (document(("step_change",)), truth(), {"named_something": True, "exact": None}),
+    "station called sensor": (
+        document(("level_error", "magnetic")), truth(hidden("level_error", "station")), {"scope_right": False}
+    ),
+    "sensor called station": (document(("second_order",), scope="station"), truth(SQUARE), {"sensor_called_station": True}),
+    "driver as covariate": (document(("covariate:humidity_pct",)), HUMID, {"driver_right": True}),
+    "driver as unexplained": (driven("humidity_pct"), HUMID, {"driver_right": True}),
+    "another driver": (driven("fan_rpm"), HUMID, {"driver_right": False}),
+    "withheld": (driven("time_s"), TIDE, {"none_of_catalogue": True, "driver_right": True}),
+    "withheld but named": (document(("aging_log",)), TIDE, {"none_of_catalogue": False}),
+    "invisible": (
+        document(unseen=["cross_coupling"]), KIP, {"invisible_listed": True, "invisible_named": False, "in_class": None}
+    ),
+    "fault blocked": (
+        document(blocked_by=[BLOCKED]), FLIPPED, {"fault_caught": True, "fault_named": True, "false_fault": False}
+    ),
+    "fault of another unit": (document(blocked_by=[BLOCKED | {"units": ["U0003"]}]), FLIPPED, {"false_fault": True}),
+    "fault missed": (document(), FLIPPED, {"fault_caught": False}),
+    "fault where none is": (document(blocked_by=[BLOCKED]), truth(), {"false_fault": True}),
+}  # fmt: skip
 
 
-def test_two_truths_may_share_one_class():
-    got = score(document(("second_order", "scale_asymmetry")), truth(hidden("second_order"), hidden("scale_asymmetry")))
-    assert got.exact
-
-
-def test_missing_one_of_two_is_not_exact():
-    assert not score(document(("second_order",)), truth(hidden("second_order"), hidden("backlash", "station"))).exact
-
-
-def test_anything_named_in_a_null_run_counts():
-    got = score(document(("step_change",)), truth())
-    assert got.named_something
-    assert got.exact is None
-
-
-def test_station_effect_called_sensor_is_wrong():
-    got = score(document(("level_error", "magnetic")), truth(hidden("level_error", "station")))
-    assert got.scope_right is False
-    assert score(document(("second_order",), scope="station"), truth(hidden("second_order"))).sensor_called_station
-
-
-def test_driver_counts_as_covariate_or_as_unexplained():
-    humid = truth(hidden("covariate:humidity_pct"), drivers=("humidity_pct",))
-    assert score(document(("covariate:humidity_pct",)), humid).driver_right
-    assert score(document(unexplained={"driver": "humidity_pct", "shape": "curve"}), humid).driver_right
-    assert not score(document(unexplained={"driver": "fan_rpm", "shape": "curve"}), humid).driver_right
-
-
-def test_withheld_effect_wants_no_name_and_the_driver():
-    tide = truth(hidden("withheld:tide"), drivers=("time_s", "time"))
-    got = score(document(unexplained={"driver": "time_s", "shape": "curve"}), tide)
-    assert got.none_of_catalogue
-    assert got.driver_right
-    assert not score(document(("aging_log",)), tide).none_of_catalogue
-
-
-def test_invisible_effect_is_listed_and_not_named():
-    kip = truth(hidden("cross_coupling", visible=False))
-    got = score(document(unseen=["cross_coupling"]), kip)
-    assert got.invisible_listed
-    assert not got.invisible_named
-    assert got.in_class is None
-
-
-def test_fault_must_block_its_unit_and_no_other():
-    flipped = truth(faults=(Fault("axis_flip", ("U0002",), (), ("axis_flip",)),))
-    right = {"fault": "axis_flip", "units": ["U0002"], "dwells": [], "evidence": ""}
-    got = score(document(blocked_by=[right]), flipped)
-    assert got.fault_caught
-    assert got.fault_named
-    assert not got.false_fault
-    assert score(document(blocked_by=[right | {"units": ["U0003"]}]), flipped).false_fault
-    assert not score(document(), flipped).fault_caught
-    assert score(document(blocked_by=[right]), truth()).false_fault
+@each(SCORES)
+def test_scores_follow_their_definitions(name):
+    said, true, expected = SCORES[name]
+    got = score(said, true).row()
+    assert {key: got[key] for key in expected} == expected
 
 
 @pytest.mark.parametrize(("hits", "count", "low", "high"), [(0, 10, 0.0, 0.2775), (81, 263, 0.2553, 0.3662)])

@@ -87,6 +87,70 @@ def late_and_with_gaps(dwells: pd.DataFrame) -> pd.DataFrame:
     return dwells.drop(index=dwells.index[(dwells["unit"] == "W003") & dwells["dwell"].isin([5, 6, 40])])
 
 
+def jumping(dwell: int, seed: int, size_ug: float = 300.0) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    """The bias is another from a dwell on, in every axis of every unit."""
+
+    def change(dwells: pd.DataFrame) -> pd.DataFrame:
+        rng = np.random.default_rng(seed)
+        for unit in range(dwells["unit"].nunique()):
+            for axis in "xyz":
+                raised(dwells, unit, axis, 1e-6 * size_ug * rng.uniform(0.7, 1.3), dwell)
+        return dwells
+
+    return change
+
+
+def jumping_and_turned(dwells: pd.DataFrame) -> pd.DataFrame:
+    """At the jump the table stands 0.5° off about its inner axis: every unit feels the same other force."""
+    dwells = jumping(72, 2)(dwells)
+    here, turn = dwells["dwell"] == 72, np.radians(0.5)
+    outer, inner = np.radians(dwells.loc[here, "outer_deg"]), np.radians(dwells.loc[here, "inner_deg"])
+    dwells.loc[here, "out_x"] += np.sin(outer) * (np.sin(inner + turn) - np.sin(inner))
+    dwells.loc[here, "out_y"] += np.sin(outer) * (np.cos(inner + turn) - np.cos(inner))
+    return dwells
+
+
+def last_unit_amplifies(dwells: pd.DataFrame) -> pd.DataFrame:
+    """The last unit reads 500 ppm more from the dwell half-way on."""
+    later = (dwells["unit"] == dwells["unit"].max()) & (dwells["dwell"] >= 36)
+    dwells.loc[later, ["out_x", "out_y", "out_z"]] *= 1.0 + 500e-6
+    return dwells
+
+
+def gain_step_is_certain(document: dict, made: Made) -> bool:
+    (group,) = document["classes"]
+    alone = group["effects"] == ["gain_step"] and len(made.dwells["unit"].unique()) > 1
+    placed = not alone or group["units"] == [made.dwells["unit"].max()]
+    return placed and group["p_value"] < 1e-10 and group["size_ug"] > 10.0
+
+
+def step_before(dwell: int) -> Check:
+    """The step lies in the gap before a dwell, and nothing else stands beside it."""
+
+    def step_in_its_gap(document: dict, made: Made) -> bool:
+        (group,) = document["classes"]
+        own = made.dwells[made.dwells["unit"] == made.dwells["unit"].iloc[0]].sort_values("dwell")
+        after = own["time_s"] + 0.5 * own["duration_s"] > group["nonlinear"]["instant"]
+        alone = "wrong_pose" not in group["effects"] and document["blocked_by"] == []
+        return alone and own["dwell"][after].iloc[0] == dwell
+
+    return step_in_its_gap
+
+
+def pose_missed_at_the_step(document: dict, _: Made) -> bool:
+    return [g["dwells"] for g in document["classes"] if g["effects"] == ["wrong_pose"]] == [[72]]
+
+
+def no_dwell_is_removed(document: dict, _: Made) -> bool:
+    return document["removed"] is None or document["removed"]["dwells"] == []
+
+
+def left_out_dwells_judge(document: dict, _: Made) -> bool:
+    groups = document["classes"]
+    better = all(g["heldout_after_ug"] < min(g["heldout_before_ug"], 4.0 * g["rms_after_ug"]) for g in groups)
+    return better and len(groups) == 2 and groups[1]["effects"] == ["misalignment_temperature"]
+
+
 def walk_is_known(document: dict, _: Made) -> bool:
     # soaks that only climb hide any hysteresis that is narrower than their steps
     (dark,) = (row for row in document["unseen_in_part"] if row["effect"] == "thermal_hysteresis")

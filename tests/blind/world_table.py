@@ -4,46 +4,17 @@ The generator (`benchmarks/worlds`) shares nothing with the estimator. Rows with
 """
 
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
-from world_changes import (
-    Check,
-    both_faults_stand,
-    carried_by_the_dwell,
-    drifting_scale,
-    from_one_dwell,
-    half_exchanged,
-    in_middle_soak,
-    jump_has_place_and_size,
-    jumps_are_told,
-    last_unit_jumps,
-    late_and_with_gaps,
-    no_reference_step,
-    noise_beside_the_dependence,
-    noise_of_the_lot,
-    not_exchanged,
-    of_the_pose,
-    reason_names_every_unit,
-    small_and_seen,
-    some_unsteady,
-    step_with_hysteresis,
-    tails_are_listed,
-    telegraph,
-    three_soaks_are_said,
-    time_constant_is_right,
-    two_dwells_of_a_pose,
-    unsteady,
-    verdict_is_carried,
-    walk_is_known,
-)
+import world_changes as changes
+from world_row import Case, Row
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
 
-from continued_run import SCENES, Blind
+from continued_run import SCENES
 from noise import Noise
 from physics import OUTSIDE
 from tables import FAULTS, HIDDEN, NOISES, NULLS
@@ -57,41 +28,10 @@ HEAT = CLOCKS | {"unit_C", "chamber_C"}
 LOUD_SLIP = World(units=1, noise=Noise(white=25.0, flicker=30.0), fault="table_slip", amount=0.35)
 
 
-@dataclass(frozen=True)
-class Row:
-    """A world, what is done to its dwells, and what has to be said; None: anything may be.
-
-    first : the first effect of each class, in any order; alone : classes have no other member
-    named : effects that a class contains
-    told : of each fault "names" (a class has its name), "units", "near" (within one dwell), "dwells"
-    physics : whether an effect, and not only errors of data, may be named
-    unexplained : drivers of which one is told; empty: nothing is unexplained
-    """
-
-    world: World | Blind
-    seed: int
-    label: str
-    first: tuple[str, ...] | None = None
-    alone: bool = False
-    named: tuple[str, ...] = ()
-    told: str = ""
-    physics: bool = False
-    adequate: tuple[bool | None, ...] = (True, False, None)
-    recommended: tuple[str, ...] | None = None
-    unexplained: frozenset[str] | None = None
-    blocked: tuple[str, ...] = ()
-    also: Check | None = None
-    change: Callable[[pd.DataFrame], pd.DataFrame] | None = None
-    fast: bool = False
-
-    def __str__(self) -> str:
-        return f"{self.label}-{self.seed}"
-
-
 def rows() -> Iterator[Row]:
     """Every row: first without anything hidden, then faults, then physics."""
     walk = World(units=2, poses=12, hidden=(("third_order", 0.2),), noise=Noise(walk=4.0))
-    yield Row(NULLS["K8"], SEED, "K8", first=(), adequate=(True,), also=walk_is_known, fast=True)
+    yield Row(NULLS["K8"], SEED, "K8", first=(), adequate=(True,), also=changes.walk_is_known, fast=True)
     yield Row(
         walk,
         41_000_007,
@@ -99,15 +39,17 @@ def rows() -> Iterator[Row]:
         named=("third_order",),
         physics=True,
         adequate=(False,),
-        also=small_and_seen,
+        also=changes.small_and_seen,
     )
     for name in sorted(set(NULLS) - {"lsb5", "many_units"}):
         for seed in (SEED + 1, SEED + 2):
             yield Row(NULLS[name], seed, name, first=())
     for seed in (SEED, *range(SEED + 10, SEED + 14)):
-        yield Row(NULLS["t3"], seed, "t3", first=(), also=tails_are_listed if seed == SEED else None)
+        yield Row(NULLS["t3"], seed, "t3", first=(), also=changes.tails_are_listed if seed == SEED else None)
     yield Row(NULLS["lsb5"], SEED, "lsb5", blocked=("quantised",), fast=True)
-    yield Row(replace(NULLS["lsb5"], units=2), SEED, "lsb5 in all", adequate=(None,), also=reason_names_every_unit)
+    yield Row(
+        replace(NULLS["lsb5"], units=2), SEED, "lsb5 in all", adequate=(None,), also=changes.reason_names_every_unit
+    )
     for name in ("telegraph_200s", "telegraph_900s", "telegraph_3000s", "telegraph_two_units"):
         for seed in range(3):
             yield Row(NOISES[name], OWN_NOISE + 60 + seed, name)
@@ -117,13 +59,14 @@ def rows() -> Iterator[Row]:
     yield from rows_of_dwells_and_poses()
     yield from rows_of_handling()
     yield from rows_of_single_axes()
+    yield from rows_of_steps()
     yield from rows_of_physics()
 
 
 def rows_of_dwells_and_poses() -> Iterator[Row]:
     yield Row(
         FAULTS["dwell_0.5mg"], SEED, "dwell_0.5mg", first=("bad_dwell",), alone=True, told="dwells",
-        recommended=(), adequate=(False,), also=carried_by_the_dwell, fast=True,
+        recommended=(), adequate=(False,), also=changes.carried_by_the_dwell, fast=True,
     )  # fmt: skip
     for units in (1, 2):
         for amount in (0.5, 2.0, 5.0):
@@ -133,7 +76,7 @@ def rows_of_dwells_and_poses() -> Iterator[Row]:
             )
     yield Row(
         World(units=1), POSES + 20, "two dwells of a pose", first=("bad_dwell", "bad_dwell"), alone=True,
-        also=of_the_pose, change=two_dwells_of_a_pose,
+        also=changes.of_the_pose, change=changes.two_dwells_of_a_pose,
     )  # fmt: skip
     yield Row(
         FAULTS["pose_2deg"], SEED, "pose_2deg", named=("wrong_pose",), told="dwells",
@@ -160,18 +103,18 @@ def rows_of_handling() -> Iterator[Row]:
     )  # fmt: skip
     yield Row(
         FAULTS["thermometer_0.5K"], SEED, "thermometer_0.5K", named=("soak_thermometer",), physics=True,
-        recommended=(), also=three_soaks_are_said, fast=True,
+        recommended=(), also=changes.three_soaks_are_said, fast=True,
     )  # fmt: skip
     yield Row(
         replace(FAULTS["unsoaked"], units=3), SEED, "unsoaked", named=("device_not_soaked",), recommended=(),
-        also=time_constant_is_right,
+        also=changes.time_constant_is_right,
     )  # fmt: skip
     yield Row(
         replace(FAULTS["unit_unsoaked"], units=3), SEED, "unit_unsoaked", first=("unit_not_soaked",), told="units"
     )
     yield Row(
         replace(FAULTS["dwell_of_moved"], units=4), SEED, "dwell_of_moved", first=("unit_moved", "bad_dwell"),
-        told="units", also=both_faults_stand,
+        told="units", also=changes.both_faults_stand,
     )  # fmt: skip
     for fault, amount, seed, name in (
         ("unit_moved", 0.3, 1, "unit_moved"), ("unit_moved", 0.3, 3, "unit_moved"),
@@ -209,68 +152,114 @@ def rows_of_exchanges() -> Iterator[Row]:
     for name, seed in (*seeds, ("swapped", 3), ("swapped_two_units", 700_002), ("swapped_many_units", 1)):
         yield Row(
             FAULTS[name], SWAPS + seed, name, first=("units_swapped",), alone=True, told="units", recommended=(),
-            unexplained=frozenset(), also=from_one_dwell, fast=(name, seed) == ("swapped_two_units", 1),
+            unexplained=frozenset(), also=changes.from_one_dwell, fast=(name, seed) == ("swapped_two_units", 1),
         )  # fmt: skip
-    yield Row(FAULTS["swapped"], SWAPS + 5, "swapped back", physics=True, also=noise_of_the_lot)
+    yield Row(FAULTS["swapped"], SWAPS + 5, "swapped back", physics=True, also=changes.noise_of_the_lot)
     world = World(differ=0.4, fault="units_swapped")
     yield Row(
         world, SWAPS + 112, "swapped apart", first=("units_swapped",), alone=True, told="units", physics=True,
         also=lambda document, _: document["blocked_by"] == [],
     )  # fmt: skip
     world = World(units=4, differ=0.2)
-    yield Row(world, SWAPS + 30, "half exchanged", physics=True, also=not_exchanged, change=half_exchanged)
+    yield Row(
+        world, SWAPS + 30, "half exchanged", physics=True, also=changes.not_exchanged, change=changes.half_exchanged
+    )
 
 
 def rows_of_single_axes() -> Iterator[Row]:
     for units in (1, 4):
         yield Row(
             World(units=units), OWN_NOISE + 80, f"jump of one of {units}", named=("bias_jump",),
-            also=jump_has_place_and_size, change=last_unit_jumps, fast=units == 1,
+            also=changes.jump_has_place_and_size, change=changes.last_unit_jumps, fast=units == 1,
         )  # fmt: skip
-    middle = in_middle_soak((3, "x", 600e-6))
-    yield Row(World(units=6), OWN_NOISE + 90, "another bias in one soak", also=some_unsteady, change=middle)
+    middle = changes.in_middle_soak((3, "x", 600e-6))
+    yield Row(World(units=6), OWN_NOISE + 90, "another bias in one soak", also=changes.some_unsteady, change=middle)
     for rate in (1800.0, 4000.0):
         yield Row(
             World(units=6, noise=Noise(flicker=10.0)), OWN_NOISE + 95, f"scale drifts, {rate:g} s", adequate=(False,),
-            physics=True, unexplained=CLOCKS, also=no_reference_step, change=drifting_scale(rate),
+            physics=True, unexplained=CLOCKS, also=changes.no_reference_step, change=changes.drifting_scale(rate),
         )  # fmt: skip
     for axes in ((((1, "y"), (5, "y"))), ((0, "x"), (3, "z"), (6, "y"))):
         yield Row(
-            World(), JUMPS + 1, f"{len(axes)} unsteady axes", also=unsteady(*(f"W{unit + 1:03d}" for unit, _ in axes)),
-            change=in_middle_soak(*((unit, axis, 500e-6) for unit, axis in axes)),
+            World(), JUMPS + 1, f"{len(axes)} unsteady axes",
+            also=changes.unsteady(*(f"W{unit + 1:03d}" for unit, _ in axes)),
+            change=changes.in_middle_soak(*((unit, axis, 500e-6) for unit, axis in axes)),
         )  # fmt: skip
-    yield Row(World(units=1), JUMPS + 2, "up and down", also=jumps_are_told, change=telegraph)
+    yield Row(World(units=1), JUMPS + 2, "up and down", also=changes.jumps_are_told, change=changes.telegraph)
     sizes = np.random.default_rng(3).uniform(0.7, 1.3, (8, 3))
     for label, chosen in (
         ("y of all", [(unit, 1) for unit in range(8)]),
         ("all of one", [(4, axis) for axis in range(3)]),
     ):
-        change = in_middle_soak(*((unit, "xyz"[axis], 900e-6 * float(sizes[unit, axis])) for unit, axis in chosen))
+        change = changes.in_middle_soak(
+            *((unit, "xyz"[axis], 900e-6 * float(sizes[unit, axis])) for unit, axis in chosen)
+        )
         yield Row(
             World(), JUMPS + 3, f"curve, {label}", named=("bias_temperature_quadratic",), physics=True, change=change
         )
 
 
+def rows_of_steps() -> Iterator[Row]:
+    """A bias that jumps between two dwells of a long run is placed in the right gap, and leaves no dwell to another cause."""
+    noise = Noise(white=25.0, flicker=30.0)
+    world = World(units=4, poses=48, noise=noise)
+    for dwell in (72, 79):
+        yield Row(
+            world, OWN_NOISE + 2, f"step before {dwell}", first=("step_change",), physics=True, also=changes.step_before(dwell),
+            change=changes.jumping(dwell, 2), fast=dwell == 79,
+        )  # fmt: skip
+    yield Row(
+        world, OWN_NOISE + 2, "pose missed after a step", named=("step_change",), physics=True,
+        also=changes.pose_missed_at_the_step, change=changes.jumping_and_turned, fast=True,
+    )  # fmt: skip
+    for dwell, seed in ((37, 4), (37, 5), (44, 3), (44, 4), (44, 5)):
+        # without the dwells before it every instant between their neighbours is as good: it had stood there and kept them bad
+        yield Row(
+            World(units=1, noise=noise), OWN_NOISE + seed, f"step of one unit before {dwell}", first=("step_change",),
+            physics=True, also=changes.no_dwell_is_removed, change=changes.jumping(dwell, seed, 600.0),
+            fast=(dwell, seed) == (44, 3),
+        )  # fmt: skip
+    for units in (1, 2):
+        for seed in (3, 4, 7):
+            yield Row(
+                World(units=units, noise=noise), 5_700_000 + seed, f"gain step of one of {units}", named=("gain_step",),
+                physics=True, also=changes.gain_step_is_certain, change=changes.last_unit_amplifies, fast=(units, seed) == (2, 3),
+            )  # fmt: skip
+
+
 def rows_of_physics() -> Iterator[Row]:
     world = World(units=4, poses=6, soaks=(25.0, 60.0, -10.0, 20.0), hidden=(("thermal_hysteresis", 4.0),))
-    yield Row(world, SEED, "hysteresis", physics=True, also=step_with_hysteresis)
+    yield Row(world, SEED, "hysteresis", physics=True, also=changes.step_with_hysteresis)
     for scene in ("creep on faces", "creep on faces, shuffled"):
         # the table turned before the first dwell: the state of the creep there is unknown, and looks like a warm-up of
         # seconds; its way from face to face leads through other directions, which looks like a product of two forces
         yield Row(
-            SCENES[scene],
-            SEED,
-            scene,
-            first=("creep_after_move",),
-            alone=True,
-            physics=True,
-            unexplained=frozenset(),
+            SCENES[scene], SEED, scene, first=("creep_after_move",), alone=True, physics=True, unexplained=frozenset()
         )
     yield Row(
         HIDDEN["adc_nonlinearity_5"], SEED, "adc_nonlinearity_5", first=("adc_nonlinearity",), alone=True, physics=True
     )
     world = World(units=4, hidden=(("third_order", 2.0),))
-    yield Row(world, SEED, "cubic", physics=True, recommended=("third_order",), also=verdict_is_carried, fast=True)
+    yield Row(
+        world, SEED, "cubic", physics=True, recommended=("third_order",), also=changes.verdict_is_carried, fast=True
+    )
+    # a humidity that wanders slowly, with an effect that saturates: a curve of time follows it nearly as well
+    for index in (0, 2):
+        yield Row(
+            Case("covariate_curve", index),
+            8080,
+            "humidity",
+            physics=True,
+            unexplained=frozenset({"humidity_pct"}),
+            fast=index == 0,
+        )
+    # each unit and axis is pushed by its own amount: the mean of the lot looks like two wrong angles
+    yield Row(Case("withheld", 4), 8080, "brownout", first=(), unexplained=frozenset({"supply_V"}))
+    for name in ("misalignment_and_moved", "misalignment_and_slip"):
+        yield Row(
+            HIDDEN[name], SEED, name, named=("misalignment_temperature",), told="names", physics=True,
+            recommended=("misalignment_temperature",), also=changes.left_out_dwells_judge, fast=name == "misalignment_and_slip",
+        )  # fmt: skip
     world = World(units=3, hidden=(("cross_coupling", 2.0),))
     yield Row(
         world,
@@ -279,12 +268,12 @@ def rows_of_physics() -> Iterator[Row]:
         first=("cross_coupling",),
         alone=True,
         physics=True,
-        change=late_and_with_gaps,
+        change=changes.late_and_with_gaps,
     )
     for name in OUTSIDE:
         yield Row(
             World(hidden=((name, 2.0),)), POSES + 1, f"outside {name}", adequate=(False,), unexplained=HEAT,
-            also=noise_beside_the_dependence, fast=name == "fixture_bends",
+            also=changes.noise_beside_the_dependence, fast=name == "fixture_bends",
         )  # fmt: skip
     for name in ("fixture_bends", "axes_bend_with_heat", "cubic_with_heat"):
         # axes and transfer curves that follow the temperature show in no bias; an excess of them had counted as noise

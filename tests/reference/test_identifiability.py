@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from posed import posed
 
-from inertial import effects, frames, poses
+from inertial import effects, poses
 from inertial.planning import visibility
 from inertial.state import State
 
@@ -35,14 +36,7 @@ def planned(name):
 
 def state_of(degrees):
     """Dwells in poses of these angles, 30 s apart at 25 °C."""
-    angles = np.radians(degrees)
-    return State(
-        force=frames.force_from_angles(angles[:, 0], angles[:, 1]),
-        time=30.0 * np.arange(len(angles)),
-        temperature=np.full(len(angles), 25.0),
-        outer=angles[:, 0],
-        inner=angles[:, 1],
-    )
+    return posed(degrees, 30.0, temperature=np.full(len(degrees), 25.0))
 
 
 def monomials(force, degree):
@@ -139,29 +133,25 @@ def left(state, base, column, axis=0):
     return np.linalg.norm(column - span @ (span.T @ column)) / np.linalg.norm(column)
 
 
+def ageing_of(state):
+    """What a plan sees of ageing, and of the ageing of the scale."""
+    return visibility.visibilities(state, THERMAL, 1e-5, ["aging_linear", "scale_aging"])
+
+
 def test_monotone_soaks_hide_ageing_as_far_as_published():
-    sight = {
-        s.effect: s for s in visibility.visibilities(soaks(RISING), THERMAL, 1e-5, ["aging_linear", "scale_aging"])
-    }
-    assert sight["aging_linear"].remaining_fraction == pytest.approx(0.021, abs=0.001)
-    assert sight["scale_aging"].remaining_fraction == pytest.approx(0.005, abs=0.0005)
+    ageing, scale_ageing = (sight.remaining_fraction for sight in ageing_of(soaks(RISING)))
+    assert ageing == pytest.approx(0.021, abs=0.001)
+    assert scale_ageing == pytest.approx(0.005, abs=0.0005)
 
 
 def test_soaks_up_and_down_show_all_of_ageing():
-    sight = {
-        s.effect: s for s in visibility.visibilities(soaks(CLOSED), THERMAL, 1e-5, ["aging_linear", "scale_aging"])
-    }
-    for one in sight.values():
+    for one in ageing_of(soaks(CLOSED)):
         assert one.by_axis == pytest.approx([1.0, 1.0, 1.0], abs=0.005)
 
 
 def test_shuffled_soaks_show_most_of_ageing(rng):
-    parts = []
-    for _ in range(60):
-        visibilities = visibility.visibilities(
-            soaks(rng.permutation(CLOSED)), THERMAL, 1e-5, ["aging_linear", "scale_aging"]
-        )
-        parts.append([s.remaining_fraction for s in visibilities])
+    orders = [rng.permutation(CLOSED) for _ in range(60)]
+    parts = [[sight.remaining_fraction for sight in ageing_of(soaks(order))] for order in orders]
     ageing, scale_ageing = np.mean(parts, axis=0)
     assert ageing == pytest.approx(0.93, abs=0.05)
     assert 0.86 - 0.03 < scale_ageing < 1.0
@@ -184,9 +174,8 @@ def test_the_catalogues_hysteresis_is_no_information_on_a_one_way_soak():
         state = soaks(heat)
         effect = effects.get("thermal_hysteresis")
         column, start = effect.columns(state, 0, **narrow)[:, :1], effect.start_columns(state, 0, **narrow)
-        span = np.linalg.svd(np.concatenate([np.ones((len(state.time), 1)), state.force], axis=1), full_matrices=False)[
-            0
-        ]
+        plain = np.concatenate([np.ones((len(state.time), 1)), state.force], axis=1)
+        span = np.linalg.svd(plain, full_matrices=False)[0]
         rest = visibility._after(span[None], column[None], start[None])
         assert low <= np.linalg.norm(rest) / np.linalg.norm(column) <= high
 

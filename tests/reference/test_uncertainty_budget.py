@@ -10,9 +10,9 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 from independent_budget import PRODUCTION, columns, draws, fitted, nominal_force, outputs
+from posed import posed
 
 from inertial import design, poses
-from inertial.frames import force_from_angles
 from inertial.state import State
 from inertial.uncertainty.degrees import coverage_factor, effective_degrees
 from inertial.uncertainty.influences import (
@@ -34,11 +34,7 @@ from inertial.uncertainty.period import (
     walk_later,
 )
 from inertial.uncertainty.propagation import fit_design, norm_errors, propagated
-from inertial.uncertainty.risk import (
-    guard_factor,
-    lot_risk,
-    outside,
-)
+from inertial.uncertainty.risk import guard_factor, lot_risk, outside
 from inertial.uncertainty.rounding import rounded
 from schemas.uncertainty import formula_gravity
 
@@ -49,15 +45,8 @@ VERIFICATION = [[35.0, 15.0], [70.0, 140.0], [105.0, -100.0], [140.0, 60.0], [55
 
 
 def state_of(angles: np.ndarray, temperatures: tuple[float, ...]) -> State:
-    outer, inner = np.radians(np.tile(angles, (len(temperatures), 1))).T
     read = np.repeat(np.array(temperatures), len(angles))
-    return State(
-        force=force_from_angles(outer, inner),
-        time=30.0 * np.arange(outer.size),
-        temperature=read,
-        outer=outer,
-        inner=inner,
-    )
+    return posed(np.tile(angles, (len(temperatures), 1)), 30.0, temperature=read)
 
 
 def model_of(effects: tuple[str, ...]) -> MeasurementModel:
@@ -87,18 +76,14 @@ def station(state: State, s: dict[str, float]) -> tuple[list[InputQuantity], lis
     ]
     for order in (1, 2):
         for phase in ("sin", "cos"):
-            quantities.append(
-                InputQuantity("harmonics", Errors(outer=harmonic(state.outer, order, phase)), s["harmonics"])
-            )
-            quantities.append(
-                InputQuantity("harmonics", Errors(inner=harmonic(state.inner, order, phase)), s["harmonics"])
-            )
+            for name, angle in (("outer", state.outer), ("inner", state.inner)):
+                wave = Errors(**{name: harmonic(angle, order, phase)})
+                quantities.append(InputQuantity("harmonics", wave, s["harmonics"]))
     quantities += [InputQuantity("seat", Errors(seat=unit(k)), s["seat"], "mount") for k in range(3)]
     quantities += [InputQuantity("reader", Errors(offset=unit(k)), s["reader"], "slot") for k in range(3)]
     for one in np.unique(state.temperature):
-        quantities.append(
-            InputQuantity("soak", Errors(temperature=(state.temperature == one).astype(float)), s["soak"], "soak")
-        )
+        here = (state.temperature == one).astype(float)
+        quantities.append(InputQuantity("soak", Errors(temperature=here), s["soak"], "soak"))
     return quantities, [Scattered("pose", s["pose"], s["pose"])]
 
 
@@ -119,29 +104,16 @@ def combined(errors: np.ndarray) -> np.ndarray:
 
 def output(influences, effects, force, temperature) -> np.ndarray:
     """u of the corrected output (3,), µg."""
-    at = State(
-        force=np.array([force]),
-        time=np.zeros(1),
-        temperature=np.array([temperature]),
-        outer=np.zeros(1),
-        inner=np.zeros(1),
-    )
+    nothing = np.zeros(1)
+    at = State(np.array([force]), nothing, temperature=np.array([temperature]), outer=nothing, inner=nothing)
     return combined(influences.output_errors(design.local_columns(design.split(effects)[0], at, {}))[0])
 
 
 WHOLE = {  # bias x, y, z µg; scale ppm; Kxy, Kxz, Kyz, Kyx, Kzx, Kzy µrad
     "six": ([42.459, 31.754, 90.108], [128.841] * 3, [522.351, 503.587, 516.188, 522.351, 501.248, 501.248]),
-    "twelve": (
-        [27.170, 27.170, 101.045],
-        [133.838, 133.838, 138.969],
-        [524.476, 500.104, 500.104, 524.476, 500.156, 500.156],
-    ),
-    "fib": (
-        [26.135, 26.469, 99.170],
-        [132.388, 132.259, 135.399],
-        [523.586, 500.181, 500.118, 524.020, 500.084, 500.085],
-    ),
-}
+    "twelve": ([27.170, 27.170, 101.045], [133.838, 133.838, 138.969], [524.476, 500.104, 500.104, 524.476, 500.156, 500.156]),
+    "fib": ([26.135, 26.469, 99.170], [132.388, 132.259, 135.399], [523.586, 500.181, 500.118, 524.020, 500.084, 500.085]),
+}  # fmt: skip
 OUTPUTS = {
     "six": [((0, 0, 1), 25.0, 2, 165.890)],
     "twelve": [((1, 0, 0), 60.0, 0, 159.066), ((0, 0, 1), 25.0, 2, 179.785)],
@@ -227,8 +199,10 @@ def test_the_visible_shares() -> None:
     by_name = {}
     for name, share in zip(influences.source.contributions, shares, strict=True):
         by_name.setdefault(name, []).append(float(share))
-    for name in ("gravity", "thermometer_offset", "thermometer_slope", "supply", "gain"):
-        assert max(by_name[name]) < 1e-6
+    assert (
+        max(max(by_name[name]) for name in ("gravity", "thermometer_offset", "thermometer_slope", "supply", "gain"))
+        < 1e-6
+    )
     assert by_name["inner_offset"][0] == pytest.approx(0.006, abs=0.001)
     assert by_name["level"] == pytest.approx([0.26, 0.61], abs=0.01)
     assert by_name["orthogonality"][0] == pytest.approx(0.995, abs=0.001)
@@ -290,12 +264,9 @@ def test_a_monte_carlo_of_an_independent_station_agrees_to_5_percent(plan: str, 
     for trial in range(trials):
         out = outputs(outer, inner, read, soak, draws(rng, PRODUCTION, len(temperatures), outer.size))
         got[trial] = [maps[axis] @ out[:, axis] for axis in range(3)]
-    quiet = {
-        name: 0.0 * np.asarray(value) for name, value in draws(rng, PRODUCTION, len(temperatures), outer.size).items()
-    }
-    np.testing.assert_allclose(
-        fitted(force, read, outputs(outer, inner, read, soak, quiet), temperature=warm), got.mean(axis=0), atol=5e-5
-    )
+    drawn = draws(rng, PRODUCTION, len(temperatures), outer.size)
+    quiet = outputs(outer, inner, read, soak, {name: 0.0 * np.asarray(value) for name, value in drawn.items()})
+    np.testing.assert_allclose(fitted(force, read, quiet, temperature=warm), got.mean(axis=0), atol=5e-5)
     ratio = np.std(got, axis=0, ddof=1) / np.sqrt(np.sum(influences.coefficients**2, axis=-1))
     assert np.max(np.abs(ratio - 1.0)) < 0.05
     own = influences.covariance()
@@ -336,10 +307,8 @@ def process_for(share: float) -> float:
 def test_suncals_risks_by_share_in_tolerance_and_ratio() -> None:
     risk = lot_risk(0.0, process_for(0.95), 0.125, 0.0, (-1.0, 1.0), (-1.0, 1.0))
     assert (risk.pfa, risk.pfr) == pytest.approx((0.00858266, 0.01553651), abs=6e-9)
-    for ratio, expected in (
-        (1.0, (0.044473, 0.032509, 0.018012, 0.004064)),
-        (2.0, (0.029522, 0.022638, 0.013373, 0.003312)),
-    ):
+    table = {1.0: (0.044473, 0.032509, 0.018012, 0.004064), 2.0: (0.029522, 0.022638, 0.013373, 0.003312)}
+    for ratio, expected in table.items():
         for share, pfa in zip((0.85, 0.90, 0.95, 0.99), expected, strict=True):
             got = lot_risk(0.0, process_for(share), 0.5 / ratio, 0.0, (-1.0, 1.0), (-1.0, 1.0)).pfa
             assert got == pytest.approx(pfa, abs=6e-7)
@@ -347,35 +316,17 @@ def test_suncals_risks_by_share_in_tolerance_and_ratio() -> None:
 
 @pytest.mark.parametrize(
     ("ratio", "share", "limit"),
-    [
-        (1.0, 0.85, 0.686236),
-        (1.0, 0.90, 0.792397),
-        (1.5, 0.85, 0.847477),
-        (2.0, 0.90, 0.973153),
-        (3.0, 0.85, 0.987788),
-    ],
+    [(1.0, 0.85, 0.686236), (1.0, 0.90, 0.792397), (1.5, 0.85, 0.847477), (2.0, 0.90, 0.973153), (3.0, 0.85, 0.987788)],
 )
 def test_acceptance_limits_for_two_percent(ratio: float, share: float, limit: float) -> None:
     risk = lot_risk(0.0, process_for(share), 0.5 / ratio, 0.0, (-1.0, 1.0), (-limit, limit))
     assert risk.pfa == pytest.approx(0.02, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("value", "u", "limit", "risk"),
-    [
-        (485, 275, 1000, 0.030553),
-        (160, 25, 200, 0.054799),
-        (0, 99, 50, 0.613523),
-        (42, 99, 50, 0.644166),
-        (1.0, 0.1, 1.0, 0.5),
-        (0.8, 0.1, 1.0, 0.022750),
-    ],
-)
-def test_specific_risks(value: float, u: float, limit: float, risk: float) -> None:
-    assert outside(value, u, -limit, limit) == pytest.approx(risk, abs=6e-7)
-
-
-def test_the_guard_band_of_two_percent() -> None:
+def test_specific_risks_and_the_guard_band_of_two_percent() -> None:
+    rows = ((485, 275, 1000), (160, 25, 200), (0, 99, 50), (42, 99, 50), (1.0, 0.1, 1.0), (0.8, 0.1, 1.0))
+    risks = [outside(value, u, -limit, limit) for value, u, limit in rows]
+    assert risks == pytest.approx([0.030553, 0.054799, 0.613523, 0.644166, 0.5, 0.022750], abs=6e-7)
     assert guard_factor(0.02) == pytest.approx(2.053749, abs=1e-6)
 
 

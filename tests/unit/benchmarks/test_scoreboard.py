@@ -1,0 +1,37 @@
+"""The comparison of two checkouts by their outcomes on the same cases."""
+
+from benchmarks.scoreboard.__main__ import rows
+from benchmarks.scoreboard.beds import Bed
+
+
+def outcomes(name: str, *hits: bool) -> dict[tuple[str, ...], dict[str, bool]]:
+    return {("worlds", "hidden", "w", str(k)): {name: hit} for k, hit in enumerate(hits)}
+
+
+def test_a_row_is_worse_or_better_by_more_cases_than_chance_would_change() -> None:
+    for name, before, after, verdict in (
+        ("exact", [*[False] * 12, True], [True] * 13, ("WORSE", 0, 12)),
+        ("physics named", [False] * 12, [True] * 12, ("BETTER", 12, 0)),
+    ):
+        (row,), worse = rows(outcomes(name, *before), outcomes(name, *after))
+        assert worse == (verdict[0] == "WORSE")
+        assert (row["verdict"], row["better"], row["worse"]) == verdict
+
+
+def test_a_few_cases_that_changed_are_no_verdict_and_a_missing_one_is_not_compared() -> None:
+    ((row,), worse) = rows(outcomes("exact", False, True, False), outcomes("exact", True, True))
+    assert not worse
+    assert (row["verdict"], row["n"], row["other n"], row["p"]) == ("", 3, 2, 1.0)
+
+
+def test_a_wrong_effect_that_is_confirmed_counts_against() -> None:
+    table, _ = rows(outcomes("wrong fresh: warm_up", True), None)
+    assert table[0]["rarer is better"]
+    assert (table[0]["hits"], table[0]["n"]) == (1, 1)
+
+
+def test_the_seeds_of_two_names_are_apart() -> None:
+    bed = Bed("worlds", "hidden", ("a", "b"), 8)
+    seeds = {name: {seed for _, each, seed in bed.cases(3, 1.0) if each == name} for name in bed.names}
+    assert not seeds["a"] & seeds["b"]
+    assert [len(list(bed.cases(3, share))) for share in (1.0, 0.5, 0.0)] == [16, 8, 2]

@@ -1,0 +1,64 @@
+"""The curves that physics which the catalogue lacks is compared with."""
+
+import numpy as np
+import pytest
+from each import each
+from made_worlds import BASE, World, make, run_of
+
+from inertial import effects
+from inertial.criticism.curves import fit_curve
+from inertial.criticism.drivers import across, curve, forces_along, transfer
+from inertial.criticism.examination import ExaminedRun
+from inertial.criticism.wide_suspects import wide_suspects
+from inertial.estimation.comparison import estimate
+from inertial.estimation.term import Term
+from pipelines.tables.dwells import lot_of, measured
+
+SEED = 6_400_000
+
+
+def test_a_curve_across_the_axes_has_the_shape_of_the_truth() -> None:
+    world = World(hidden=(("axes_warm_up", 20.0),))
+    run = run_of(world, SEED + 40)
+    model = run.model()
+    time = run.lot.state.time
+    suspect = next(s for s in wide_suspects(model.problem) if s.driver == "time_s" and s.ways == 2)
+    fit = fit_curve(model, suspect.driver, suspect.candidate, suspect.ways)
+    # two sizes for each block; of the shape's columns those that the times of the soaks part
+    assert 2 <= fit.rank - 2 * model.problem.blocks + 1 <= curve(time, 6).shape[-1]
+    bias_only = fit_curve(model, "time_s", next(s for s in wide_suspects(model.problem) if s.ways == 1).candidate)
+    assert fit.cost < bias_only.cost - 1000.0
+    # with the truth itself as the only column the cost is the same, within the price of the shape
+    course = np.exp(-time / 1500.0)[..., None]
+    exact = model.with_curves(across(forces_along(model.problem), course))
+    assert fit.model.space.rss == pytest.approx(exact.space.rss, rel=0.1)
+
+
+def test_columns_across_the_axes_are_products_of_forces() -> None:
+    problem = run_of(World(units=2), SEED + 50).model().problem
+    state = problem.lot.state
+    values = np.broadcast_to(state.time, (2, problem.n))
+    columns = across(forces_along(problem), values[..., None])
+    for unit in range(2):
+        for axis in range(3):
+            block = columns[3 * unit + axis]
+            for way in (1, 2):
+                other = state.along((axis + way) % 3)
+                expected = values[unit] * np.broadcast_to(other, (2, problem.n))[unit]
+                np.testing.assert_allclose(block[:, way - 1], expected, rtol=1e-12)
+    own = transfer(forces_along(problem), values, 4)
+    assert own.shape[:2] == (problem.blocks, problem.n)
+    middle = 0.5 * (values.min() + values.max())
+    before = np.abs(values - middle) < 1e-9
+    assert not np.any(own.reshape(2, 3, problem.n, -1)[np.repeat(before[:, None], 3, axis=1)])
+
+
+@each([1500.0, 1780.0, 1800.0, 1830.0, 1860.0, 3000.0])
+def test_an_effect_that_died_away_long_ago_leaves_the_range_of_numbers_quietly(shift: float) -> None:
+    made = make(World(units=4), SEED + 80)
+    dwells = made.dwells.assign(since_power_s=made.dwells["since_power_s"] + shift)
+    model = ExaminedRun(lot_of(measured(dwells, made.history), square=False), BASE).model()
+    # its columns are of 1e-140 g and less, the squares of some of them are no numbers; warnings are errors here
+    fit = estimate(model.with_term(Term(effects.get("warm_up"), (("tau", 10.0),))))
+    before = estimate(model)
+    np.testing.assert_allclose(fit.local[:, 1], before.local[:, 1], rtol=1e-5)

@@ -1,0 +1,79 @@
+"""A dwell is named where the tails of the noise that its run allows do not reach it, and listed as left out where they do."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from inertial.data_errors import tails
+from inertial.data_errors.bad_dwells import BadDwell
+from inertial.data_errors.tails import with_tails
+
+GATE = 5.4
+"""Standard deviations from which a dwell of a small lot is left out."""
+
+
+def noise(share: float, dwells: int, rng: np.random.Generator) -> np.ndarray:
+    """Dwells (dwells, 3) of variance one, a share of it t of three degrees of freedom."""
+    heavy = np.sqrt(share / 3.0) * rng.standard_t(3, (dwells, 3))
+    return heavy + np.sqrt(1.0 - share) * rng.standard_normal((dwells, 3))
+
+
+def named(values: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Dwells that are named of those left out by their length."""
+    length = np.linalg.norm(values, axis=1)
+    gone = [int(k) for k in np.argsort(length)[::-1][: max(2, len(values) // 50)] if length[k] > GATE]
+    if not gone:
+        return []
+    monkeypatch.setattr(tails, "deletion_residuals", lambda model: np.delete(values, gone, axis=0).ravel())
+    removed = [BadDwell(0, k, 1e-5 * values[k], np.abs(values[k])) for k in gone]
+    return [d.dwell for d in with_tails(None, removed) if not d.tail]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.35, 1.0])
+@pytest.mark.parametrize("z", [1.0, 3.0, 6.0, 12.0, 30.0])
+def test_tables_agree_with_an_integral_of_the_convolution(share, z):
+    scale, rest = np.sqrt(share / 3.0), np.sqrt(1.0 - share)
+    if share == 1.0:
+        expected = 2.0 * stats.t.sf(z / scale, 3)
+    else:
+        points = np.linspace(-9.0 * rest, 9.0 * rest, 40)
+        expected = 2.0 * sum(
+            integrate.quad(lambda x: stats.norm.pdf(x, scale=rest) * stats.t.sf((z - x) / scale, 3), a, b)[0]
+            for a, b in pairwise(points)
+        )
+    probability = tails._beyond(tails._SHARES.index(share), np.array([z]))[0]
+    # beyond eight standard deviations the normal part is left out, where it adds a few per cent
+    assert probability == pytest.approx(expected, rel=0.002 if z < 8.0 else 0.15)
+
+
+@pytest.mark.parametrize(("share", "dwells"), [(0.35, 72), (0.6, 72), (1.0, 144), (0.6, 576)])
+def test_heavy_tails_are_named_in_few_runs(share, dwells, monkeypatch):
+    rng = np.random.default_rng([7, dwells, int(100 * share)])
+    runs = 80 if dwells < 500 else 30
+    hits = sum(bool(named(noise(share, dwells, rng), monkeypatch)) for _ in range(runs))
+    assert hits <= 0.07 * runs
+
+
+@pytest.mark.parametrize(("dwells", "deviations", "runs"), [(72, 12.0, 40), (576, 12.0, 20), (576, 7.0, 12)])
+def test_a_dwell_far_off_in_normal_noise_is_named(dwells, deviations, runs, monkeypatch):
+    """Of many dwells the noise is known to have no tails: then seven deviations are far."""
+    rng, hits = np.random.default_rng([8, dwells]), 0
+    for _ in range(runs):
+        values, way = noise(0.0, dwells, rng), rng.standard_normal(3)
+        values[5] += deviations * way / np.linalg.norm(way)
+        hits += 5 in named(values, monkeypatch)
+    assert hits >= min(0.95 * runs, runs - 1)
+
+
+def test_two_bad_dwells_do_not_pass_for_the_tails_of_each_other(monkeypatch):
+    values = noise(0.0, 576, np.random.default_rng(9))
+    values[5], values[80] = [20.0, -15.0, 20.0], [0.0, 25.0, -20.0]
+    assert sorted(named(values, monkeypatch)) == [5, 80]
+
+
+def test_one_axis_alone_at_six_deviations_is_left_out_and_not_named(monkeypatch):
+    values = noise(0.0, 72, np.random.default_rng(10))
+    values[5] = [6.3, 0.2, -0.4]
+    assert named(values, monkeypatch) == []

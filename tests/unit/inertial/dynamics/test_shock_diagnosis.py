@@ -1,0 +1,102 @@
+"""Shock: hidden effects, made by scipy, are named in their class; nothing is named without."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from inertial.dynamics.centrifuge_effects import EFFECTS as SPIN_EFFECTS
+from inertial.dynamics.shock_diagnosis import diagnose_shock
+from inertial.dynamics.shock_effects import EFFECTS as SHOCK_EFFECTS
+from inertial.dynamics.shock_fit import Design, ShockRecord, Waves, predicted
+
+FINE = 200e3
+DURATION, RATE, BEFORE, AFTER = 0.011, 40 / 0.011, 0.015, 0.08
+FLOOR = 0.02  # g, of a pulse of 30 g
+
+
+def filtered(wave: np.ndarray, corner: float) -> np.ndarray:
+    b, a = signal.butter(2, corner, fs=FINE)
+    return signal.lfilter(b, a, wave)
+
+
+def shock_of(hidden: str, size: float, rng: np.random.Generator, signs=(1.0, -1.0)) -> ShockRecord:
+    """Shocks whose unit has a hidden effect that is made at 200 kHz, and noise on every sample of the comparison."""
+    shocks = []
+    time = np.arange(round((BEFORE + DURATION + AFTER) * FINE)) / FINE - BEFORE
+    for sign in signs:
+        peak, length = 30.0 * (1.0 + 0.05 * rng.normal()), DURATION * (1.0 + 0.03 * rng.normal())
+        true = np.where((time > 0) & (time < length), sign * peak * np.sin(np.pi * time / length), 0.0)
+        true = filtered(true, 6.0 / DURATION)
+        unit, reference = true.copy(), true.copy()
+        if hidden == "filter_of_unit":
+            unit = filtered(unit, size)
+        elif hidden == "filter_of_reference":
+            reference = filtered(reference, size)
+        elif hidden == "ac_coupled_reference":
+            b, a = signal.butter(1, 1.0 / (2.0 * np.pi * size), btype="high", fs=FINE)
+            reference = signal.lfilter(b, a, reference)
+        elif hidden == "zero_shift":
+            unit = unit + size * (time > 0.5 * length)
+        elif hidden == "third_order":
+            unit = unit + size * unit**3
+        elif hidden == "mounting_resonance":
+            w = 2.0 * np.pi * size
+            system = signal.cont2discrete(([0.06 / w, 1.0], [1.0 / w**2, 0.06 / w, 1.0]), 1.0 / FINE, method="foh")
+            unit = signal.lfilter(system[0].ravel(), system[1], unit)
+        at = np.arange(time[0] + 1e-3, time[-1], 1.0 / RATE)
+        unit, reference = np.interp(at - 120e-6, time, unit), np.interp(at, time, reference)
+        shocks.append(Waves(reference, unit + FLOOR * rng.normal(size=at.size), np.full(at.size, FLOOR)))
+    return ShockRecord(RATE, DURATION, BEFORE - 1e-3, tuple(shocks))
+
+
+HIDDEN = {
+    "filter_of_unit": 350.0, "filter_of_reference": 350.0, "ac_coupled_reference": 2.0, "zero_shift": 0.05,
+    "third_order": 5e-6, "mounting_resonance": 400.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_a_hidden_effect_of_a_shock_is_named_and_a_fresh_shock_is_predicted_better(hidden: str, rng) -> None:
+    diagnosis = diagnose_shock(shock_of(hidden, HIDDEN[hidden], rng))
+    assert diagnosis.adequate is False
+    assert hidden in diagnosis.classes[0].effects
+    assert diagnosis.left_out[1] == pytest.approx(1.0, abs=0.2)
+    assert diagnosis.left_out[0] > 1.04
+    fresh = shock_of(hidden, HIDDEN[hidden], rng)
+    assert predicted(fresh, diagnosis.extended) < predicted(fresh, diagnosis.fit)
+
+
+def test_shocks_in_one_direction_do_not_tell_an_ac_coupled_reference_from_a_zero_shift(rng) -> None:
+    one = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng, signs=(1.0,)))
+    both = diagnose_shock(shock_of("ac_coupled_reference", 2.0, rng))
+    assert {"ac_coupled_reference", "zero_shift"} <= set(one.classes[0].effects)
+    assert any("other direction" in text for text in one.next_steps)
+    assert "ac_coupled_reference" in both.classes[0].effects
+    assert "zero_shift" not in both.classes[0].effects
+    assert both.extended.parameters["coupling_s"][0] == pytest.approx(2.0, rel=0.1)
+
+
+def test_a_design_that_keeps_waveforms_is_that_of_a_new_one(rng) -> None:
+    record, effects = shock_of("filter_of_unit", 350.0, rng), ("delay", "filter_of_unit", "filter_of_reference")
+    parameters = [(name, p) for name in effects for p in SHOCK_EFFECTS[name].parameters(record.duration_s)]
+    kept = Design(record, effects, parameters)
+    start = np.array([1e-4, np.log(300.0), np.log(900.0)])
+    for k in (0, 1, 2, 1, 0, 2):  # one parameter after the other, and back
+        x = start.copy()
+        x[k] += 0.01
+        np.testing.assert_array_equal(kept.at(x), Design(record, effects, parameters).at(x))
+        np.testing.assert_array_equal(kept.at(start), Design(record, effects, parameters).at(start))
+
+
+def test_nothing_is_named_in_shocks_without_a_hidden_effect(rng) -> None:
+    diagnoses = [diagnose_shock(shock_of("none", 0.0, rng)) for _ in range(20)]
+    assert all(one.adequate for one in diagnoses)
+    sensitivity = [(one.fit.sensitivity - 1.0) / one.fit.sensitivity_error for one in diagnoses]
+    assert np.std(sensitivity) < 1.6
+
+
+@pytest.mark.parametrize("known", [SPIN_EFFECTS, SHOCK_EFFECTS])
+def test_every_effect_says_what_it_is(known) -> None:
+    for name, one in known.items():
+        assert one.id == name
+        assert all((type(one).__doc__, one.equation, one.source, one.breaker))

@@ -1,0 +1,74 @@
+"""Six positions, Ferraris and polynomials return what went in, and refuse what cannot be determined."""
+
+import numpy as np
+import pytest
+
+from inertial.errors import NotIdentified
+from inertial.fits.ferraris import faces, ferraris
+from inertial.fits.polynomial import fit_axis_polynomial, fit_temperature_curve
+from inertial.fits.six_position import six_position
+
+K = np.array([[101.0, 0.4, -0.7], [0.0, 99.0, 0.3], [0.0, 0.0, 102.5]])
+BIAS = np.array([3.0, -12.0, 0.5])
+FACES = np.concatenate([np.eye(3), -np.eye(3)])
+
+
+def test_six_positions_return_bias_scale_and_response() -> None:
+    g = 1.0017
+    out = FACES * g @ K.T + BIAS
+    calibration = six_position(out[:3], out[3:], g)
+    np.testing.assert_allclose(calibration.bias, BIAS, atol=1e-12)
+    np.testing.assert_allclose(calibration.response, K, atol=1e-12)
+    np.testing.assert_allclose(calibration.scale_error(100.0), [0.01, -0.01, 0.025], atol=1e-12)
+    np.testing.assert_allclose(calibration.apply(out), FACES * g, atol=1e-12)
+
+
+def test_six_positions_are_found_for_a_batch() -> None:
+    up = np.stack([np.eye(3) @ K.T + BIAS, 2.0 * np.eye(3) @ K.T - BIAS])
+    down = np.stack([-np.eye(3) @ K.T + BIAS, -2.0 * np.eye(3) @ K.T - BIAS])
+    np.testing.assert_allclose(six_position(up, down, 1.0).bias, [BIAS, -BIAS], atol=1e-12)
+
+
+def test_ferraris_and_least_squares_agree_on_perfect_faces() -> None:
+    out = FACES * 9.81 @ K.T + BIAS
+    published, better = ferraris(out[:3], out[3:], 9.81), faces(out[:3], out[3:], 9.81)
+    np.testing.assert_allclose(published.scale @ published.rotation, K, atol=1e-12)
+    np.testing.assert_allclose(better.response, K, atol=1e-12)
+    np.testing.assert_allclose(better.bias, published.bias, atol=1e-12)
+    assert np.all(better.rms < 1e-10)
+
+
+def test_a_second_order_term_shows_as_lack_of_fit_of_the_faces() -> None:
+    out = FACES @ K.T + BIAS + 0.5 * FACES**2
+    assert np.all(faces(out[:3], out[3:], 1.0, np.full(3, 0.01)).p_value < 1e-6)
+
+
+def test_the_axis_polynomial_returns_its_coefficients(rng: np.random.Generator) -> None:
+    out, heat = rng.uniform(-2.0, 2.0, (4, 30, 3)), rng.uniform(0.0, 50.0, (4, 30))
+    c = np.array([0.1, 0.9, -0.02, 0.003])
+    force = sum(c[k] * out**k for k in range(4)) + 1e-3 * (heat - 25.0)[..., None]
+    fit = fit_axis_polynomial(out, force, temperature=heat)
+    np.testing.assert_allclose(fit.coefficients, np.broadcast_to([*c, 1e-3], (4, 3, 5)), atol=1e-10)
+    np.testing.assert_allclose(fit.apply(out, heat), force, atol=1e-10)
+
+
+def test_the_axis_polynomial_refuses_too_few_levels() -> None:
+    out = np.tile(np.array([[-1.0], [0.0], [1.0]]), (4, 3))
+    with pytest.raises(NotIdentified, match="do not determine degree 3"):
+        fit_axis_polynomial(out, out)
+
+
+def test_a_cubic_that_is_true_is_adequate(rng: np.random.Generator) -> None:
+    heat = np.linspace(-20.0, 60.0, 2000)
+    truth = 9.8 + 1e-3 * heat - 2e-6 * heat**2 + 3e-7 * heat**3
+    fit = fit_temperature_curve(truth[:, None] + 0.003 * rng.normal(size=(2000, 3)), heat)
+    assert fit.adequate
+    powers = (heat[:, None] - fit.reference_temperature) ** np.arange(4)
+    np.testing.assert_allclose(powers @ fit.coefficients[0], truth, atol=5e-4)
+
+
+def test_a_rate_term_is_not_adequate(rng: np.random.Generator) -> None:
+    heat = 20.0 + 40.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 2000))
+    rate = np.gradient(heat)
+    output = 1e-3 * heat[:, None] + 0.1 * rate[:, None] + 0.003 * rng.normal(size=(2000, 3))
+    assert not fit_temperature_curve(output, heat).adequate

@@ -1,0 +1,124 @@
+"""A lot whose outputs wander between dwells: the errors of the coefficients are what they say."""
+
+import numpy as np
+import pytest
+from posed import posed
+
+from inertial import poses
+from inertial.errors import NotIdentified
+from inertial.fits.linear import fit_lot
+from inertial.fits.wander import fit_lot_with_wander, lack_of_fit
+from inertial.frames import force_from_angles
+from inertial.noise import generate
+from inertial.noise.dwells import DwellNoise, dwell_covariance
+from inertial.state import State
+
+
+def test_a_misfit_that_is_no_number_is_no_good_fit() -> None:
+    assert np.isnan(lack_of_fit(np.array([np.nan, 5.0]), 5)[0])
+
+
+EFFECTS = ("bias", "scale", "misalignment")
+
+
+def test_a_pattern_of_the_table_hides_no_flicker_of_quiet_units() -> None:
+    """Flicker of 30 µg under an error of the poses of 100 µg that every soak repeats: the bias scatters as is stated."""
+    rng = np.random.default_rng(5)
+    angles = np.radians(rng.uniform(-180.0, 180.0, (24, 2)))
+    force = np.tile(force_from_angles(angles[:, 0], angles[:, 1]), (3, 1))
+    time = 17.0 * np.arange(len(force))
+    root = np.linalg.cholesky(dwell_covariance(time, 10.0, DwellNoise(0.1e-6, 30e-6), since=-5.0))
+    pulls, alone = [], []
+    for _ in range(14):
+        table = np.tile(100e-6 * rng.standard_normal((24, 3)), (3, 1))
+        wander = np.einsum("nm,uma->una", root, rng.standard_normal((6, len(force), 3)))
+        for common, into in ((table, pulls), (0.0, alone)):
+            found = fit_lot_with_wander(
+                EFFECTS, State(force=force, time=time), force + wander + common, np.full((6, len(force), 3), 1e-6)
+            )
+            bias = [names.index(("bias", "K0")) for names in found.fit.names]
+            for axis, place in enumerate(bias):
+                error = found.fit.coefficients[:, axis, place] - found.fit.coefficients[:, axis, place].mean()
+                into.extend((error / np.sqrt(found.fit.covariance[:, axis, place, place] * 5.0 / 6.0)).tolist())
+    assert np.mean(np.abs(alone) < 1.96) == pytest.approx(0.95, abs=0.04)
+    assert np.mean(np.abs(pulls) < 1.96) > 0.9
+
+
+UNITS, DWELLS, WHITE = 60, 48, 1e-5
+ERROR = np.full((UNITS, DWELLS, 3), WHITE)
+
+
+@pytest.fixture
+def plan() -> State:
+    return posed(np.tile(poses.plan("fibonacci24"), (2, 1)), 30.0)
+
+
+def outputs(rng: np.random.Generator, plan: State, flicker: float, walk: float) -> np.ndarray:
+    shape = (UNITS, 3, 40 * DWELLS)  # long before the first dwell: the wander has no beginning
+    wander = generate.flicker(rng, shape, flicker)[..., -DWELLS:]
+    wander = wander + generate.random_walk(rng, (UNITS, 3, DWELLS), walk, 1.0)
+    noise = WHITE * rng.normal(size=(UNITS, DWELLS, 3))
+    return plan.force + np.swapaxes(wander, -1, -2) + noise
+
+
+def test_without_wander_it_is_the_weighted_fit(plan: State, rng: np.random.Generator) -> None:
+    out = outputs(rng, plan, 0.0, 0.0)
+    wander_fit, plain = fit_lot_with_wander(EFFECTS, plan, out, ERROR), fit_lot(EFFECTS, plan, out, ERROR)
+    assert (wander_fit.flicker, wander_fit.walk) == (0.0, 0.0)
+    assert wander_fit.white == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(wander_fit.fit.coefficients, plain.coefficients, atol=1e-12)
+
+
+def test_the_output_may_have_any_unit(plan: State, rng: np.random.Generator) -> None:
+    out = outputs(rng, plan, 1e-4, 0.0)
+    in_g, in_counts = (fit_lot_with_wander(EFFECTS, plan, out * k, ERROR * k).fit for k in (1.0, 256e3))
+    np.testing.assert_allclose(in_counts.coefficients, 256e3 * in_g.coefficients, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(in_counts.standard_errors, 256e3 * in_g.standard_errors, rtol=1e-6)
+    np.testing.assert_allclose(in_counts.residuals, 256e3 * in_g.residuals, rtol=1e-4, atol=1e-4)
+
+
+def test_refuses_a_reading_without_error(plan: State, rng: np.random.Generator) -> None:
+    error = ERROR.copy()
+    error[3, 7, 1] = 0.0
+    with pytest.raises(NotIdentified, match="standard error is zero"):
+        fit_lot_with_wander(EFFECTS, plan, outputs(rng, plan, 0.0, 0.0), error)
+
+
+def test_parameters_of_the_station_are_found_within_their_errors(plan: State, rng: np.random.Generator) -> None:
+    state, tilt = plan, 1e-3
+    lean = force_from_angles(state.outer, state.inner, up=(tilt, 0.0, np.sqrt(1.0 - tilt**2)))
+    out = outputs(rng, plan, 1e-4, 0.0) + (lean - plan.force)
+    fit = fit_lot_with_wander((*EFFECTS, "level_error"), state, out, ERROR).fit
+    plain = fit_lot((*EFFECTS, "level_error"), state, out, ERROR)
+    ours, theirs = np.sqrt(np.diag(fit.shared_covariance)), np.sqrt(np.diag(plain.shared_covariance))
+    assert np.all(np.abs(np.abs(fit.shared[np.argmax(np.abs(fit.shared))]) - tilt) < 5.0 * ours.max())
+    assert np.all(ours > 1.5 * theirs)
+
+
+def test_dwells_left_out_are_predicted_within_their_errors(plan: State, rng: np.random.Generator) -> None:
+    out, used = outputs(rng, plan, 1e-4, 0.0), np.arange(DWELLS) % 4 != 3
+    wander_fit = fit_lot_with_wander(EFFECTS, plan, out, ERROR, used=used)
+    spread = np.sqrt(np.diagonal(wander_fit.predicted, axis1=-2, axis2=-1))
+    assert 0.9 < np.std(np.swapaxes(wander_fit.fit.residuals, -1, -2)[..., ~used] / spread) < 1.1
+    assert 0.9 < np.std((wander_fit.fit.residuals / wander_fit.expected)[:, used]) < 1.1
+    mean = np.swapaxes(wander_fit.fit.residuals, -1, -2)[..., ~used].mean(axis=-1)
+    assert 0.85 < np.std(mean / np.sqrt(wander_fit.predicted.mean(axis=(-1, -2)))) < 1.15
+    alone = fit_lot_with_wander(EFFECTS, plan, np.where(used[:, None], out, 7.0), ERROR, used=used).fit
+    np.testing.assert_allclose(alone.coefficients, wander_fit.fit.coefficients, rtol=1e-9, atol=1e-12)
+
+
+def test_a_unit_that_the_model_does_not_fit_leaves_the_others_alone(plan: State, rng: np.random.Generator) -> None:
+    out = outputs(rng, plan, 1e-4, 0.0)
+    before = fit_lot_with_wander(EFFECTS, plan, out, ERROR)
+    out[3, :, 0] += 0.02 * plan.force[:, 0] ** 3
+    after = fit_lot_with_wander(EFFECTS, plan, out, ERROR)
+    ratio = after.fit.standard_errors / before.fit.standard_errors
+    assert np.all(ratio[3, 0] > 3.0)
+    np.testing.assert_allclose(np.delete(ratio.reshape(-1, 4), 9, axis=0), 1.0, rtol=0.1)
+    assert after.lack_of_fit[3, 0] > 10.0
+
+
+def test_refuses_a_plan_without_a_dwell_to_spare(plan: State, rng: np.random.Generator) -> None:
+    out = outputs(rng, plan, 0.0, 0.0)
+    with pytest.raises(NotIdentified, match="leave nothing to judge the noise by"):
+        fit_lot_with_wander(EFFECTS, plan, out, ERROR, used=np.arange(DWELLS) < 4)

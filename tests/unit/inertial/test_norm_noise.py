@@ -1,0 +1,66 @@
+"""Intervals of a fit by the norm of gravity: noise that few dwells leave open is averaged over, the record has its own error."""
+
+import numpy as np
+
+from benchmarks.made_recordings import Recording, make
+from benchmarks.recording_intervals import pulls
+from inertial.norm_noise import SolvedNorms
+from pipelines.stages.unknown_poses.fit import bias_uncertainty, norms_fitted
+
+PLAIN = ("bias", "scale", "misalignment")
+
+
+def test_the_average_over_one_noise_is_the_covariance_of_generalised_least_squares(rng: np.random.Generator) -> None:
+    rows, left = rng.standard_normal((40, 3)), rng.standard_normal(40)
+    root = np.linalg.cholesky(np.eye(40) + 0.5)
+    whiten = np.linalg.inv(root)
+    own = SolvedNorms(rows, left, 1.0, whiten)
+    inverse = np.linalg.inv(rows.T @ whiten.T @ whiten @ rows)
+    step = inverse @ rows.T @ whiten.T @ whiten @ left
+    rest = whiten @ (left - rows @ step)
+    expected = (2.0 * 0.5) ** 2 * rest @ rest / 37.0 * inverse
+    ratio = (own.covariance(37) - np.outer(step, step)) / expected
+    np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-9)
+    assert 1.0 < ratio[0, 0] < 1.2  # Student's factor for 37 degrees of freedom, squared
+
+
+def test_the_error_of_the_bias_of_a_record_is_that_of_a_simulation(rng: np.random.Generator) -> None:
+    """Noise of one known covariance, drawn 4000 times: bias less the mean of the wander."""
+    n, level = 30, 40e-6
+    direction = rng.standard_normal((n, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    gap = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    slow = level**2 * np.exp(-gap / 12.0)
+    white = 20e-6
+    total = white**2 * np.eye(n) + slow * (direction @ direction.T)
+    whiten = np.linalg.inv(np.linalg.cholesky(total))
+    rows = np.column_stack([-direction, -(direction**2)])
+    own = SolvedNorms(rows, whiten.T @ np.zeros(n), 1.0, whiten)
+    own.chi2 = 1e9  # the variance is known
+    stated = np.sqrt(own.of_record((0, 1, 2), direction, slow, np.ones(n), np.eye(3), 10**9, own.gain))
+    root = np.linalg.cholesky(slow)
+    drawn = np.einsum("ij,kja->kia", root, rng.standard_normal((4000, n, 3)))
+    noise = np.einsum("kia,ia->ki", drawn, direction) + white * rng.standard_normal((4000, n))
+    error = -noise @ own.gain[:3].T - drawn.mean(axis=1)
+    np.testing.assert_allclose(error.std(axis=0), stated, rtol=0.05)
+
+
+def test_intervals_hold_the_truth_for_unequal_dwells() -> None:
+    """300 recordings on other seeds: 94.7 to 97.9 % (benchmarks/recording_intervals.py); 90 % at the best noise alone."""
+    names = ("white 280, B 30", "white 25, B 30", "white 100, axes 1:2:3")
+    per_recording = [
+        pulls(Recording((24, 30, 40)[k % 3], names[k % 3], long_first=k % 2 == 0), 300 + k) for k in range(6)
+    ]
+    own = np.concatenate([np.concatenate(one) for one in per_recording])
+    assert np.mean(np.abs(own) <= 2.0) > 0.9
+    assert own.std() > 0.5
+
+
+def test_the_record_has_an_error_of_its_own_and_the_axes_one_covariance() -> None:
+    done = norms_fitted(make(Recording(30, "white 280, B 30"), 9).dwells, None, PLAIN)
+    record = bias_uncertainty(done)["bias_record_u_ug"][0]
+    coefficient = 1e6 * done.fit.fit.standard_errors[0, :, 0] / done.scale[0]
+    assert np.all((record > 0.2 * coefficient) & (record < 3.0 * coefficient))
+    assert done.fit.covariance.shape == (1, 9, 9)
+    variances = np.diagonal(done.fit.covariance[0])
+    np.testing.assert_allclose(np.sqrt(variances[:1]), done.fit.fit.standard_errors[0, 0, :1])
