@@ -9,7 +9,7 @@ from numpy.random import Generator
 from inertial import effects as catalogue
 from inertial.criticism.adequacy import adequacy
 from inertial.criticism.classes import EffectClass, class_of
-from inertial.criticism.drivers import Misfit, looks_of, places
+from inertial.criticism.drivers import Driver, Misfit, looks_of, places
 from inertial.criticism.evidence import Evidence, evidence
 from inertial.criticism.examination import Named, worst
 from inertial.criticism.field import Candidates
@@ -28,6 +28,7 @@ from inertial.estimation.comparison import rms as rms_of
 from inertial.estimation.heldout import fit_rms
 from inertial.estimation.model import Model
 from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.space import Space
 from inertial.estimation.term import Term
 from inertial.planning.ranges import UnseenRange
 
@@ -83,9 +84,13 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
     classes = _classes(fields, base, final)
     named = _named(problem, base, classes)
     unexplained = verdict.unexplained or _covariate(classes)
-    where = places(problem, drivers, base.at(final.noise), final.space.variance)
-    charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
     silent = verdict.sound or bool(verdict.unjudged)
+    where = (
+        ()
+        if silent
+        else places(problem, drivers, base.at(final.noise), final.space.variance, _beyond_pose(base, drivers, final))
+    )
+    charged = tuple(p for p in where if p.log_p + np.log(len(drivers)) < np.log(ADEQUATE_ABOVE))
     every = [*run.handled, *named]
     blind, in_part = unseen(fields, base, [e for e in catalogue.catalogue().values() if e.id not in set(run.effects)])
     return Diagnosis(
@@ -96,7 +101,7 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
         floor=verdict.floor,
         log_p=verdict.log_p,
         adequate=verdict.adequate,
-        where=() if silent else charged,
+        where=charged,
         named=named,
         unexplained=unexplained,
         unseen=blind,
@@ -110,6 +115,14 @@ def diagnose(lot: Lot, effects: Sequence[str], rng: Generator) -> Diagnosis:
         unjudged=verdict.unjudged,
         without_removed=(None if verdict.unjudged else verdict.sound) if verdict.removed else None,
     )
+
+
+def _beyond_pose(base: Model, drivers: Sequence[Driver], final: Model) -> Space:
+    """The residuals of a model after any dependence on the pose, at the noise of the final model."""
+    pose = next((driver for driver in drivers if driver.name == "pose"), None)
+    if pose is None:
+        return base.at(final.noise)
+    return base.with_curves(pose.candidate.of_blocks[:, :, 0, :]).at(final.noise)
 
 
 def _residuals(base: Model, fields: Candidates, rng: Generator | None) -> CarriedEvidence:

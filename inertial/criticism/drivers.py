@@ -207,17 +207,25 @@ def _by_axis(problem: Problem, values: Array) -> Candidate:
     return Candidate(column[:, :, None, :], shared=False)
 
 
-def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float) -> list[Misfit]:
+_OF_POSE = frozenset({"pose", "approach", "outer_deg", "inner_deg"})
+"""Drivers that are the pose, or how it was reached."""
+
+
+def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance: float, beyond: Space) -> list[Misfit]:
     """Drivers of the residuals of a space, most significant first.
+
+    A temperature that drifts by hundredths of a kelvin, or the time, follows the sequence of the poses: a quantity is a driver by
+    what it explains beyond the pose.
 
     Parameters
     ----------
     floor_variance : variance of an adequate model, in the unit of the space
+    beyond : the same residuals after any dependence on the pose
     """
     excess = max(space.rss - space.dof * floor_variance, 1e-12)
     misfits: list[Misfit] = []
     for driver in drivers:
-        gain = space.gain(driver.candidate)
+        gain = (space if driver.name in _OF_POSE else beyond).gain(driver.candidate)
         drop, rank = float(gain.drop[0]), int(gain.rank[0])
         if rank:
             share = float(np.clip((drop - rank * floor_variance) / excess, 0.0, 1.0))
@@ -225,7 +233,10 @@ def places(problem: Problem, drivers: list[Driver], space: Space, floor_variance
             misfits.append(Misfit(driver.name, axes, share, log_p_value(space, drop, rank), rank, drop))
     # two clocks of a run explain the same: their order is not that of rounding errors
     misfits.sort(key=lambda p: (round(max(p.log_p, _CERTAIN), _DIGITS), -round(p.share, _DIGITS)))
-    return list({p.driver: p for p in reversed(misfits)}.values())[::-1]
+    best: dict[str, Misfit] = {}
+    for misfit in misfits:
+        best.setdefault(misfit.driver, misfit)  # of its bias, its axes and its transfer curve what follows it most
+    return list(best.values())
 
 
 def _axes(problem: Problem, by_block: Array, rank: int, variance: float) -> tuple[str, ...]:

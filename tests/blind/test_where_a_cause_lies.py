@@ -80,3 +80,8 @@ def test_a_bad_dwell_is_no_warm_up():
     spoilt = recorded(Recording(24, "white 25, B 30", bad=1, bad_ug=5000.0), 5150002)
     (group,) = diagnose(spoilt.dwells)["classes"]
     assert (group["effects"], tuple(group["dwells"])) == (["bad_dwell"], spoilt.spoilt)
+
+
+def test_what_follows_the_sequence_of_the_poses_is_no_driver():
+    document, _ = strange("sticking_pivot", 12, 6.0)
+    assert [one["driver"] for one in document["where"]] == ["pose"]
