@@ -207,7 +207,23 @@ def small_run(folder: Path, faults: dict[str, str] | None = None, *changes: tupl
 
 
 def finished_run(folder: Path, *changes: tuple[str, str]) -> Run:
-    """A run of the small recipe in an archive of its own, with its report."""
+    """A run of the small recipe in an archive of its own, with its report; made once per process like the small run."""
+    root = folder / "archive"
+    if root.exists() or key_place() is not None:
+        return _reported(folder, changes)
+    recipe_file(folder, *changes)
+    run = _kept_report(changes)
+    shutil.copytree(str(run.archive.root), root)
+    return Archive(root).run(run.id)
+
+
+@cache
+def _kept_report(changes: tuple[tuple[str, str], ...]) -> Run:
+    """The finished run that others of its kind are copies of."""
+    return _reported(Path(tempfile.mkdtemp(prefix="finished-", dir=_kept_folder().name)), changes)
+
+
+def _reported(folder: Path, changes: tuple[tuple[str, str], ...]) -> Run:
     run = small_run(folder, None, *changes)
     Runner(small_job(folder, *changes), Archive(folder / "archive"), measure=CaptureDouble()).stage(ORDER[-1])
     return run

@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from in_process import given
 from s3_server import CREDENTIALS, s3_bucket
 
 from benchmarks.generated_archive import write_archive
@@ -23,7 +24,6 @@ from pipelines.audit.findings import findings
 from pipelines.audit.index import up_to_date
 from pipelines.audit.rules import load_rules
 from pipelines.audit.sql import ask
-from pipelines.cli import main
 from pipelines.tables.json_values import json_value
 from schemas.errors import RecipeInvalid, WrongUse
 
@@ -37,29 +37,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def typed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    monkeypatch.setenv("COLUMNS", "120")
-
-    def run(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["tumbleline", *words])
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
-
-
 def told(folder: Path) -> str:
     """The whole document of an audit, as text."""
     audited = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
     return json.dumps(json_value(document(audited, findings(audited), "archive")), sort_keys=True)
 
 
-def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, typed, tmp_path):
+def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, tmp_path):
     page = tmp_path / "audit.html"
-    status, out, err = typed(
+    status, out, err = given(
         "audit", "--archive", str(made), "--until", UNTIL, "--page", str(page), "--json", "--workers", "1"
     )
     document = json.loads(out)
@@ -74,7 +60,7 @@ def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, typed, 
     assert "http://" not in text.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
         "http://creativecommons.org", ""
     )
-    status, shown, _ = typed("audit", "--archive", str(made), "--until", UNTIL, "--workers", "1")
+    status, shown, _ = given("audit", "--archive", str(made), "--until", UNTIL, "--workers", "1")
     assert status == 1
     assert document["findings"][0]["message"] in " ".join(shown.split())
 
@@ -219,21 +205,21 @@ def test_every_way_to_read_is_answered(made, question):
     assert ask(Archive(made), question).rows
 
 
-def test_the_query_command_prints_a_table_json_and_csv(made, typed):
+def test_the_query_command_prints_a_table_json_and_csv(made):
     question = "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station"
-    status, out, _ = typed("query", question, "--archive", str(made), "--json")
+    status, out, _ = given("query", question, "--archive", str(made), "--json")
     assert (status, json.loads(out)["rows"][0]) == (0, {"station": "line-1", "n": 6})
-    assert typed("query", question, "--archive", str(made), "--csv")[1].splitlines()[:2] == ["station,n", "line-1,6"]
-    assert "line-1" in typed("query", question, "--archive", str(made))[1]
-    assert typed("query", question, "--archive", str(made), "--csv", "--json")[0] == 2
+    assert given("query", question, "--archive", str(made), "--csv")[1].splitlines()[:2] == ["station,n", "line-1,6"]
+    assert "line-1" in given("query", question, "--archive", str(made))[1]
+    assert given("query", question, "--archive", str(made), "--csv", "--json")[0] == 2
 
 
-def test_what_cannot_be_audited_is_refused(made, typed, tmp_path):
-    status, _, err = typed("audit", "--archive", str(made), "--device", "ADXL335")
+def test_what_cannot_be_audited_is_refused(made, tmp_path):
+    status, _, err = given("audit", "--archive", str(made), "--device", "ADXL335")
     assert (status, "did you mean ADXL355?" in err) == (2, True)
-    status, _, err = typed("audit", "--archive", str(made), "--since", "2024-01-01", "--until", "2023-01-01")
+    status, _, err = given("audit", "--archive", str(made), "--since", "2024-01-01", "--until", "2023-01-01")
     assert (status, "a period is needed" in err) == (2, True)
-    status, _, err = typed("audit", "--archive", str(tmp_path / "none"))
+    status, _, err = given("audit", "--archive", str(tmp_path / "none"))
     assert (status, "has no calibration" in err) == (2, True)
 
 

@@ -145,15 +145,17 @@ def test_without_a_statement_an_import_stays_noise_only(folder: Path) -> None:
     ("old", "new", "words"),
     [
         ('grade_source = "certificates"', 'grade_source = "assumed"', "rests on assumed uncertainties"),
-        (
+        pytest.param(
             "thermometer = ",
             "timing = { wait_u_s = 0.1, source = 'tests' }\n# thermometer = ",
             "not stated: thermometer",
+            marks=pytest.mark.slow,  # the fast part has tests/unit/test_certify.py
         ),
-        (
+        pytest.param(
             "due = 2027-03-02",
             "due = 2026-11-19",
             "reference standard PT-7 (certificate K-26-118) was due on 2026-11-19",
+            marks=pytest.mark.slow,  # the fast part has tests/faults/test_archive_trouble.py
         ),
         ("horizon_days = 400.0", "horizon_days = 40.0", "no error over the period of validity (12 months)"),
     ],

@@ -1,5 +1,6 @@
 """diagnose, compare, extend and history from the command line, on small lots with something hidden in them."""
 
+import io
 import json
 import re
 import sys
@@ -7,10 +8,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from capture_double import small_run
+from in_process import Given, given
 from pydantic import TypeAdapter
 
 from inertial import effects
-from pipelines.cli import main
 from pipelines.cli.documents.models import DemoDocument
 from pipelines.demo.measure import DemoLot, measure
 from pipelines.demo.scenes import scene
@@ -56,12 +58,6 @@ class Damp(SensorEffect):
 '''
 
 
-@pytest.fixture(autouse=True)
-def forgotten():
-    with effects.additions_forgotten():
-        yield
-
-
 @pytest.fixture(scope="module")
 def cubic(tmp_path_factory: pytest.TempPathFactory) -> Path:
     spec = Spec(effects=("third_order",), sizes=(3.0,), plan="fibonacci24", soaks="one", repeats=3, units=4)
@@ -85,18 +81,9 @@ def written(run: Run, folder: Path) -> Path:
 
 
 @pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    """The command line in this process: status, standard output, standard error."""
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["tumbleline", *map(str, words)])
-        monkeypatch.setenv("COLUMNS", "120")
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
+def command(no_next_measurement: None) -> Given:
+    """The command line in this process: status, standard output, standard error; its diagnoses propose no measurement."""
+    return lambda *words: given(*words, columns=120)
 
 
 def test_diagnose_names_what_is_missing_and_the_next_command(command, cubic):
@@ -292,13 +279,7 @@ def test_the_report_is_one_file_that_needs_no_network(command, cubic, tmp_path):
     report = tmp_path / "report.html"
     command("diagnose", cubic / "dwells.parquet", "--report", report)
     text = report.read_text(encoding="utf-8")
-    for part in (
-        "third_order",
-        "Residuals on the sphere",
-        "Candidates",
-        "Effects that this plan cannot show",
-        "<svg",
-    ):
+    for part in ("third_order", "Residuals on the sphere", "Candidates", "Effects that this plan cannot show", "<svg"):
         assert part in text
     outside = re.sub(r'xmlns(:\w+)?="[^"]*"|"http://www.w3.org/[^"]*"', "", text)
     assert "content=\"default-src 'none'; script-src 'sha256-" in text  # its two scripts by their hashes, and no other
@@ -325,15 +306,8 @@ def test_the_demonstration_finds_what_it_hid(command, measured, monkeypatch, tmp
     assert document["found"] is True
     assert document["added"] == ["third_order"]
     assert document["after"]["fresh_rms_ug"] < 0.8 * document["before"]["fresh_rms_ug"]
-    kept = {path.name for path in (tmp_path / "game").iterdir()}
-    assert kept == {
-        "dwells.parquet",
-        "history.parquet",
-        "fresh.parquet",
-        "fresh-history.parquet",
-        "model.toml",
-        "report.html",
-    }
+    tables = {f"{name}.parquet" for name in ("dwells", "history", "fresh", "fresh-history")}
+    assert {path.name for path in (tmp_path / "game").iterdir()} == {*tables, "model.toml", "report.html"}
 
 
 def test_the_demonstration_names_close_matches(command, tmp_path):
@@ -343,8 +317,6 @@ def test_the_demonstration_names_close_matches(command, tmp_path):
 
 
 def test_a_run_of_the_archive_brings_its_own_history(command, tmp_path):
-    from capture_double import small_run
-
     run = small_run(tmp_path)
     where = ("--archive", run.archive.root)
     assert "history" in run.tables()
@@ -360,8 +332,6 @@ def test_a_run_of_the_archive_brings_its_own_history(command, tmp_path):
 
 
 def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(command, tmp_path):
-    from capture_double import small_run
-
     run = small_run(tmp_path)
     where = ("--archive", run.archive.root)
     model = tmp_path / "model.toml"
@@ -385,8 +355,6 @@ def test_a_formula_is_fitted_by_the_chain_and_told_of_by_export(command, tmp_pat
 
 
 def test_a_player_may_add_something_else(command, measured, monkeypatch, tmp_path):
-    import io
-
     monkeypatch.setattr("pipelines.demo.measure.measure", lambda *_: measured)
     monkeypatch.setattr(sys, "stdin", io.StringIO("\n\nfifth_order\n\n\n\n\n"))
     status, out, err = command("demo", "--effect", "cubic_transfer", "--seed", "7", "--folder", tmp_path / "game")

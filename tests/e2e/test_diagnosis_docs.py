@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from inertial import effects
 from pipelines.cli import main
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -20,12 +19,6 @@ NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d")
 CLOSE = 0.05
 """Numbers may differ so much between processors and library versions."""
-
-
-@pytest.fixture(autouse=True)
-def forgotten():
-    with effects.additions_forgotten():
-        yield
 
 
 @pytest.fixture
@@ -86,7 +79,7 @@ def test_the_model_of_the_guide_is_extended_as_printed(typed):
     assert lines(typed(command)) == lines(printed)
 
 
-def test_the_effect_of_the_guide_is_an_effect(typed, rng):
+def test_the_effect_of_the_guide_is_an_effect(typed, rng, no_next_measurement: None):
     code = re.findall(r"```python\n(.*?)```", GUIDE, flags=re.DOTALL)[0]
     Path("swelling_glue.py").write_text(code, encoding="utf-8")
     n = 60

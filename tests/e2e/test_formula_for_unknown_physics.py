@@ -5,8 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from pipelines.cli import main
+from in_process import given
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
 
@@ -22,26 +21,22 @@ PARTS = {
 }
 
 
-@pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+def command(*words: object) -> tuple[int, str]:
     """The command line in this process: status and standard output."""
-
-    def run(*words: object) -> tuple[int, str]:
-        monkeypatch.setattr(sys, "argv", ["tumbleline", *map(str, words)])
-        monkeypatch.setenv("COLUMNS", "120")
-        with pytest.raises(SystemExit) as left:
-            main()
-        return int(left.value.code or 0), capsys.readouterr().out
-
-    return run
+    return given(*words, columns=120)[:2]
 
 
 def test_every_such_physics_is_here() -> None:
     assert set(PARTS) == set(OUTSIDE)
 
 
-@pytest.mark.parametrize("name", PARTS)
-def test_the_suggested_formula_explains_what_no_effect_does(command, tmp_path: Path, name: str) -> None:
+FAST = ("scale_warms_up", "cubic_with_heat", "fixture_bends")
+"""One physics of each part."""
+
+
+@pytest.mark.usefixtures("no_next_measurement")
+@pytest.mark.parametrize("name", [pytest.param(one, marks=[] if one in FAST else [pytest.mark.slow]) for one in PARTS])
+def test_the_suggested_formula_explains_what_no_effect_does(tmp_path: Path, name: str) -> None:
     made = make(World(hidden=((name, 3.0),)), 6_400_002)
     for kind in ("dwells", "history", "fresh", "fresh_history"):
         getattr(made, kind).to_parquet(tmp_path / f"{kind}.parquet")

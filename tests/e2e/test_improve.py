@@ -1,5 +1,6 @@
 """`improve` on the files of the demonstration and on a lot whose effects cannot be separated; `extend --remove`."""
 
+import io
 import json
 import re
 import sys
@@ -7,50 +8,47 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from in_process import command
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
 
 from truth import Spec, make_run
 
 from deploy.release import unpack
-from pipelines.cli import main, terminal
+from pipelines.cli import terminal
 from pipelines.jobs.model_files import read_model, versions
 
 PLAIN = "bias,scale,misalignment"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "improve-a-model.md"
 
 
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
+
 def run(*words: object, typed: str = "") -> tuple[int, str, str]:
     """The command line in this process: status, standard output, standard error."""
-    import contextlib
-    import io
-
-    out, err = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        patch.setattr(sys, "argv", ["tumbleline", *map(str, words)])
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stdin", io.StringIO(typed))
-        patch.setenv("COLUMNS", "80")
-        with pytest.raises(SystemExit) as left:
-            main()
-    return int(left.value.code or 0), out.getvalue(), err.getvalue()
+        done = command([*map(str, words)], 80)
+    return done.returncode, done.stdout, done.stderr
 
 
 @pytest.fixture(scope="module")
 def game(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The files of the demonstration as the guide makes them."""
     folder = tmp_path_factory.mktemp("demo") / "game"
-    command = re.search(r"^\$ tumbleline (demo .*) --folder game$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    assert command is not None
-    assert run(*command[1].split(), "--folder", folder)[0] == 0
+    shown = re.search(r"^\$ tumbleline (demo .*) --folder game$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert shown is not None
+    assert run(*shown[1].split(), "--folder", folder)[0] == 0
     return folder
 
 
 @pytest.fixture(scope="module")
 def improved(game: Path) -> tuple[int, str, str]:
     """The guide's `improve`."""
-    command = re.search(r"^\$ tumbleline (improve .*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    assert command is not None
-    return run(*command[1].replace("game/", f"{game}/").split())
+    shown = re.search(r"^\$ tumbleline (improve .*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert shown is not None
+    return run(*shown[1].replace("game/", f"{game}/").split())
 
 
 @pytest.fixture(scope="module")

@@ -6,22 +6,20 @@ The modules that print such commands are discovered: each has a case here, or it
 
 import ast
 import contextlib
-import io
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble, small_job
+from in_process import given
 from typed_commands import printed_commands
 
 from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
 from pipelines.chain.runner import Runner
-from pipelines.cli import main
 from pipelines.cli.history import removal
 
 HERE = "tests/e2e/test_next_lines.py::"
@@ -40,22 +38,6 @@ PRINTING = {"command_line", "print_next", "print_extension", "removal"}
 """Functions that make or print a command to give next."""
 
 ROOT = Path(__file__).resolve().parents[2]
-
-Given = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def given(monkeypatch: pytest.MonkeyPatch) -> Given:
-    """The command line in this process: status, standard output, standard error."""
-
-    def run(*words: object) -> tuple[int, str, str]:
-        out, err = io.StringIO(), io.StringIO()
-        monkeypatch.setattr(sys, "argv", ["tumbleline", *map(str, words)])
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as left:
-            main()
-        return int(left.value.code or 0), out.getvalue(), err.getvalue()
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -99,47 +81,31 @@ def _norms() -> pd.DataFrame:
     return table
 
 
-def _rerun(given: Given, folder: Path) -> tuple[int, str, str]:
+def _rerun(folder: Path) -> tuple[int, str, str]:
     return given("rerun", "small", "--limits", "industrial", "--archive", folder / "kept runs")
 
 
-def _run(given: Given, folder: Path) -> tuple[int, str, str]:
+def _run(folder: Path) -> tuple[int, str, str]:
     return given("run", next(folder.glob("*.toml")), "--direct", "--archive", folder / "kept runs")
 
 
-def _refuted(given: Given, folder: Path) -> tuple[int, str, str]:
+def _refuted(folder: Path) -> tuple[int, str, str]:
     return 0, f"  {removal(folder / 'm.toml', 'third_order')}", ""
 
 
-def _imported(given: Given, folder: Path) -> tuple[int, str, str]:
-    words = (
-        "--map",
-        "unit=unit,dwell=dwell,time=time_s,x=out_x,y=out_y,z=out_z,n=n",
-        "--units",
-        "output=g",
-        "--rows",
-        "dwells",
-    )
-    return given(
-        "import",
-        folder / "norms.csv",
-        *words,
-        "--fit",
-        "norm",
-        "--local-g",
-        "9.80665",
-        "--archive",
-        folder / "kept runs",
-    )
+def _imported(folder: Path) -> tuple[int, str, str]:
+    columns = "unit=unit,dwell=dwell,time=time_s,x=out_x,y=out_y,z=out_z,n=n"
+    words = ("--map", columns, "--units", "output=g", "--rows", "dwells", "--fit", "norm", "--local-g", "9.80665")
+    return given("import", folder / "norms.csv", *words, "--archive", folder / "kept runs")
 
 
 CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_text": _imported}
 
 
 @pytest.mark.parametrize("module", CASES)
-def test_the_lines_to_give_next_run_as_they_are_printed(module: str, given: Given, line: Path, monkeypatch) -> None:
+def test_the_lines_to_give_next_run_as_they_are_printed(module: str, line: Path, monkeypatch) -> None:
     monkeypatch.setenv(VARIABLE, "")
-    status, out, err = CASES[module](given, line)
+    status, out, err = CASES[module](line)
     assert status in {0, 1}, err
     lines = printed_commands(out)
     assert lines
@@ -167,7 +133,7 @@ def test_every_module_that_prints_a_command_to_give_next_is_run_by_a_test() -> N
 
 
 @pytest.mark.slow
-def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(given: Given, tmp_path: Path) -> None:
+def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(tmp_path: Path) -> None:
     """A lot on the simulated station with a mechanism in it: diagnosed, extended, measured again, judged."""
     import inquiries
 
@@ -191,7 +157,7 @@ def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(g
 
 
 @pytest.mark.slow
-def test_improve_lets_the_station_measure_the_fresh_run(given: Given, tmp_path: Path) -> None:
+def test_improve_lets_the_station_measure_the_fresh_run(tmp_path: Path) -> None:
     import json
 
     import inquiries
@@ -216,7 +182,7 @@ def test_improve_lets_the_station_measure_the_fresh_run(given: Given, tmp_path: 
 
 
 @pytest.mark.slow
-def test_the_lines_after_an_investigation_name_the_judged_model(given: Given, tmp_path: Path) -> None:
+def test_the_lines_after_an_investigation_name_the_judged_model(tmp_path: Path) -> None:
     import inquiries
 
     recipe = inquiries.recipe_file(tmp_path)
@@ -233,7 +199,7 @@ def test_the_lines_after_an_investigation_name_the_judged_model(given: Given, tm
 
 
 @pytest.mark.slow
-def test_the_lines_after_an_improvement_decide_between_alternatives(given: Given, tmp_path: Path) -> None:
+def test_the_lines_after_an_improvement_decide_between_alternatives(tmp_path: Path) -> None:
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
     from truth import Spec, make_run
 
@@ -252,7 +218,7 @@ def test_the_lines_after_an_improvement_decide_between_alternatives(given: Given
 
 
 @pytest.mark.slow
-def test_the_lines_of_the_demonstration_run_by_hand(given: Given, tmp_path: Path) -> None:
+def test_the_lines_of_the_demonstration_run_by_hand(tmp_path: Path) -> None:
     folder = tmp_path / "my game"
     status, out, err = given("demo", "--effect", "cubic_transfer", "--seed", "1", "--auto", "--folder", folder)
     assert status == 0, err

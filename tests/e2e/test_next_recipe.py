@@ -5,13 +5,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from in_process import given
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
 
 from truth import Spec, make_run
 
-from pipelines.cli import app, main
+from pipelines.cli import app
 from pipelines.diagnosis.next_recipe import next_recipe
 from pipelines.jobs.job import Request
 from pipelines.jobs.recipes import load_recipe
@@ -66,13 +67,10 @@ def planned(recipe: Path) -> dict:
     return json.loads(result.stdout)
 
 
-def test_dwells_of_a_file_need_their_recipe(six: Path, tmp_path: Path, monkeypatch, capsys) -> None:
-    words = ["diagnose", str(six / "dwells.parquet"), "--next", str(tmp_path / "next.toml")]
-    monkeypatch.setattr(sys, "argv", ["tumbleline", *words])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert left.value.code == 2
-    assert "add --recipe FILE" in capsys.readouterr().err
+def test_dwells_of_a_file_need_their_recipe(six: Path, tmp_path: Path) -> None:
+    status, _, err = given("diagnose", six / "dwells.parquet", "--next", tmp_path / "next.toml")
+    assert status == 2
+    assert "add --recipe FILE" in err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -107,8 +107,13 @@ def test_trouble_is_asked_about_and_the_run_goes_on_behind_its_last_record(tmp_p
     assert measure.measured == sorted(set(measure.measured))
 
 
+NEAR = ("temperatures_C = [0.0, 50.0]", "temperatures_C = [20.0, 30.0]")
+"""Soaks that are reached in moments."""
+
+
 def run_at_a_terminal(folder: Path, typed: str, *options: str):
-    command = ["run", recipe_file(folder), "--direct", "--prompts", "--archive", str(folder / "archive"), *options]
+    recipe = recipe_file(folder, NEAR)
+    command = ["run", recipe, "--direct", "--prompts", "--archive", str(folder / "archive"), *options]
     return CliRunner().invoke(app, command, input=typed)
 
 

@@ -26,6 +26,21 @@ effects = ["bias", "scale", "misalignment"]
 KEYS = {"effect", "seen", "left", "variance_inflation", "floor_ug", "alias", "breaker"}
 
 
+def planned(*words: object) -> dict:
+    """The document of a plan."""
+    done = CliRunner().invoke(app, ["plan", *map(str, words), "--json"])
+    assert done.exit_code == 0, done.exception
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory) -> dict:
+    """What the plan of six faces says of every effect."""
+    path = tmp_path_factory.mktemp("seen") / "faces.toml"
+    path.write_text(RECIPE, encoding="utf-8")
+    return {row["effect"]: row for row in planned(path)["effects"]}
+
+
 @pytest.fixture
 def faces(tmp_path):
     path = tmp_path / "faces.toml"
@@ -33,23 +48,22 @@ def faces(tmp_path):
     return path
 
 
-def test_plan_says_for_every_effect_whether_six_faces_see_it(faces):
-    done = CliRunner().invoke(app, ["plan", str(faces), "--json"])
-    assert done.exit_code == 0
-    rows = {row["effect"]: row for row in json.loads(done.stdout)["effects"]}
-    assert all(set(row) >= KEYS for row in rows.values())
-    assert rows["second_order"]["seen"]
-    assert rows["second_order"]["left"] == pytest.approx(0.82, abs=0.01)
-    assert {"scale_asymmetry", "fourth_order"} <= set(rows["second_order"]["alias"])
-    assert not rows["cross_coupling"]["seen"]
-    assert rows["cross_coupling"]["floor_ug"] is None
-    assert "45" in rows["cross_coupling"]["breaker"] or "90" in rows["cross_coupling"]["breaker"]
+def test_plan_says_for_every_effect_whether_six_faces_see_it_and_what_hides_it(seen):
+    assert all(set(row) >= KEYS for row in seen.values())
+    square, cross = seen["second_order"], seen["cross_coupling"]
+    assert square["seen"]
+    assert square["left"] == pytest.approx(0.82, abs=0.01)
+    assert {"scale_asymmetry", "fourth_order"} <= set(square["alias"])
+    assert square["why"] == ""
+    assert not cross["seen"]
+    assert cross["floor_ug"] is None
+    assert "45" in cross["breaker"] or "90" in cross["breaker"]
+    assert "β in 90° steps" in cross["why"]
+    assert "add poses at β = 45°" in cross["why"]
 
 
-def test_a_floor_comes_with_its_unit_and_with_what_an_effect_of_that_size_adds(faces):
-    done = CliRunner().invoke(app, ["plan", str(faces), "--json"])
-    rows = {row["effect"]: row for row in json.loads(done.stdout)["effects"]}
-    square, shaken = rows["second_order"], rows["vibration_rectification"]
+def test_a_floor_comes_with_its_unit_and_with_what_an_effect_of_that_size_adds(seen):
+    square, shaken = seen["second_order"], seen["vibration_rectification"]
     assert square["floor_unit"] == "µg/g²"
     # K2·fx² is 1 in two of six faces and 0 in the others
     assert square["floor_size_ug"] == pytest.approx(square["floor_ug"] / 3**0.5, rel=1e-3)
@@ -58,18 +72,15 @@ def test_a_floor_comes_with_its_unit_and_with_what_an_effect_of_that_size_adds(f
 
 
 def test_plan_marks_what_would_have_to_be_larger_than_it_ever_is():
-    done = CliRunner().invoke(app, ["plan", "production", "--json"])
-    faint = {
-        r["effect"] for r in json.loads(done.stdout)["effects"] if r["seen"] and r["floor_size_ug"] > r["typical_ug"][1]
-    }
+    rows = planned("production")["effects"]
+    faint = {row["effect"] for row in rows if row["seen"] and row["floor_size_ug"] > row["typical_ug"][1]}
     told = " ".join(CliRunner().invoke(app, ["plan", "production"]).stdout.split())
     assert "scale_aging" in faint
     assert f"floor above the typical size: {', '.join(sorted(faint))}" in told
 
 
 def test_plan_of_the_built_in_recipe_adds_up_its_minutes():
-    done = CliRunner().invoke(app, ["plan", "--json"])
-    minutes = json.loads(done.stdout)["minutes"]
+    minutes = planned()["minutes"]
     parts = [minutes[k] for k in ("soaks", "moves", "dwells", "static_record")]
     assert minutes["total"] == pytest.approx(sum(parts), abs=0.05)
 
@@ -81,15 +92,6 @@ def test_plan_refuses_a_model_that_the_recipe_cannot_determine(faces):
     assert "third_order" in str(done.exception)
 
 
-def test_plan_says_what_hides_an_effect_in_the_users_words(faces):
-    rows = {
-        r["effect"]: r for r in json.loads(CliRunner().invoke(app, ["plan", str(faces), "--json"]).stdout)["effects"]
-    }
-    assert "β in 90° steps" in rows["cross_coupling"]["why"]
-    assert "add poses at β = 45°" in rows["cross_coupling"]["why"]
-    assert rows["second_order"]["why"] == ""
-
-
 def test_plan_refuses_an_invisible_model_with_what_is_missing(faces):
     faces.write_text(RECIPE.replace('"misalignment"]', '"misalignment", "cross_coupling"]'), encoding="utf-8")
     done = CliRunner().invoke(app, ["plan", str(faces)])
@@ -99,9 +101,7 @@ def test_plan_refuses_an_invisible_model_with_what_is_missing(faces):
 
 
 def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces):
-    document = json.loads(
-        CliRunner().invoke(app, ["plan", str(faces), "--json", "--noise", "25", "--wander", "0"]).stdout
-    )
+    document = planned(faces, "--noise", "25", "--wander", "0")
     rows = {(r["effect"], r["axis"]): r for r in document["coefficients"] if r["effect"] != "misalignment"}
     white = document["dwell_error_ug"]["white"]
     assert white == pytest.approx(25.0 / 20.0**0.5)
@@ -112,10 +112,7 @@ def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces):
 
 
 def test_wander_of_the_device_counts_beside_its_white_noise(faces):
-    quiet, restless = (
-        json.loads(CliRunner().invoke(app, ["plan", str(faces), "--json", "--device", name]).stdout)
-        for name in ("qa700", "adxl355")
-    )
+    quiet, restless = (planned(faces, "--device", name) for name in ("qa700", "adxl355"))
     assert restless["dwell_error_ug"]["wander"] == pytest.approx(0.664 * 300.0, rel=0.01)
     assert restless["dwell_error_ug"]["together"] > 5.0 * quiet["dwell_error_ug"]["together"]
     floors = [{r["effect"]: r["floor_ug"] for r in d["effects"]}["second_order"] for d in (quiet, restless)]
@@ -126,10 +123,7 @@ def test_a_slow_station_needs_more_minutes(faces, tmp_path):
     text = (Path(__file__).parents[2] / "deploy/stations/simulated.toml").read_text(encoding="utf-8")
     slow = tmp_path / "slow.toml"
     slow.write_text(text.replace("speed_deg_s = 30.0", "speed_deg_s = 3.0"), encoding="utf-8")
-    usual, slower = (
-        json.loads(CliRunner().invoke(app, ["plan", str(faces), "--json", *more]).stdout)["minutes"]
-        for more in ((), ("--station", str(slow)))
-    )
+    usual, slower = (planned(faces, *more)["minutes"] for more in ((), ("--station", slow)))
     assert slower["moves"] > 3.0 * usual["moves"]
     assert slower["soaks"] == usual["soaks"]
 
@@ -152,7 +146,7 @@ def test_a_page_in_a_folder_that_is_not_there_is_one_message(faces, tmp_path):
 
 def test_plan_of_a_recipe_with_the_lines_model_asks_the_archive_for_it(faces, tmp_path):
     faces.write_text(RECIPE.replace('effects = ["bias", "scale", "misalignment"]', 'model = "line"'), encoding="utf-8")
-    asked = ["plan", str(faces), "--archive", str(tmp_path / "archive"), "--json"]
+    asked = ["plan", str(faces), "--archive", str(tmp_path / "archive")]
     none = CliRunner().invoke(app, asked)
     assert isinstance(none.exception, RecipeInvalid)
     assert "for adxl355 on simulated no model is released" in str(none.exception)
@@ -164,10 +158,8 @@ def test_plan_of_a_recipe_with_the_lines_model_asks_the_archive_for_it(faces, tm
         '[[formula]]\nid = "own_square"\ncolumns = ["f**2"]\nwhy = "a trial"\n'
     )
     release(own, change_from_options("", model), datetime(2026, 1, 1, tzinfo=UTC), reason="test", force=True)
-    document = json.loads(CliRunner().invoke(app, asked).stdout)
-    assert document["model"] == ["bias", "scale", "misalignment", "own_square"]
-    other = CliRunner().invoke(app, ["plan", str(faces), "--effects", "bias,scale,misalignment", "--json"])
-    assert json.loads(other.stdout)["model"] == ["bias", "scale", "misalignment"]
+    assert planned(*asked[1:])["model"] == ["bias", "scale", "misalignment", "own_square"]
+    assert planned(faces, "--effects", "bias,scale,misalignment")["model"] == ["bias", "scale", "misalignment"]
 
 
 def test_effects_that_slow_noise_hides_are_listed_with_what_shows_them():

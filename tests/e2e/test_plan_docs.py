@@ -31,6 +31,7 @@ def test_the_command_that_looks_for_a_recipe_has_the_options_of_the_page():
         assert option in said
 
 
+@pytest.mark.slow
 def test_the_command_of_the_page_that_tells_rivals_apart_finds_what_it_says(tmp_path, monkeypatch):
     (line,) = [c for c in COMMANDS if "--criterion T" in c]
     monkeypatch.chdir(tmp_path)

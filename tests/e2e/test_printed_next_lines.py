@@ -7,12 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from in_process import Given, given
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
 
 from truth import Run, Spec, make_run
-
-from pipelines.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -22,18 +21,9 @@ def lagging() -> Run:
 
 
 @pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
+def command(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, no_next_measurement: None) -> Given:
     monkeypatch.chdir(tmp_path)
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["tumbleline", *map(str, words)])
-        monkeypatch.setenv("COLUMNS", "140")
-        with pytest.raises(SystemExit) as left:
-            main()
-        captured = capsys.readouterr()
-        return int(left.value.code or 0), captured.out, captured.err
-
-    return run
+    return lambda *words: given(*words, columns=140)
 
 
 def next_lines(out: str) -> list[list[str]]:

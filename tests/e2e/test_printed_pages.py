@@ -1,16 +1,12 @@
 """What README and guides show as printed is printed: each block with an output is compared by a test, here or elsewhere."""
 
-import contextlib
-import io
 import re
 import shlex
 import shutil
-import sys
 from pathlib import Path
 
+import in_process
 import pytest
-
-from pipelines.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted((ROOT / "deploy").glob("*.md"))]
@@ -56,13 +52,7 @@ def pattern(printed: str) -> str:
 
 def given(command: str) -> tuple[int, str, str]:
     """The command line in this process: status, standard output, standard error."""
-    out, err = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        patch.setattr(sys, "argv", shlex.split(command))
-        patch.setenv("COLUMNS", "100")
-        with pytest.raises(SystemExit) as left:
-            main()
-    return int(left.value.code or 0), out.getvalue(), err.getvalue()
+    return in_process.given(*shlex.split(command)[1:], columns=100)
 
 
 def compared(command: str, printed: str) -> None:

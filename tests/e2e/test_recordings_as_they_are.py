@@ -8,32 +8,18 @@ import numpy as np
 import pandas as pd
 import pytest
 import recordings
+from in_process import given
 from typer.testing import CliRunner
 
-from pipelines.cli import app, main
+from pipelines.cli import app
 from pipelines.importers.exchange import read_dwells
 
 MAPPED = ("--map", "time=t,x=ax,y=ay,z=az", "--units", "output=LSB", "--unit", "A1")
 
 
-def told(monkeypatch, capsys, *words: object) -> tuple[int, str, str]:
-    monkeypatch.setattr("sys.argv", ["tumbleline", *map(str, words)])
-    monkeypatch.setenv("COLUMNS", "200")
-    with pytest.raises(SystemExit) as left:
-        main()
-    captured = capsys.readouterr()
-    return int(left.value.code or 0), captured.out, captured.err
-
-
 def imported(path: Path, tmp_path: Path, *more: str) -> dict:
-    words = [
-        "import",
-        *map(str, path if isinstance(path, list) else [path]),
-        *more,
-        "--archive",
-        str(tmp_path / "archive"),
-        "--json",
-    ]
+    files = map(str, path if isinstance(path, list) else [path])
+    words = ["import", *files, *more, "--archive", str(tmp_path / "archive"), "--json"]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0 or isinstance(done.exception, SystemExit), done.exception
     return json.loads(done.stdout)
@@ -77,14 +63,14 @@ def frozen_file(one: recordings.Recording) -> str:
 
 
 @pytest.mark.parametrize("write", [device_file, epoch_file, stamped_file, gapped_file, frozen_file])
-def test_the_command_that_inspect_prints_imports_the_file(write, record, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_the_command_that_inspect_prints_imports_the_file(write, record, tmp_path: Path) -> None:
     path = tmp_path / "my sensor.csv"
     path.write_text(write(record), encoding="utf-8")
-    status, out, _ = told(monkeypatch, capsys, "inspect", path)
+    status, out, _ = given("inspect", path)
     assert status == 0, out
     command = shlex.split(out.strip().splitlines()[-1])
     assert command[:2] == ["tumbleline", "import"]
-    status, out, err = told(monkeypatch, capsys, *command[1:], "--archive", tmp_path / "archive", "--json")
+    status, out, err = given(*command[1:], "--archive", tmp_path / "archive", "--json")
     assert status == 0, err
     document = json.loads(out)
     assert document["out_unit"] == "LSB"
@@ -116,28 +102,24 @@ def test_inspect_draws_the_record_and_writes_a_page(record, tmp_path: Path) -> N
     assert document["command"].replace("'", "&#39;") in page
 
 
-def test_what_a_file_does_not_say_stands_in_capitals_and_leaves_with_1(
-    record, monkeypatch, capsys, tmp_path: Path
-) -> None:
+def test_what_a_file_does_not_say_stands_in_capitals_and_leaves_with_1(record, tmp_path: Path) -> None:
     recordings.table(record).drop(columns="t").to_csv(tmp_path / "a.csv", index=False)
-    status, out, _ = told(monkeypatch, capsys, "inspect", tmp_path / "a.csv")
+    status, out, _ = given("inspect", tmp_path / "a.csv")
     assert status == 1
     assert "to be added by you: the rate of the samples" in out
     assert out.strip().endswith("--rate HZ")
 
 
-def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_request(
-    record, monkeypatch, capsys, tmp_path: Path
-) -> None:
+def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_request(record, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(gapped_file(record), encoding="utf-8")
-    status, _, err = told(monkeypatch, capsys, "import", path, *MAPPED, "--archive", tmp_path / "b")
+    status, _, err = given("import", path, *MAPPED, "--archive", tmp_path / "b")
     assert status == 2
     assert "a.csv: row 701 (line 702), column 'ay': found nan" in err
     assert "--gaps split" in err
     assert not (tmp_path / "b").exists()
     path.write_text(recordings.table(record).drop(index=range(1500, 1560)).to_csv(index=False), encoding="utf-8")
-    _, _, err = told(monkeypatch, capsys, "import", path, *MAPPED, "--archive", tmp_path / "b")
+    _, _, err = given("import", path, *MAPPED, "--archive", tmp_path / "b")
     assert "1 gap in time longer than 5 samples, the first before row 1501, the longest 0.61 s" in err
     path.write_text(gapped_file(record), encoding="utf-8")
     document = imported(path, tmp_path, *MAPPED, "--gaps", "split")
@@ -147,12 +129,12 @@ def test_gaps_and_rows_without_a_number_are_refused_with_their_row_and_split_on_
         assert one["end_s"] - one["start_s"] == pytest.approx((one["n"] - 1) / 100.0, abs=1e-9)
 
 
-def test_positions_logged_back_to_back_are_seen_and_divided(rng, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_positions_logged_back_to_back_are_seen_and_divided(rng, tmp_path: Path) -> None:
     full = recordings.counts(rng, positions=20, moves=False)
     keep = np.concatenate([np.arange(a, a + 40) for a, _ in full.spans])  # 0.4 s each
     frame = pd.DataFrame(full.output[keep], columns=["ax", "ay", "az"]).assign(t=np.arange(keep.size) / 100.0)
     frame.to_csv(tmp_path / "a.csv", index=False)
-    status, _, err = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
+    status, _, err = given("import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
     assert status == 2
     assert "positions logged back to back" in err
     assert "--positions 20" in err
@@ -162,11 +144,9 @@ def test_positions_logged_back_to_back_are_seen_and_divided(rng, monkeypatch, ca
     np.testing.assert_allclose(means, truth, atol=5.0)
 
 
-def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(
-    record, monkeypatch, capsys, tmp_path
-) -> None:
+def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(record, tmp_path) -> None:
     (tmp_path / "a.csv").write_text(frozen_file(record), encoding="utf-8")
-    status, _, err = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
+    status, _, err = given("import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
     assert status == 2
     assert "axis z is constant for" in err
     assert f"from row {record.spans[4][0] + 1} on" in err
@@ -176,12 +156,12 @@ def test_a_frozen_axis_among_unknown_poses_is_named_and_what_is_sound_is_used(
     assert imported(tmp_path / "a.csv", tmp_path, *MAPPED, "--faulty", "keep")["dwells"] == 9
 
 
-def test_torn_words_are_named_and_left_out_of_the_means(record, rng, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_torn_words_are_named_and_left_out_of_the_means(record, rng, tmp_path: Path) -> None:
     frame = recordings.table(record)
     torn = rng.random(len(frame)) < 0.08
     frame.loc[torn, "ax"] += 256.0 * rng.choice([-1.0, 1.0, 1.0], size=int(torn.sum()))
     frame.to_csv(tmp_path / "a.csv", index=False)
-    status, _, err = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
+    status, _, err = given("import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
     assert status == 2
     assert "axis x has torn words" in err
     assert "±256 steps of its resolution" in err
@@ -197,7 +177,7 @@ def _written(frame: pd.DataFrame, path: Path) -> Path:
     return path
 
 
-def test_two_files_one_after_another_are_one_recording(record, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_two_files_one_after_another_are_one_recording(record, tmp_path: Path) -> None:
     frame = recordings.table(record)
     half = record.spans[4][0] + 100
     first = _written(frame.iloc[:half], tmp_path / "1.csv")
@@ -209,9 +189,7 @@ def test_two_files_one_after_another_are_one_recording(record, monkeypatch, caps
     boundary = (half - 0.5) / 100.0
     assert all(not one["start_s"] < boundary < one["end_s"] for one in document["dwell_list"])
     other = _written(frame.rename(columns={"ax": "bx"}), tmp_path / "3.csv")
-    status, _, err = told(
-        monkeypatch, capsys, "import", first, other, *MAPPED, "--join", "rows", "--archive", tmp_path / "b"
-    )
+    status, _, err = given("import", first, other, *MAPPED, "--join", "rows", "--archive", tmp_path / "b")
     assert status == 2
     assert "the same are needed" in err
 
@@ -228,13 +206,13 @@ def test_columns_of_two_files_stand_side_by_side_by_their_clocks(record, tmp_pat
     np.testing.assert_allclose(dwells["unit_C"], 20.0 + 0.1 * dwells["time_s"], atol=1e-6)
 
 
-def test_a_list_of_dwells_has_residual_and_influence_of_a_fit(rng, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_a_list_of_dwells_has_residual_and_influence_of_a_fit(rng, tmp_path: Path) -> None:
     one = recordings.counts(rng, positions=16)
     path = _written(recordings.table(one), tmp_path / "a.csv")
     words = (*MAPPED, "--local-g", "9.80665", "--fit", "norm", "--archive", tmp_path / "b")
-    _, out, _ = told(monkeypatch, capsys, "import", path, *words, "--list-dwells")
+    _, out, _ = given("import", path, *words, "--list-dwells")
     assert "residual, µg" in out
-    _, out, _ = told(monkeypatch, capsys, "import", path, *words, "--json")
+    _, out, _ = given("import", path, *words, "--json")
     document = json.loads(out)
     residual = np.array([row["residual_ug"] for row in document["dwell_list"]])
     assert np.sqrt(np.mean(residual**2)) == pytest.approx(document["error"]["rms_ug"], rel=0.05)
@@ -249,59 +227,59 @@ def test_window_threshold_and_shortest_decide_what_a_dwell_is(record, tmp_path: 
     assert imported(path, tmp_path, *MAPPED, "--window", "0.5")["dwells"] == 9
 
 
-def test_a_unit_that_the_file_states_is_taken_and_not_contradicted(record, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_a_unit_that_the_file_states_is_taken_and_not_contradicted(record, tmp_path: Path) -> None:
     frame = recordings.table(record)
     frame[["ax", "ay", "az"]] /= 16384.0
     path = _written(frame.set_axis(["t [s]", "ax [g]", "ay [g]", "az [g]"], axis=1), tmp_path / "a.csv")
     words = ("--map", "time=t [s],x=ax [g],y=ay [g],z=az [g]", "--unit", "A1", "--archive", tmp_path / "b")
-    status, out, _ = told(monkeypatch, capsys, "import", path, *words)
+    status, out, _ = given("import", path, *words)
     assert status == 0
     assert "dwells in g" in out
-    status, _, err = told(monkeypatch, capsys, "import", path, *words, "--units", "output=m/s^2")
+    status, _, err = given("import", path, *words, "--units", "output=m/s^2")
     assert (status, "the file states g for its output" in err) == (2, True)
 
 
-def test_the_export_of_an_import_says_how_to_fit_it(record, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_the_export_of_an_import_says_how_to_fit_it(record, tmp_path: Path) -> None:
     run = imported(_written(recordings.table(record), tmp_path / "a.csv"), tmp_path, *MAPPED)["run"]
-    status, _, err = told(monkeypatch, capsys, "export", run, "--archive", tmp_path / "archive")
+    status, _, err = given("export", run, "--archive", tmp_path / "archive")
     assert status in {2, 3}
     assert f"tumbleline fit {run} --effects" in err
     assert "give its command again" not in err
 
 
-def test_a_dead_axis_is_named_instead_of_asking_for_more_poses(record, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_a_dead_axis_is_named_instead_of_asking_for_more_poses(record, tmp_path: Path) -> None:
     frame = recordings.table(record)
     frame["ay"] = np.round(frame["ay"] * 0.0 + 12.0 + np.random.default_rng(3).normal(0.0, 4.0, len(frame)))
     words = (*MAPPED, "--local-g", "9.80665", "--fit", "norm", "--archive", tmp_path / "b")
-    status, _, err = told(monkeypatch, capsys, "import", _written(frame, tmp_path / "a.csv"), *words)
+    status, _, err = given("import", _written(frame, tmp_path / "a.csv"), *words)
     assert status == 2
     assert "axis y changes by" in err
     assert "add poses" not in err
 
 
-def test_one_pose_says_what_it_shows(monkeypatch, capsys, tmp_path: Path, rng: np.random.Generator) -> None:
+def test_one_pose_says_what_it_shows(tmp_path: Path, rng: np.random.Generator) -> None:
     n = 3000
     frame = pd.DataFrame(
         np.round(16384 * np.array([0.0, 0.0, 1.0]) + 5.0 * rng.normal(size=(n, 3))), columns=["ax", "ay", "az"]
     )
     (tmp_path / "a.csv").write_text(frame.assign(t=np.arange(n) / 100.0).to_csv(index=False), encoding="utf-8")
-    status, out, _ = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
+    status, out, _ = given("import", tmp_path / "a.csv", *MAPPED, "--archive", tmp_path / "b")
     assert status == 0
     assert "3000 samples, 1 dwell in LSB" in out
     assert "one pose whose force is not known: its noise by 'tumbleline allan'" in out
     assert "--face +x … -z" in out
     stated = ("--face", "+z", "--blocks", "5", "--local-g", "9.81")
-    _, out, err = told(monkeypatch, capsys, "import", tmp_path / "a.csv", *MAPPED, *stated, "--archive", tmp_path / "b")
+    _, out, err = given("import", tmp_path / "a.csv", *MAPPED, *stated, "--archive", tmp_path / "b")
     assert "6 dwells in LSB" in out, err
     assert "one pose whose" not in out
 
 
-def test_several_recordings_are_offered_as_one(record, monkeypatch, capsys, tmp_path: Path) -> None:
+def test_several_recordings_are_offered_as_one(record, tmp_path: Path) -> None:
     table, half = recordings.table(record), len(record.time) // 2
     for name, part in (("p1.csv", table[:half]), ("p2.csv", table[half:])):
         (tmp_path / name).write_text(part.to_csv(index=False), encoding="utf-8")
-    _, out, _ = told(monkeypatch, capsys, "inspect", tmp_path / "p1.csv", tmp_path / "p2.csv")
+    _, out, _ = given("inspect", tmp_path / "p1.csv", tmp_path / "p2.csv")
     assert "add --join rows (one after the other) or --join" in out
     assert out.rstrip().splitlines()[-1].startswith("tumbleline import ")
-    _, out, _ = told(monkeypatch, capsys, "inspect", tmp_path / "p1.csv", tmp_path / "p2.csv", "--join", "rows")
+    _, out, _ = given("inspect", tmp_path / "p1.csv", tmp_path / "p2.csv", "--join", "rows")
     assert "--join rows (one" not in out

@@ -3,6 +3,7 @@
 import sysconfig
 from pathlib import Path
 
+import pytest
 from orchestrator import served
 
 PACKAGES = Path(sysconfig.get_path("purelib"))
@@ -18,6 +19,7 @@ def listing() -> dict[str, tuple[int, int]]:
     }
 
 
+@pytest.mark.slow
 def test_the_pages_of_the_server_are_copied_into_the_state_folder_and_nothing_into_the_packages(tmp_path: Path) -> None:
     before = listing()
     with served(tmp_path / "orchestrator", TUMBLELINE_STATE=str(tmp_path / "state")) as server:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from in_process import command
 from pydantic import TypeAdapter
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
@@ -103,7 +104,9 @@ def test_another_repeat_measures_the_same_devices_with_new_noise(captured):
     assert first.mean() == pytest.approx(fresh.mean(), abs=256.0)  # 1 mg: the same bias, other flicker
 
 
-@pytest.mark.parametrize("records", [1, 3, 5])
+@pytest.mark.parametrize(
+    "records", [pytest.param(1, marks=pytest.mark.slow), 3, pytest.param(5, marks=pytest.mark.slow)]
+)
 def test_a_killed_run_goes_on_bit_for_bit(captured, records):
     sink = MemorySink(die_after=records)
     with pytest.raises(KeyboardInterrupt):
@@ -113,6 +116,7 @@ def test_a_killed_run_goes_on_bit_for_bit(captured, records):
     same(captured, run(RECIPE, lot_of(), sink))
 
 
+@pytest.mark.slow
 def test_a_killed_run_with_a_silent_unit_goes_on_bit_for_bit():
     config = station_of(faults=[{"kind": "silent", "at_s": 905.0, "serial": "U001"}])
     whole, sink = run(RECIPE, lot_of(), config=config), MemorySink(die_after=2)
@@ -144,7 +148,7 @@ def test_ten_hours_of_soak_take_seconds():
 @contextmanager
 def served(*options: str):
     """``tumbleline station serve`` as a process of its own; gives its port."""
-    command = [
+    words = [
         sys.executable,
         "-m",
         "pipelines.cli",
@@ -158,7 +162,7 @@ def served(*options: str):
         *options,
     ]
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=buffered) as process:
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=buffered) as process:
         try:
             lines = []
             for line in process.stdout:
@@ -176,23 +180,10 @@ def mbpoll(port: int, device_id: int, address: int, kind: str, *more: str) -> li
     program = shutil.which("mbpoll")
     if program is None:
         pytest.skip("mbpoll is not installed; 'make debian' as root installs it")
-    command = [
-        program,
-        "-m",
-        "tcp",
-        "-p",
-        str(port),
-        "-a",
-        str(device_id),
-        "-0",
-        "-r",
-        str(address),
-        "-t",
-        kind,
-        "-1",
-        *more,
-    ]
-    done = subprocess.run([*command, "127.0.0.1"], capture_output=True, text=True, timeout=20, check=True)
+    options = f"-m tcp -p {port} -a {device_id} -0 -r {address} -t {kind} -1".split()
+    done = subprocess.run(
+        [program, *options, *more, "127.0.0.1"], capture_output=True, text=True, timeout=20, check=True
+    )
     return [line.split("\t")[-1].strip() for line in done.stdout.splitlines() if line.startswith("[")]
 
 
@@ -207,9 +198,7 @@ def test_a_client_of_another_maker_reads_what_the_profiles_say():
 
 
 def test_check_reads_every_register_of_the_built_in_station():
-    command = [sys.executable, "-m", "pipelines.cli", "station", "check", "--units", "2", "--json"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True)
-    document = json.loads(done.stdout)
+    document = json.loads(command(["station", "check", "--units", "2", "--registers", "--json"]).stdout)
     assert document["ok"]
     assert {row["device"] for row in document["registers"]} == {
         "outer axis", "inner axis", "chamber", "reader", "slot 0", "slot 1"

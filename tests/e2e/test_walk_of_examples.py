@@ -32,6 +32,12 @@ LONG = ("demo",)
 PARTITIONED = {"rerun", "whatif", "release"}
 """Commands that start processes of their own for every partition, or need one that does: in the slow part."""
 
+SEARCHING = (
+    "plan optimise", "investigate",
+    "program latest --station line-1.toml --form q24", "verify certificates/", "fit latest --effects",
+)  # fmt: skip
+"""Examples in the slow part: they search for a recipe and measure it, or mean that run as the latest one."""
+
 DIRECT = {"run", "investigate"}
 """Commands that are given with --direct: the orchestrator is tested elsewhere."""
 
@@ -53,6 +59,10 @@ OTHERWISE = {
 
 def kept(example: str) -> bool:
     return any(one in example for one in SERVE)
+
+
+def slow(example: str) -> bool:
+    return example.split()[1] in PARTITIONED or any(f"tumbleline {one}" in example for one in SEARCHING)
 
 
 ALL = list(examples())
@@ -86,7 +96,7 @@ def test_the_examples_are_found_and_every_exception_is_one_of_them() -> None:
 @pytest.mark.parametrize(
     "chosen",
     [
-        pytest.param([one for one in SHORT if one.split()[1] not in PARTITIONED], id="short"),
+        pytest.param([one for one in SHORT if not slow(one)], id="short"),
         pytest.param(SHORT, id="all", marks=pytest.mark.slow),
     ],
 )

@@ -51,9 +51,18 @@ def pasted(text: str, archive: Path, *, also_quoted: bool = False) -> int:
 
 def test_there_is_something_to_walk() -> None:
     assert (len(RECIPES), len(PROCEDURES), len(STATIONS)) >= (5, 12, 8)
+    assert set(QUICK) < set(map(named, PROCEDURES))
 
 
-@pytest.mark.parametrize("recipe", PROCEDURES, ids=named)
+QUICK = ("tilt", "turn_on", "bias_stability")
+"""Procedures of the fast part; on simulated units each is measured by ``tests/contract/test_procedures.py``."""
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [pytest.param(one, marks=[] if named(one) in QUICK else [pytest.mark.slow]) for one in PROCEDURES],
+    ids=named,
+)
 def test_a_procedure_is_planned_measured_reported_and_says_what_it_lacks(recipe: Path, tmp_path: Path) -> None:
     archive = ("--archive", tmp_path / "archive")
     content = parse_toml(recipe.read_text(encoding="utf-8"), recipe.name)

@@ -120,6 +120,7 @@ def test_the_browser_of_these_tests_reaches_nothing_outside_and_notes_what_is_as
         assert one.outside == ["http://192.0.2.1/", "http://example.org/"]
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
     bench: Served, browser: Any, pictures: Path
 ) -> None:
@@ -196,6 +197,7 @@ def floors_of(one: Tab) -> dict[str, float]:
     return {effect: float(floor) for effect, floor in pairs if floor}
 
 
+@pytest.mark.slow
 def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_written(
     bench: Served, browser: Any, pictures: Path
 ) -> None:

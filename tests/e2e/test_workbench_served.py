@@ -1,17 +1,15 @@
 """The workbench as a process of its own, asked by raw sockets: from this machine, through proxies, and by a crowd."""
 
-import os
 import resource
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from browser import ROOT, TOKEN, Served, served
+from browser import TOKEN, Served, served
+from in_process import command
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +71,8 @@ def files(limit: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_NOFILE, before)
 
 
-@pytest.mark.parametrize(("limit", "count"), [(256, 400), pytest.param(1024, 1500, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("limit", "count"), [(256, 400), (1024, 1500)])
 def test_idle_connections_shut_nobody_out(tmp_path: Path, limit: int, count: int) -> None:
     with ExitStack() as within:
         with files(limit):
@@ -85,12 +84,10 @@ def test_idle_connections_shut_nobody_out(tmp_path: Path, limit: int, count: int
         assert time.monotonic() - begin < 5.0
 
 
-def test_a_token_that_can_be_guessed_ends_the_command(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "pipelines.cli", "workbench", str(tmp_path / "archive"), "--port", "0"]
-    environment = os.environ | {"TUMBLELINE_WORKBENCH_TOKEN": "secret", "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
-    )
+def test_a_token_that_can_be_guessed_ends_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TUMBLELINE_WORKBENCH_TOKEN", "secret")
+    done = command(["workbench", str(tmp_path / "archive"), "--port", "0"])
     assert (done.returncode, done.stdout) == (2, "")
     assert "a token of 6 characters" in done.stderr
     assert "at least 128 bits is needed" in done.stderr
