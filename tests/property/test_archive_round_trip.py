@@ -3,6 +3,7 @@
 import json
 from itertools import pairwise
 from pathlib import Path
+from random import Random
 
 import pandas as pd
 import pytest
@@ -55,7 +56,7 @@ def test_a_manifest_reads_back_as_it_was_written(content: dict[str, object]) -> 
 
 @SOME
 @given(DOCUMENTS, st.randoms(use_true_random=False))
-def test_a_digest_does_not_depend_on_the_order_of_keys(content: dict[str, object], random) -> None:
+def test_a_digest_does_not_depend_on_the_order_of_keys(content: dict[str, object], random: Random) -> None:
     shuffled = list(content.items())
     random.shuffle(shuffled)
     assert digest(dict(shuffled)) == digest(content)

@@ -25,10 +25,10 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return small_run(tmp_path_factory.mktemp("first"))
 
 
-def copied(original: Run, tmp_path_factory: pytest.TempPathFactory) -> Run:
+def copied(original: Run, tmp_path_factory: pytest.TempPathFactory) -> Archive:
     root = tmp_path_factory.mktemp("again") / "archive"
-    shutil.copytree(original.archive.root, root)
-    return Archive(root).run(original.id)
+    shutil.copytree(str(original.archive.root), root)
+    return Archive(root)
 
 
 def hashes(run: Run) -> dict[str, str]:
@@ -38,10 +38,10 @@ def hashes(run: Run) -> dict[str, str]:
 @FEWER
 @given(effects=MODELS)
 def test_a_rerun_reproduces_itself(effects: str, original: Run, tmp_path_factory: pytest.TempPathFactory) -> None:
-    run = copied(original, tmp_path_factory)
-    outcome = again(run.archive, run.id, change_from_options(effects=effects))
-    assert check(run.archive, outcome.new).same
-    assert verify(run.archive, keys={}).whole
+    archive = copied(original, tmp_path_factory)
+    outcome = again(archive, original.id, change_from_options(effects=effects))
+    assert check(archive, outcome.new).same
+    assert verify(archive, keys={}).whole
 
 
 @FEWER
@@ -51,10 +51,10 @@ def test_a_way_round_does_not_matter(
 ) -> None:
     """The bytes of a model are those that it has from the first run, even where it is reached over another model."""
     direct, round_about = (copied(original, tmp_path_factory) for _ in range(2))
-    straight = again(direct.archive, direct.id, change_from_options(effects=then)).new
-    over = again(round_about.archive, round_about.id, change_from_options(effects=first)).new
-    reached = again(round_about.archive, over, change_from_options(effects=then)).new
-    assert hashes(round_about.archive.run(reached)) == hashes(direct.archive.run(straight))
+    straight = again(direct, original.id, change_from_options(effects=then)).new
+    over = again(round_about, original.id, change_from_options(effects=first)).new
+    reached = again(round_about, over, change_from_options(effects=then)).new
+    assert hashes(round_about.run(reached)) == hashes(direct.run(straight))
 
 
 @FEWER
@@ -62,8 +62,8 @@ def test_a_way_round_does_not_matter(
 def test_a_second_time_nothing_is_computed(
     effects: str, original: Run, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    run = copied(original, tmp_path_factory)
+    archive = copied(original, tmp_path_factory)
     change = change_from_options(effects=effects)
-    outcome = again(run.archive, run.id, change)
-    assert again(run.archive, run.id, change).new == outcome.new
-    assert set(again(run.archive, outcome.new, ModelChange()).stages.values()) == {"there"}
+    outcome = again(archive, original.id, change)
+    assert again(archive, original.id, change).new == outcome.new
+    assert set(again(archive, outcome.new, ModelChange()).stages.values()) == {"there"}
