@@ -46,11 +46,6 @@ def test_a_format_names_every_unit_and_ends_its_last_line(name: str) -> None:
 
 
 @each(FORMATS)
-def test_a_format_has_the_same_bytes_each_time(name: str) -> None:
-    assert written(name, [calibration("SN1")]) == written(name, [calibration("SN1")])
-
-
-@each(FORMATS)
 def test_an_effect_without_a_place_is_named_or_refused(name: str) -> None:
     units = [calibration("SN1", ("third_order",))]
     if getattr(FORMATS[name], "COMPLETE", False):

@@ -136,6 +136,7 @@ def test_a_manifest_of_a_newer_schema_is_told(root: Path, monkeypatch, capsys, c
     assert "dwells.json has schema 8, this version knows up to" in err
 
 
+@pytest.mark.slow
 def test_a_clock_that_goes_backwards_loses_nothing_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A host whose clock fell back by a day writes a second lot: it is kept whole, and verify says so."""
     store = Archive(tmp_path / "archive")
@@ -216,6 +217,7 @@ def test_two_units_with_one_serial_in_one_lot_are_refused(tmp_path: Path, monkey
     assert "serial A1 is there twice" in err
 
 
+@pytest.mark.slow
 def test_two_units_with_one_serial_on_two_stations_at_once_are_refused(tmp_path: Path) -> None:
     """While one station measures A1, another measures an A1, too: only one of the two can be certified."""
     store = Archive(tmp_path / "archive")
@@ -236,6 +238,7 @@ def test_two_units_with_one_serial_on_two_stations_at_once_are_refused(tmp_path:
     assert len(Ledger(store).events("A1")) == 1
 
 
+@pytest.mark.slow
 def test_two_measurements_one_after_the_other_are_both_certified(tmp_path: Path) -> None:
     store = Archive(tmp_path / "archive")
     for seed in (5, 6):
@@ -245,7 +248,7 @@ def test_two_measurements_one_after_the_other_are_both_certified(tmp_path: Path)
     assert [e.action for e in Ledger(store).events("A1")] == ["certify", "supersede"]
 
 
-@pytest.mark.parametrize(("days", "refused"), [(-1, True), (400, False)])
+@pytest.mark.parametrize(("days", "refused"), [(-1, True), pytest.param(400, False, marks=pytest.mark.slow)])
 def test_what_was_measured_with_an_overdue_standard_is_not_certified(
     tmp_path: Path, days: int, *, refused: bool
 ) -> None:

@@ -66,24 +66,22 @@ def undisturbed(name: str) -> tuple[float, set[int]]:
         return float(readings[readings["pose"] != "bias"]["start_s"].min()), good.finished()
 
 
+SPOILT = {
+    "sweep": ("missed_trigger", "clipped_reference", "level_not_reached", "reference_cable_off"),
+    "shock": ("missed_trigger", "clipped_reference", "level_not_reached"),
+    "step_response": ("missed_trigger", "level_not_reached"),
+    "transverse": ("missed_trigger", "clipped_reference", "level_not_reached"),
+    "random_vibration": ("missed_trigger", "clipped_reference", "level_not_reached"),
+}
+"""Equipment and how its recordings are spoilt: every kind with the sweep, every equipment with one kind; the others are slow."""
+
+
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        ("sweep", "missed_trigger"),
-        ("sweep", "clipped_reference"),
-        ("sweep", "level_not_reached"),
-        ("sweep", "reference_cable_off"),
-        ("shock", "missed_trigger"),
-        ("shock", "clipped_reference"),
-        ("shock", "level_not_reached"),
-        ("step_response", "missed_trigger"),
-        ("step_response", "level_not_reached"),
-        ("transverse", "missed_trigger"),
-        ("transverse", "clipped_reference"),
-        ("transverse", "level_not_reached"),
-        ("random_vibration", "missed_trigger"),
-        ("random_vibration", "clipped_reference"),
-        ("random_vibration", "level_not_reached"),
+        pytest.param(name, kind, marks=() if name == "sweep" or kind == kinds[0] else pytest.mark.slow)
+        for name, kinds in SPOILT.items()
+        for kind in kinds
     ],
 )
 def test_a_spoilt_recording_is_discarded_and_repeated(name: str, kind: str, tmp_path: Path) -> None:

@@ -46,7 +46,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, bytes], i
         return run(folder, "archive"), disk.written
 
 
-@pytest.mark.parametrize("part", [0.0, 0.01, 0.03, 0.2, 0.5, 0.77, 0.8, 0.85, 0.9, 0.95, 0.999])
+QUICK = (0.03, 0.8)  # within the capture and within the results
+PARTS = (0.0, 0.01, 0.03, 0.2, 0.5, 0.77, 0.8, 0.85, 0.9, 0.95, 0.999)
+
+
+@pytest.mark.parametrize("part", [pytest.param(p, marks=() if p in QUICK else pytest.mark.slow) for p in PARTS])
 def test_a_full_disk_is_refused_by_name_and_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: tuple[dict[str, bytes], int], part: float
 ) -> None:

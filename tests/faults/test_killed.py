@@ -107,7 +107,7 @@ def test_a_run_killed_between_writing_a_file_and_publishing_it_ends_in_the_same_
     assert finish(tmp_path) == undisturbed
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_a_plug_pulled_at_random_times_loses_no_finished_dwell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:

@@ -121,7 +121,7 @@ def test_a_station_that_delivers_no_time_is_refused(tmp_path: Path) -> None:
     assert records.finished() == set()
 
 
-@pytest.mark.parametrize("stop_after", [0, 1, 7, 22])
+@pytest.mark.parametrize("stop_after", [7, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 1, 22))])
 def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, sound: Run, stop_after: int) -> None:
     archive, job = Archive(tmp_path / "archive"), small_job(tmp_path)
     with pytest.raises(PulledPlug):

@@ -57,7 +57,10 @@ def torn_notes(state, pids):
         path.write_text('{"token": "12')
 
 
-@pytest.mark.parametrize("trouble", [full_disk, folder_gone, folder_in_the_way, torn_notes])
+@pytest.mark.parametrize(
+    "trouble",
+    [full_disk, *(pytest.param(one, marks=pytest.mark.slow) for one in (folder_gone, folder_in_the_way, torn_notes))],
+)
 def test_a_station_is_made_safe_though_no_note_of_it_can_be_kept(state, trouble):
     with served() as port:
         config = modbus_station(port, limits=SLOW)
@@ -145,6 +148,7 @@ def refused_soon(config):
         following.take()
 
 
+@pytest.mark.slow
 def test_a_watchdog_goes_on_until_the_network_is_back_and_is_seen_to():
     away_and_back(3.0)
 

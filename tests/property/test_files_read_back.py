@@ -1,0 +1,180 @@
+"""What a writer writes a reader reads back: recordings in every format, tables as text, exported calibrations."""
+
+import csv
+import gzip
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from generated import FEW
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipelines.export import FORMATS, ExportSettings, UnitCalibration, export_files
+from pipelines.export.polynomials import ORDER
+from pipelines.export.unit_noise import TERMS, UnitNoise
+from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
+from pipelines.importers import files
+from pipelines.importers.exchange import checked, read_dwells
+
+VALUES = st.floats(-1e4, 1e4, allow_subnormal=False)
+STATE_THE_INTERVAL = ("uff58", "tdms", "lvm", "wav")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("written")
+
+
+@st.composite
+def channels(draw: st.DrawFn) -> list[Channel]:
+    """Up to three channels of one clock."""
+    count, length = draw(st.integers(1, 3)), draw(st.integers(8, 40))
+    interval, unit = 1.0 / draw(st.integers(1, 50_000)), draw(st.sampled_from(["g", "V", "m/s^2"]))
+    return [
+        Channel(
+            f"unit {axis}",
+            unit,
+            "units",
+            np.array(draw(st.lists(VALUES, min_size=length, max_size=length))),
+            interval,
+            k,
+        )
+        for k, axis in zip(range(count), "xyz", strict=False)
+    ]
+
+
+def read_back(form: str, written: list[Channel], folder: Path):
+    path = folder / f"recording{WRITERS[form].SUFFIX}"
+    assert write_waveforms(form, written, path) == [path]
+    return files.read_content(path)
+
+
+@pytest.mark.parametrize("form", WRITERS)
+@FEW
+@given(written=channels())
+def test_samples_of_a_recording_read_back_exactly(form: str, written: list[Channel], folder: Path) -> None:
+    table = read_back(form, written, folder)[0].table
+    columns = [name for name in table if not str(name).lower().startswith(("time", "x_value"))]
+    assert len(columns) == len(written)
+    for name, channel in zip(columns, written, strict=True):
+        np.testing.assert_array_equal(table[name].to_numpy(dtype=float), channel.values)
+
+
+@pytest.mark.parametrize("form", STATE_THE_INTERVAL)
+@FEW
+@given(written=channels())
+def test_the_interval_of_a_recording_reads_back(form: str, written: list[Channel], folder: Path) -> None:
+    content, source = read_back(form, written, folder)
+    assert source.form == form
+    assert content.interval_s == pytest.approx(written[0].interval_s, rel=1e-5)
+
+
+@st.composite
+def dwells(draw: st.DrawFn) -> pd.DataFrame:
+    """Dwells of two units in the exchange format."""
+    rows = draw(st.integers(2, 6))
+    numbers = st.lists(st.floats(-1.2, 1.2).map(lambda value: round(value, 9)), min_size=2 * rows, max_size=2 * rows)
+    temperature = draw(st.lists(st.integers(-400, 850), min_size=2 * rows, max_size=2 * rows))
+    return pd.DataFrame({
+        "unit": np.repeat(["A1", "B2"], rows),
+        "dwell": np.tile(np.arange(rows), 2),
+        "time_s": np.tile(30.0 * np.arange(rows), 2),
+        "unit_C": np.array(temperature) / 10.0,
+        **{f"out_{axis}": draw(numbers) for axis in "xyz"},
+    })  # fmt: skip
+
+
+def same(one: pd.DataFrame, other: pd.DataFrame) -> None:
+    pd.testing.assert_frame_equal(one, other[list(one.columns)], check_exact=True, check_dtype=False)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@FEW
+@given(frame=dwells())
+def test_dwells_as_text_read_back(separator: str, encoding: str, frame: pd.DataFrame, folder: Path) -> None:
+    frame.to_csv(folder / "dwells.csv", sep=separator, index=False, encoding=encoding)
+    same(frame, read_dwells(folder / "dwells.csv"))
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+@FEW
+@given(frame=dwells())
+def test_dwells_with_decimal_commas_read_back(separator: str, frame: pd.DataFrame, folder: Path) -> None:
+    frame.to_csv(folder / "dwells.csv", sep=separator, decimal=",", index=False)
+    same(frame, read_dwells(folder / "dwells.csv"))
+
+
+@FEW
+@given(frame=dwells())
+def test_dwells_as_parquet_and_compressed_read_back(frame: pd.DataFrame, folder: Path) -> None:
+    frame.to_parquet(folder / "dwells.parquet")
+    (folder / "dwells.csv.gz").write_bytes(gzip.compress(frame.to_csv(index=False).encode()))
+    same(frame, read_dwells(folder / "dwells.parquet"))
+    same(frame, read_dwells(folder / "dwells.csv.gz"))
+
+
+@FEW
+@given(frame=dwells(), seed=st.integers(0, 2**32 - 1))
+def test_dwells_in_any_order_are_the_same_and_checked_once_is_checked(frame: pd.DataFrame, seed: int) -> None:
+    known = checked(frame, where="a")
+    same(known, checked(frame.sample(frac=1.0, random_state=seed), where="a"))
+    same(known, checked(known, where="a"))
+
+
+@st.composite
+def calibrations(draw: st.DrawFn, unit: str) -> UnitCalibration:
+    """A calibration of small errors, about a nominal of 256 000 LSB/g."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    bias, response = 100.0 * rng.normal(size=(ORDER, 3)), np.zeros((ORDER, 3, 3))
+    bias[1:] *= 1e-4
+    response[0] = 256000.0 * (np.eye(3) + 1e-3 * rng.normal(size=(3, 3)))
+    noise = UnitNoise(
+        dict.fromkeys(TERMS, rng.uniform(5.0, 50.0, 3)), dict.fromkeys(TERMS, np.ones(3, dtype=bool)), 100.0
+    )
+    return UnitCalibration(unit, "pass", "industrial", "LSB", bias, response, (-10.0, 60.0), (), None, noise, 524287.0)
+
+
+SETTINGS = ExportSettings(nominal=256000.0, device_ids={"SN1": 1310988, "SN2": 1310996})
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@FEW
+@given(one=calibrations("SN1"), other=calibrations("SN2"))
+def test_an_export_depends_on_its_calibrations_alone(form: str, one: UnitCalibration, other: UnitCalibration) -> None:
+    written = export_files(form, [one, other], "run-1", SETTINGS)
+    assert written == export_files(form, [one, other], "run-1", SETTINGS)
+    assert written != export_files(form, [other, one], "run-1", SETTINGS) or len(written) == 2
+
+
+@FEW
+@given(unit=calibrations("SN1"))
+def test_an_exported_json_has_every_digit(unit: UnitCalibration) -> None:
+    (data,) = export_files("json", [unit], "run-1", SETTINGS).values()
+    (back,) = json.loads(data)["units"]
+    np.testing.assert_array_equal(back["bias"], unit.bias)
+    np.testing.assert_array_equal(back["response"], unit.response)
+
+
+@FEW
+@given(unit=calibrations("SN1"))
+def test_an_exported_csv_has_every_digit(unit: UnitCalibration) -> None:
+    (data,) = export_files("csv", [unit], "run-1", SETTINGS).values()
+    for row in csv.DictReader(io.StringIO(data.decode())):
+        values = {"bias": unit.bias, "response": unit.response}[row["quantity"]]
+        place = ["xyz".index(row[name]) for name in ("row", "column") if row[name]]
+        assert float(row["value"]) == values[int(row["power_of_theta"])][tuple(place)]
+
+
+@FEW
+@given(
+    unit=calibrations("SN1"), force=st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3), warm=st.floats(-10.0, 60.0)
+)
+def test_a_correction_takes_back_what_the_unit_does(unit: UnitCalibration, force: list[float], warm: float) -> None:
+    powers = (warm - 25.0) ** np.arange(ORDER)
+    output = powers @ unit.bias + np.einsum("k,kij->ij", powers, unit.response) @ force
+    np.testing.assert_allclose(unit.correct(output[None], warm)[0], force, atol=1e-9)
