@@ -155,7 +155,7 @@ def worn_gears(scene: Scene) -> Change:
     return _alike(scene, _outer_axis(scene) * behind[:, None, :1] * worn[0] + inner)
 
 
-@kind("effect", "soaks", catalogue=("misalignment_temperature",))
+@kind("effect", "soaks", catalogue=("fixture_bends",))
 def fixture_bends(scene: Scene) -> Change:
     """The fixture bends as its plate follows the chamber: a rotation that all units have alike."""
     plate = relax(scene.day.chamber, scene.lot.uniform(300.0, 900.0), scene.day.chamber[0])
@@ -170,7 +170,7 @@ def _tilt(scene: Scene, lean: Floats) -> Change:
     return _alike(scene, _outer_axis(scene) * lean[:, None, :1] + about_y[:, None, :] * lean[:, None, 1:])
 
 
-@kind("effect", "soaks")
+@kind("effect", "soaks", catalogue=("base_tilts",))
 def base_tilts(scene: Scene) -> Change:
     """The chamber warms one leg of the base: table and level lean as the leg follows over an hour."""
     leg = relax(scene.day.chamber, 3600.0, np.asarray(22.0))
