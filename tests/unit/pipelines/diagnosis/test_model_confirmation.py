@@ -41,8 +41,10 @@ def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_wo
             None,
             ["third_order"],
             [
-                "third_order is recommended by its evidence alone: no dwells left out can judge it; "
-                "confirm with a fresh run of the same units."
+                (
+                    "third_order is recommended by its evidence alone: no dwells left out can judge it; "
+                    "confirm with a fresh run of the same units."
+                )
             ],
         ),
     ],
