@@ -14,11 +14,15 @@ from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import price
 
+_AT_LEAST = 2
+"""Bad dwells that an effect has to explain: in one alone it is told from a bad dwell by nothing."""
+
 
 def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
     """The bad dwells of a lot, without those that an effect explains at a lower price than they have together.
 
-    The first dwells of a sensor that warms up deviate most: left out, they take the warm-up with them.
+    The first dwells of a sensor that warms up deviate most: left out, they take the warm-up with them. An effect that explains
+    no more than one of them says the same as the bad dwell, in more words.
 
     Parameters
     ----------
@@ -33,8 +37,9 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
         return found
     kept = bad_dwells(base.with_term(best.term))
     places = {(d.unit, d.dwell) for d in kept}
-    explained = sum(_score(base, d) for d in found if (d.unit, d.dwell) not in places)
-    return kept if -best.cost > explained else found
+    explained = [d for d in found if (d.unit, d.dwell) not in places]
+    lower = len(explained) >= _AT_LEAST and -best.cost > sum(_score(base, d) for d in explained)
+    return kept if lower else found
 
 
 def _score(base: Model, bad: BadDwell) -> float:
