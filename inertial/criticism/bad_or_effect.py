@@ -7,22 +7,21 @@ import numpy as np
 from inertial import effects as catalogue
 from inertial.criticism.drivers import varies
 from inertial.criticism.field import Candidates
-from inertial.criticism.search import contest, convincing
-from inertial.data_errors.bad_dwells import BadDwell, bad_dwells
+from inertial.criticism.search import contest, convincing, judge
+from inertial.data_errors.bad_dwells import BadDwell, bad_dwells, without
 from inertial.effects.base import AnyEffect
 from inertial.effects.covariate import COVARIATE_PREFIX, Covariate
 from inertial.estimation.model import Model
 from inertial.estimation.penalty import price
-
-_AT_LEAST = 2
-"""Bad dwells that an effect has to explain: in one alone it is told from a bad dwell by nothing."""
+from inertial.estimation.problem import Problem
+from inertial.estimation.term import Term
 
 
 def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
     """The bad dwells of a lot, without those that an effect explains at a lower price than they have together.
 
     The first dwells of a sensor that warms up deviate most: left out, they take the warm-up with them. An effect that explains
-    no more than one of them says the same as the bad dwell, in more words.
+    one of them alone has to be seen in the other dwells too: otherwise it says the same as the bad dwell, in more words.
 
     Parameters
     ----------
@@ -31,15 +30,25 @@ def bad_beside_effects(base: Model, effects: Sequence[str]) -> list[BadDwell]:
     found = bad_dwells(base)
     if not found:
         return found
-    field = Candidates(base.problem, candidates_of(base, effects), [])
+    rivals = candidates_of(base, effects)
+    field = Candidates(base.problem, rivals, [])
     best = next(iter(contest(field, base)), None)
     if best is None or not convincing(field, base, best):
         return found
     kept = bad_dwells(base.with_term(best.term))
     places = {(d.unit, d.dwell) for d in kept}
     explained = [d for d in found if (d.unit, d.dwell) not in places]
-    lower = len(explained) >= _AT_LEAST and -best.cost > sum(_score(base, d) for d in explained)
-    return kept if lower else found
+    if not explained or -best.cost <= sum(_score(base, d) for d in explained):
+        return found
+    return kept if len(explained) > 1 or _seen_without(base, rivals, best.term, explained) else found
+
+
+def _seen_without(base: Model, effects: list[AnyEffect], term: Term, bad: list[BadDwell]) -> bool:
+    """Whether a term explains more than its price with the bad dwells left out, by what a named effect has to: one look only."""
+    problem = Problem(without(base.problem.lot, bad), slope=base.problem.slope)
+    field = Candidates(problem, effects, [])
+    rest = Model(problem, base.terms, near=base.noise)
+    return -judge(field, rest, term).cost > float(np.log(max(problem.count, 1)))
 
 
 def _score(base: Model, bad: BadDwell) -> float:

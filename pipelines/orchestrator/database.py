@@ -29,7 +29,7 @@ def default_database() -> str:
 def copy_into(folder: Path, keep: int) -> Path:
     """A new copy of the database of this environment in a folder, named by its time; older copies than ``keep`` are removed."""
     source = default_database()
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")  # two copies may be made in one second
     suffix = ".dump" if source.startswith(POSTGRES) else ".db"
     made = folder / f"orchestrator-{stamp}{suffix}"
     copy_database(source, made)
