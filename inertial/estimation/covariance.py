@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from inertial.decisions import SHARE_STEP
 from inertial.estimation.candidate import Candidate
-from inertial.estimation.noise import LONGEST, walk_kernel
+from inertial.estimation.noise import LONGEST
 from inertial.estimation.noise_shares import Noise, Shares
 from inertial.estimation.products import PIECE, Spanned, products_of, products_with
 from inertial.estimation.whitener import applied, applied_back, grouped, solved, whitener_of
 from inertial.noise.flicker import flicker_kernel
+from inertial.noise.measurands import walk_kernel
 
 Array = NDArray[np.float64]
 

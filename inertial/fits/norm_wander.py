@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from inertial.fits.wander import walk_kernel
 from inertial.noise.flicker import flicker_kernel
+from inertial.noise.measurands import walk_kernel
 
 Array = NDArray[np.float64]
 
@@ -45,14 +45,10 @@ def norm_noise(residual: Array, rows: Array, direction: Array, time: Array, erro
     """
     white = error / np.sqrt(np.mean(error**2))
     along = direction @ direction.T
-    # a walk that began at the first dwell would make the bias that of the first dwell; about its mean it is that of the record
-    since = (time - time.min()) / max(float(np.ptp(time)), 1e-9)
-    with_mean = since - 0.5 * since**2
-    walk = walk_kernel(time) - with_mean - with_mean[:, None] + 1.0 / 3.0
-    kernels = flicker_kernel(time) * along, walk * along
+    kernels = flicker_kernel(time) * along, walk_kernel(time) * along
 
     def root(flicker: float, walk: float) -> Array:
-        return np.linalg.cholesky(np.diag(white**2) + flicker * kernels[0] + walk * kernels[1])
+        return np.asarray(np.linalg.cholesky(np.diag(white**2) + flicker * kernels[0] + walk * kernels[1]), np.float64)
 
     def deviance(shares: tuple[float, float]) -> float:
         low = root(*shares)

@@ -21,6 +21,7 @@ from inertial.fits.generalised import SHARES, Series, Solved
 from inertial.fits.linear import LotFit, fit_lot
 from inertial.fits.wander_columns import LotColumns
 from inertial.noise.flicker import SLOWEST_FITTED, flicker_kernel
+from inertial.noise.measurands import walk_kernel
 from inertial.state import State
 
 Array = NDArray[np.float64]
@@ -84,27 +85,22 @@ class WanderFit:
         return self.white * float(np.sqrt(self.walk_share))
 
 
-def walk_kernel(time: Array) -> Array:
-    """Covariance (n, n) of a random walk that is zero at the first and of variance one at the last of times (n,), s."""
-    since = time - time.min()
-    return np.minimum(since[:, None], since) / max(float(since.max()), 1e-9)
-
-
-def wander_kernels(time: Array) -> tuple[Array, Array]:
+def wander_kernels(time: Array, used: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
     """Covariances (n, n) of 1/f wander and random walk of variance one at times (n,), s.
 
     Wander slower than the record is, for the record, the bias itself. Those of a short record are kept, because fit and budget of
-    a lot need the same ones.
+    a lot need the same ones. The walk is counted from its mean over the dwells that are used.
     """
+    there = np.ones(time.size, dtype=bool) if used is None else used
     if time.size > _KEPT_TIMES:
-        return flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time)
-    return _kept_kernels(np.asarray(time, dtype=np.float64).tobytes())
+        return flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time, there)
+    return _kept_kernels(np.asarray(time, dtype=np.float64).tobytes(), there.tobytes())
 
 
 @lru_cache(maxsize=4)
-def _kept_kernels(times: bytes) -> tuple[Array, Array]:
+def _kept_kernels(times: bytes, used: bytes) -> tuple[Array, Array]:
     time = np.frombuffer(times)
-    kernels = flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time)
+    kernels = flicker_kernel(time, slowest=SLOWEST_FITTED), walk_kernel(time, np.frombuffer(used, dtype=bool))
     for kernel in kernels:
         kernel.setflags(write=False)
     return kernels
@@ -155,7 +151,7 @@ def fit_lot_with_wander(
     level = np.sqrt(np.mean(error[..., there] ** 2, axis=-1, keepdims=True))
     profile = np.sqrt(np.mean((error / level) ** 2, axis=tuple(range(error.ndim - 1))))
     time = np.reshape(np.broadcast_to(state.time, error[..., 0, :].shape), (-1, error.shape[-1]))[0]
-    kernels = wander_kernels(time)
+    kernels = wander_kernels(time, there)
     cut = tuple(k[np.ix_(there, there)] for k in kernels)
     shared = columns.shared / level[..., None]
     series = Series(columns.local[..., there, :], shared[..., there, :], (z / level)[..., there], profile[there], cut)

@@ -1,9 +1,12 @@
 """What a bias is the bias of: the mean of its record, of a longer time, of another switch-on; and how far these lie apart."""
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+_Time = TypeVar("_Time", float, Array)
 
 DAY_S = 86_400.0
 """Window of a unit's long mean, s: the day after the record. Flicker has no mean for ever: a decade more adds B²·ln 10/π."""
@@ -49,15 +52,35 @@ def instability(deviation: Array, time: Array, *, slowest: float = 1.0) -> Array
     return deviation * np.sqrt(np.pi / (octaves * _OCTAVE))
 
 
-def walk_mean(time: Array, since: float, start: float, length: float) -> tuple[Array, float]:
-    """Covariance (n,) of a random walk with its mean over a window, and that mean's variance; K = 1, zero at ``since``.
+def walk_kernel(time: Array, fitted: NDArray[np.bool_] | None = None) -> Array:
+    """Covariance (..., n, n) of a random walk about its mean over its record, which gathers a variance of one over all times.
+
+    About a walk that is zero at the first dwell, the bias of a fit would be that of the first dwell. Where a bias is fitted,
+    nothing but the bias depends on what the walk is counted from.
 
     Parameters
     ----------
-    time : (n,), s; since, start : s; length : of the window, s
+    time : (..., n), s
+    fitted : (n,), the dwells whose time is the record; all where None
+    """
+    record = time if fitted is None else time[..., fitted]
+    first = time.min(axis=-1, keepdims=True)
+    start = record.min(axis=-1, keepdims=True)
+    along, own = walk_mean(time, first, start, record.max(axis=-1, keepdims=True) - start)
+    since = time - first
+    shared = np.minimum(since[..., :, None], since[..., None, :])
+    return (shared - along[..., :, None] - along[..., None, :] + own[..., None]) / max(float(np.ptp(time)), 1e-9)
+
+
+def walk_mean(time: Array, since: _Time, start: _Time, length: _Time) -> tuple[Array, _Time]:
+    """Covariance (..., n) of a random walk with its mean over a window, and that mean's variance; K = 1, zero at ``since``.
+
+    Parameters
+    ----------
+    time : (..., n), s; since, start : s; length : of the window, s
     """
     before, inside = start - since, np.clip(time - start, 0.0, length)
-    along = np.minimum(time - since, before) + inside - 0.5 * inside**2 / max(length, 1e-9)
+    along = np.asarray(np.minimum(time - since, before) + inside - 0.5 * inside**2 / np.maximum(length, 1e-9))
     return along, before + length / 3.0
 
 

@@ -116,9 +116,15 @@ def plan(context: PlanContext, terms: BudgetTerms | None = None, limits: Limits 
 
 
 def _of_record(context: PlanContext) -> Array:
-    """Covariance of the dwells as a fit sees it: what changes more slowly than the record is, for the record, the bias itself."""
+    """Covariance of the dwells as a fit sees it: what changes more slowly than the record is, for the record, the bias itself.
+
+    The walk is counted from its mean over the record, as in a fit.
+    """
     time, length = context.state.time, context.recipe.dwell_s
-    return dwell_covariance(time, length, context.noise, since=float(time.min()) - 0.5 * length)
+    since = float(time.min()) - 0.5 * length
+    along, own = walk_mean(time, since, float(time.min()), float(np.ptp(time)))
+    covariance = dwell_covariance(time, length, context.noise, since=since)
+    return covariance + context.noise.walk**2 * (own - along[:, None] - along)
 
 
 def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Array, Array]:
@@ -137,9 +143,9 @@ def _against_means(context: PlanContext, square: Array, gain: Array) -> tuple[Ar
     flicker = np.full(len(square), noise.instability**2 * constants.size * np.log(RATIO) / np.pi)
     square = square + against_mean(flicker, gain, flicker_mean(time, constants, first, span))
     walk = np.full(len(square), noise.walk**2)
-    record = square + against_mean(walk, gain, walk_mean(time, since, first, span))
-    later = square + against_mean(walk, gain, walk_mean(time, since, first + span, DAY_S))
-    return np.maximum(record, 0.0), np.maximum(later, 0.0)
+    goes_on = against_mean(walk, gain, walk_mean(time, since, first + span, DAY_S))
+    goes_on = goes_on - against_mean(walk, gain, walk_mean(time, since, first, span))
+    return np.maximum(square, 0.0), np.maximum(square + goes_on, 0.0)
 
 
 def _bias(

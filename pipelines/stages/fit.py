@@ -173,14 +173,11 @@ def _bias_of(lot: LotArrays, fitted: NoisyFit, scale: Array) -> dict[str, Array]
     walk = fitted.walk if carried else np.zeros_like(fitted.walk)
     excess = np.sqrt(np.maximum(fitted.white**2 - own, 0.0) + 0.5 * (fitted.walk**2 - walk**2))
     record = np.stack([errors[:, axis, place] for axis, place in enumerate(places)], axis=1)
-    record, flicker, whole, walk, excess = (
-        MICRO * part / scale for part in (record, fitted.flicker, fitted.walk, walk, excess)
-    )
+    record, flicker, walk, excess = (MICRO * part / scale for part in (record, fitted.flicker, walk, excess))
     noise = BiasNoise(
         error=record,
         gain=np.stack([fitted.gain[:, axis, place] for axis, place in enumerate(places)], axis=1),
         flicker=flicker,
-        walk=whole,
         carried=walk,
         excess=excess,
         time=time[used],

@@ -22,10 +22,11 @@ COLUMNS = (
 class BiasNoise:
     """Bias and noise of a fit; arrays (units, 3), µg.
 
-    error : standard error of the coefficient; gain : (units, 3, n), what every dwell of the fit adds to the coefficient
-    flicker, walk : standard deviations of the wander between dwells, and of the random walk at the end of all dwells
-    carried : the walk that goes on after the record; excess : scatter of the dwells that their samples do not show, and what of
-        the walk is not carried on
+    error : standard error of the coefficient, the walk counted from its mean over the record
+    gain : (units, 3, n), what every dwell of the fit adds to the coefficient
+    flicker : standard deviation of the wander between dwells
+    carried : that of the random walk that goes on after the record, at the end of all dwells
+    excess : scatter of the dwells that their samples do not show, and what of the walk is not carried on
     time : (n,), s, of the dwells of the fit; every : (m,), s, of all dwells: the walk is zero at the first of them
     known : factor of the errors, as the noise is known from few degrees of freedom; widened : of the flicker after the record
     """
@@ -33,7 +34,6 @@ class BiasNoise:
     error: Array
     gain: Array
     flicker: Array
-    walk: Array
     carried: Array
     excess: Array
     time: Array
@@ -62,11 +62,9 @@ def bias_measurands(noise: BiasNoise, switch_on: float | None = None) -> dict[st
         walk = _of_variance_one(walk_mean(time, start, first, length), noise)
         day = _of_variance_one(walk_mean(time, start, first + length, DAY_S), noise)
         square = square + noise.known**2 * against_mean(noise.flicker**2, noise.gain, flicker)
-        stays = noise.walk**2 - noise.carried**2
-        later = square + noise.known**2 * (
-            against_mean(stays, noise.gain, walk) + against_mean(noise.carried**2, noise.gain, day)
-        )
-        square = square + noise.known**2 * against_mean(noise.walk**2, noise.gain, walk)
+        # the fit counts the walk from its mean over the record: of the record's mean its error is none
+        goes_on = against_mean(noise.carried**2, noise.gain, day) - against_mean(noise.carried**2, noise.gain, walk)
+        later = square + noise.known**2 * goes_on
     else:
         later = square
     record, at_end = (np.sqrt(np.maximum(part, 0.0)) for part in (square, later))

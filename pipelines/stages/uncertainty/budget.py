@@ -112,6 +112,6 @@ def dwell_noise(lot: LotArrays, wander: pd.DataFrame, used: NDArray[np.bool_]) -
         float(np.mean(np.asarray(wander[name], dtype=float) ** 2)) for name in ("white_ug", "flicker_ug", "walk_ug")
     )
     time = np.broadcast_to(lot.state.time, (len(lot.units), used.size))[0]
-    kernels = [kernel[np.ix_(used, used)] for kernel in wander_kernels(time)]
+    kernels = [kernel[np.ix_(used, used)] for kernel in wander_kernels(time, used)]
     total = np.diag(profile**2) * (white if white > 0.0 else 1.0) + flicker * kernels[0] + walk * kernels[1]
     return total / np.mean(np.diagonal(total))

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from inertial.correction import correct
 from inertial.fits.linear import force_along_axes, response_matrix
-from inertial.fits.wander import walk_kernel
 from inertial.noise.flicker import flicker_kernel
+from inertial.noise.measurands import walk_kernel
 from inertial.uncertainty.influences import MeasurementModel
 from inertial.uncertainty.norm_design import NormDesign, norm_design
 from pipelines.tables.calibration import Calibration, read_calibration

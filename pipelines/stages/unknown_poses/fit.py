@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from inertial import effects as catalogue
 from inertial.errors import InertialError
 from inertial.estimation.model import Model
-from inertial.estimation.noise import LONGEST, walk_kernel
+from inertial.estimation.noise import LONGEST
 from inertial.estimation.problem import Problem
 from inertial.estimation.refinement import terms_of
 from inertial.fits.wander import student
 from inertial.noise.flicker import SLOWEST_DIAGNOSED, flicker_kernel
-from inertial.noise.measurands import DAY_S, instability, of_a_day
+from inertial.noise.measurands import DAY_S, instability, of_a_day, walk_kernel
 from inertial.norm_fit import NormFit, PlausibleNoise, fit_norms
 from pipelines.stages.uncertainty.bias_measurands import COLUMNS
 from pipelines.tables.calibration import coefficient_rows, covariance_rows

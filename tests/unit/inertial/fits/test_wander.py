@@ -95,6 +95,20 @@ def test_parameters_of_the_station_are_found_within_their_errors(plan: State, rn
     assert np.all(ours > 1.5 * theirs)
 
 
+def test_under_a_strong_walk_the_bias_is_that_of_the_mean_of_the_record(plan: State, rng: np.random.Generator) -> None:
+    steps = 2e-4 * rng.normal(size=(UNITS, 100 * DWELLS, 3))
+    walk = np.cumsum(steps, axis=1) / 10.0  # a hundred steps from one dwell to the next
+    out = plan.force + walk[:, ::100] + WHITE * rng.normal(size=(UNITS, DWELLS, 3))
+    fit = fit_lot_with_wander(EFFECTS, plan, out, ERROR).fit
+    place = [names.index(("bias", "K0")) for names in fit.names]
+    bias = np.stack([fit.coefficients[:, axis, k] for axis, k in enumerate(place)], axis=1)
+    stated = np.stack([fit.standard_errors[:, axis, k] for axis, k in enumerate(place)], axis=1)
+    of_record, of_first = bias - walk[:, : 100 * (DWELLS - 1)].mean(axis=1), bias - walk[:, 0]
+    # the error that is stated has the mean of the flicker in it that the fit cannot tell from this walk
+    assert 0.6 < np.sqrt(np.mean((of_record / stated) ** 2)) < 1.1
+    assert np.std(of_record) < 0.3 * np.std(of_first)
+
+
 def test_dwells_left_out_are_predicted_within_their_errors(plan: State, rng: np.random.Generator) -> None:
     out, used = outputs(rng, plan, 1e-4, 0.0), np.arange(DWELLS) % 4 != 3
     wander_fit = fit_lot_with_wander(EFFECTS, plan, out, ERROR, used=used)
