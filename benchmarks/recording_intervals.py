@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 SEEDS = {"development": 53_000_000, "judging": 97_000_000}
 EFFECTS = ("bias", "scale", "misalignment")
 SIZES = (24, 30, 40, 60)
-WHAT = ("bias of the record", "bias coefficient", "scale", "angles")
+WHAT = ("bias of the record", "the same by its standard error", "scale", "angles")
 
 
 def upper(response: Floats) -> Floats:
@@ -34,16 +34,16 @@ def upper(response: Floats) -> Floats:
 
 
 def pulls(what: recordings.Recording, seed: int) -> tuple[Floats, ...]:
-    """(estimate - truth) over the stated standard error, of the bias of the record, its coefficient, scales, angles."""
+    """(estimate - truth) over the stated uncertainty, of the bias of the record (twice: also over its standard error), scales, angles."""
     from pipelines.stages.unknown_poses.fit import bias_uncertainty, norms_fitted
 
     made = recordings.make(what, seed)
     done = norms_fitted(made.dwells, None, EFFECTS)
     coefficients, errors = done.fit.fit.coefficients[0], done.fit.fit.standard_errors[0]
     truth = upper(made.response)
-    bias = (coefficients[:, 0] - made.bias) / errors[:, 0]
     of_record = 1e-6 * bias_uncertainty(done)["bias_record_u_ug"][0] * done.scale[0]
-    record = (coefficients[:, 0] - made.bias - made.response @ made.wander) / of_record
+    apart = coefficients[:, 0] - made.bias - made.response @ made.wander
+    record, bias = apart / of_record, apart / errors[:, 0]
     scale = np.array([(coefficients[k, 1] - truth[k, k]) / errors[k, 1] for k in range(3)])
     places = ((0, 1, 2), (0, 2, 3), (1, 2, 2))  # axis, other axis, column: the axes after the own one in turn
     angles = np.array([(coefficients[i, c] - truth[i, j]) / errors[i, c] for i, j, c in places])
