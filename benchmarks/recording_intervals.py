@@ -34,7 +34,7 @@ def upper(response: Floats) -> Floats:
 
 
 def pulls(what: recordings.Recording, seed: int) -> tuple[Floats, ...]:
-    """(estimate - truth) over the stated uncertainty, of the bias of the record (twice: also over its standard error), scales, angles."""
+    """(estimate - truth) over the stated uncertainty: bias of the record, the same by its standard error, scales, angles."""
     from pipelines.stages.unknown_poses.fit import bias_uncertainty, norms_fitted
 
     made = recordings.make(what, seed)
