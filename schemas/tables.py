@@ -14,6 +14,7 @@ VERSION = version.VERSION
 KINDS = ("dwell", "verification", "allan", "procedure")
 OUTPUT_UNITS = ("V", "LSB", "g", "m/s^2")
 OUTCOMES = ("pass", "fail", "refused")
+ADEQUATE, NOT_ADEQUATE, NOT_JUDGED = VERDICTS = ("adequate", "not adequate", "not judged")
 
 
 _OUT = ("out_x", "out_y", "out_z")
@@ -241,6 +242,18 @@ TABLES: dict[str, Table] = {
         {"unit": text(), "row": whole(), "column": whole(), "value": number()},
         finite=("value",),
         key=("unit", "row", "column"),
+    ),
+    # on the model of the run: the effects of the fit; one row, none without a model
+    "verdict": Table(
+        {
+            "model": text(),
+            "verdict": text(*VERDICTS),
+            **{name: any_text() for name in ("reason", "faulty")},
+            **gaps(("rms_ug", "floor_ug", "p_value")),
+            "named": flag(),
+            "units": whole(),
+        },
+        key=("model",),
     ),
     # risks of the decisions over the production that a lot stands for
     "lot_risks": Table(

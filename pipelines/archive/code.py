@@ -52,6 +52,11 @@ CODE = {
         *(*_ENGINE, "inertial.counts", "inertial.probability", "inertial.uncertainty"),
         *("pipelines.importers.judged", "pipelines.importers.plane"),
     ),
+    "judge": (
+        *(*_ENGINE, "inertial.counts", "inertial.criticism", "inertial.planning.drivers"),
+        *("inertial.planning.sequences", "inertial.probability", "inertial.roots", "inertial.timing"),
+        "pipelines.stages.judge",
+    ),
     "verify": (*_ENGINE, "inertial.correction", "pipelines.stages.rms_error", "pipelines.stages.verify"),
     "verify of norms": (
         *(*_ENGINE, "inertial.correction", "inertial.norm_fit", "inertial.norm_noise", "inertial.uncertainty"),

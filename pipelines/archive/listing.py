@@ -26,6 +26,7 @@ class RunInfo:
 
     station : its name; empty for an import · rerun_of : the run that it computes again; empty for others
     passed, graded : units; None before the grades are there
+    verdict : on the model, as the table ``verdict`` has it; None without one
     """
 
     id: str
@@ -39,6 +40,7 @@ class RunInfo:
     rerun_of: str = ""
     passed: int | None = None
     graded: int | None = None
+    verdict: str | None = None
 
 
 def info_of(run: Run) -> RunInfo | None:
@@ -61,20 +63,27 @@ def info_of(run: Run) -> RunInfo | None:
         rerun_of=about.get("rerun_of") or "",
         passed=None if outcomes is None else outcomes["pass"],
         graded=None if outcomes is None else outcomes.total(),
+        verdict=next(iter(_texts(run, names, VERDICT, "verdict") or ()), None),
     )
 
 
 def _outcomes(run: Run, names: set[str]) -> Counter[str] | None:
     """How many units passed, failed and were refused; None where there are no grades, or they cannot be read."""
-    if f"{GRADES}.parquet" not in names:
+    outcomes = _texts(run, names, GRADES, "outcome")
+    return None if outcomes is None else Counter(outcomes)
+
+
+def _texts(run: Run, names: set[str], table: str, column: str) -> list[str] | None:
+    """A column of texts of a table; None where the table is not there, or cannot be read."""
+    if f"{table}.parquet" not in names:
         return None
-    import pyarrow as pa  # a list of runs without grades does without it
+    import pyarrow as pa  # a list of runs without tables does without it
     import pyarrow.parquet as pq
 
     try:
-        file = pq.ParquetFile(pa.BufferReader((run.path / f"{GRADES}.parquet").read_bytes()))
+        file = pq.ParquetFile(pa.BufferReader((run.path / f"{table}.parquet").read_bytes()))
         # without threads: a short command that ends while Arrow's threads start is aborted (1 of 360 presses of the tab key)
-        return Counter(file.read(columns=["outcome"], use_threads=False)["outcome"].to_pylist())
+        return file.read(columns=[column], use_threads=False)[column].to_pylist()
     except (OSError, pa.ArrowInvalid, KeyError):  # 'tumbleline verify' says what is wrong with the file
         return None
 
@@ -89,7 +98,7 @@ def _sealed_stages(run: Run, names: set[str]) -> list[str]:
     return seal.get("stages", []) if there == named else []
 
 
-GRADES = "grades"
+GRADES, VERDICT = "grades", "verdict"
 FEWEST_NEW = 32  # reading fewer again is faster than writing the list
 TICK_NS = 2_000_000_000
 FINISHED = 1  # stamp of a finished run in an object store, whose folders have no time

@@ -18,6 +18,7 @@ from pipelines.jobs.adequacy import adequacy_of
 from pipelines.jobs.references import contradiction, references_of
 from pipelines.jobs.terms import archived_terms
 from pipelines.stages.grade import BUDGET
+from pipelines.stages.judge import AdequacyDocument, told_by
 from pipelines.stages.uncertainty.budget_terms import BudgetTerms
 from schemas.errors import ArchiveUnusable, WrongUse
 from schemas.limits import ADEQUACY_P_MIN
@@ -89,7 +90,7 @@ def refuse_inadequate(run: Run) -> str:
     judged = _verdict(run)
     if judged is None:
         return ""
-    adequate, reason, p, named = judged
+    adequate, reason, p, named = judged["adequate"], judged["reason"], judged["p_value"], judged["named"]
     least = float((run.about.get("limits") or {}).get("adequacy_p_min") or ADEQUACY_P_MIN)
     see = f"see 'tumbleline diagnose {run.id}'"
     if adequate is None or p is None:
@@ -112,23 +113,19 @@ def refuse_inadequate(run: Run) -> str:
     return f"{level}; certified, as nothing is found that it lacks and p is at least {least:g}"
 
 
-def _verdict(run: Run) -> tuple[bool | None, str | None, float | None, bool] | None:
-    """Whether a run's model is adequate, why that cannot be told, its p, and whether what it lacks is found.
-
-    None where there is nothing to judge.
-    """
-    if run.about.get("capture"):
-        own = adequacy_of(run)
-        return None if own is None else (own["adequate"], own["reason"], own["p_value"], own["named"])
-    if "dwells" not in run.tables():
+def _verdict(run: Run) -> AdequacyDocument | None:
+    """The verdict on a run's model; an import without one is judged. None where there is nothing to judge."""
+    own = adequacy_of(run)
+    if own is not None:
+        return own
+    if run.about.get("capture") or "dwells" not in run.tables():
         return None
     from pipelines.diagnosis.diagnose import diagnose  # loads the search for effects, which captured runs do not need
 
     past = run.table("history") if "history" in run.tables() else None
     effects = list((run.about.get("recipe") or {}).get("effects", ()))
-    verdict = diagnose(run.table("dwells"), past, effects or None)
-    named = bool(verdict["classes"] or verdict["unexplained"] or verdict["removed"])
-    return verdict["adequate"], verdict["reason"], verdict["error"]["p_value"], named
+    dwells = run.table("dwells")
+    return told_by(diagnose(dwells, past, effects or None), dwells["unit"].nunique())
 
 
 REFUTED_BELOW = 0.001

@@ -12,6 +12,7 @@ from pipelines.archive import Records, Run
 from pipelines.jobs.terms import budget_terms
 from pipelines.stages.fit import fit_tables
 from pipelines.stages.grade import GradeEvidence, grade
+from pipelines.stages.judge import judge
 from pipelines.stages.noise import noise
 from pipelines.stages.procedures import procedures
 from pipelines.stages.reduce import reduced_summaries
@@ -111,6 +112,10 @@ def _fit(job: Job, run: Run) -> Tables:
     return fit_tables(_lot(run), job.recipe.effects)
 
 
+def _judge(job: Job, run: Run) -> Tables:
+    return judge(run.table("dwells"), run.table("history"), job.recipe.effects if job.recipe.tumbles else ())
+
+
 def _verify(job: Job, run: Run) -> Tables:
     coefficients, covariance, predictions = (run.table(name) for name in _VERIFIED[2:])
     return verify_tables(_lot(run), coefficients, covariance, predictions)
@@ -157,6 +162,13 @@ def _procedures(job: Job, run: Run) -> Tables:
     return procedures(job.recipe, _records(run).samples, *tables)
 
 
+def _model(job: Job) -> dict[str, Any]:
+    return {
+        "effects": job.recipe.effects,
+        "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
+    }
+
+
 def _listed(job: Job) -> dict[str, Any]:
     if not job.recipe.procedures:
         return {}
@@ -186,11 +198,15 @@ STAGES: tuple[Stage, ...] = (
         name="fit",
         inputs=("dwells", "history"),
         outputs=("coefficients", "covariance", "residuals", "predictions", "wander"),
-        parameters=lambda job: {
-            "effects": job.recipe.effects,
-            "formulas": [f.model_dump(mode="json") for f in job.recipe.formulas],
-        },
+        parameters=_model,
         call=_fit,
+    ),
+    Stage(
+        name="judge",
+        inputs=("dwells", "history"),
+        outputs=("verdict",),
+        parameters=_model,
+        call=_judge,
     ),
     Stage(
         name="verify",

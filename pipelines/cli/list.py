@@ -7,6 +7,7 @@ from dataclasses import asdict
 from inertial.counts import number_of
 from pipelines.archive import RunInfo
 from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
+from schemas.tables import ADEQUATE
 
 PART = "Results"
 ORDER = 310
@@ -39,14 +40,21 @@ def command(archive: ArchiveOption = None, *, as_json: JsonOption = False) -> No
 
 def _line(info: RunInfo) -> list[str]:
     started = info.started[:16].replace("T", " ")
-    return [info.id, started, info.station or "import", _result(info), f"{_units(info.units)}, {info.device}"]
+    return [
+        info.id,
+        started,
+        info.station or "import",
+        _result(info),
+        f"{_units(info.units)}, {info.device}",
+    ]
 
 
 def _result(info: RunInfo) -> str:
-    """The number of units that passed, or the state of the run."""
-    if info.graded is not None and info.finished:
-        return f"{info.passed} of {info.graded}"
-    return "not graded" if info.finished else "unfinished"
+    """The number of units that passed, or the state of the run; and the verdict on its model where that is not adequate."""
+    if not info.finished:
+        return "unfinished"
+    passed = "not graded" if info.graded is None else f"{info.passed} of {info.graded}"
+    return passed if info.verdict in {None, ADEQUATE} else f"{passed}, model {info.verdict}"
 
 
 def _units(units: tuple[str, ...]) -> str:

@@ -17,6 +17,7 @@ from inertial.uncertainty.rounding import equal
 from pipelines.diagnosis.diagnose import default_model, diagnose
 from pipelines.importers.judged import FitAnswer, gravity_of, imported_dwells
 from pipelines.importers.mapping import Mapping
+from pipelines.stages.judge import AdequacyDocument, told_by, verdict_table
 from pipelines.stages.unknown_poses.fit import FittedNorms, bias_uncertainty, fitted_dwells, norm_tables, norms_fitted
 from pipelines.tables.condense import MOST
 from schemas.errors import DataRejected
@@ -39,6 +40,7 @@ def norm(data: Imported, mapping: Mapping) -> FitAnswer:
     tables = norm_tables(answer.fit, dwells)
     rows = [{str(name): value for name, value in row.items()} for row in tables["coefficients"].to_dict("records")]
     others = {name: tables[name] for name in ("covariance", "residuals", "predictions", "wander")}
+    others["verdict"] = verdict_table(answer.verdict, effects)
     return FitAnswer("norm", answer.adequate, answer.document, answer.lines, rows, tuple(effects), others)
 
 
@@ -50,6 +52,7 @@ class NormAnswer:
     adequate: bool | None
     document: dict[str, Any]
     lines: tuple[str, ...]
+    verdict: AdequacyDocument
 
 
 def fitted(
@@ -71,7 +74,13 @@ def fitted(
         smaller = _smaller(dwells, history, effects, gravity)
     verdict = diagnose(fitted_dwells(dwells), history, list(effects))
     document = _document(done, smaller, verdict)
-    return NormAnswer(done, verdict["adequate"], document, tuple(_lines(done, smaller, verdict, out_unit)))
+    return NormAnswer(
+        done,
+        verdict["adequate"],
+        document,
+        tuple(_lines(done, smaller, verdict, out_unit)),
+        told_by(verdict, dwells["unit"].nunique()),
+    )
 
 
 def _smaller(

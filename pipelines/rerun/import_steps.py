@@ -11,9 +11,11 @@ import pandas as pd
 from pipelines.archive import Run, code_hash
 from pipelines.chain.chain import BY_NAME, Tables
 from pipelines.importers.plane import plane_answer
+from pipelines.stages.judge import judge
 from pipelines.stages.uncertainty.budget import budget
 from pipelines.stages.uncertainty.budget_terms import BudgetTables, BudgetTerms
 from pipelines.stages.unknown_poses.budget import norm_budget
+from pipelines.stages.unknown_poses.fit import fitted_dwells
 from pipelines.stages.unknown_poses.verify import verify_norms
 from pipelines.tables.frames import empty_table
 
@@ -54,6 +56,20 @@ def verify_norms_step(gravity: float, *, history: bool) -> StageCall:
     code = code_hash("verify of norms")
     inputs = (*names, "history") if history else names
     return StageCall("verify", inputs, stage.outputs, {"gravity_g": gravity}, code, call)
+
+
+def judge_step(model: dict[str, Any], *, history: bool, known: bool) -> StageCall:
+    """The verdict on the model of an import; of dwells of unknown poses those that are held out are not judged."""
+    stage = BY_NAME["judge"]
+
+    def call(run: Run) -> Tables:
+        dwells = run.table("dwells")
+        past = run.table("history") if history else None
+        return judge(dwells if known else fitted_dwells(dwells), past, model["effects"])
+
+    inputs = ("dwells", "history") if history else ("dwells",)
+    parameters = {"effects": model["effects"], "formulas": model["formulas"], "known_poses": known}
+    return StageCall("judge", inputs, stage.outputs, parameters, code_hash(stage.name), call)
 
 
 def plane_step(across: int, gravity: float) -> StageCall:

@@ -22,6 +22,7 @@ from pipelines.rerun.archived_job import ArchivedJob, archived_job, model_keys, 
 from pipelines.rerun.import_steps import (
     StageCall,
     budget_step,
+    judge_step,
     no_noise,
     plane_step,
     recorded_history,
@@ -114,6 +115,7 @@ def _imported(run: Run, change: ModelChange, left_out: Dwells) -> Plan:
     history = "history" in run.tables()
     gravity = gravity_of_import(about)
     steps = [_import_step(history, left_out, run), _fit_step(model, history, None if known else gravity)]
+    steps.append(judge_step(model, history=history, known=known))
     steps += [_verify_step(history)] if known else [verify_norms_step(gravity, history=history)]
     terms = archived_terms({**about, "limits": limits.model_dump(mode="json") if limits else about.get("limits")})
     steps += [budget_step(terms, history=history, known=known)] if terms else []

@@ -18,6 +18,7 @@ STARTS = {
     "fit": "pipelines.stages.fit",
     "fit of norms": "pipelines.stages.unknown_poses.fit",
     "fit in a plane": "pipelines.importers.plane",
+    "judge": "pipelines.stages.judge",
     "verify": "pipelines.stages.verify",
     "verify of norms": "pipelines.stages.unknown_poses.verify",
     "noise": "pipelines.stages.noise",

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from pipelines.capture.interruptions import Interruptions
-from pipelines.jobs.adequacy import AdequacyDocument
 from pipelines.jobs.references import ReferencesDocument
+from pipelines.stages.judge import AdequacyDocument
 
 
 class FigureDocument(TypedDict):
@@ -88,6 +88,7 @@ class ListedRun(TypedDict):
     rerun_of: NotRequired[Annotated[str, "the run that it computes again; empty for others"]]
     passed: NotRequired[Annotated[int | None, "units that passed; null before the grades are there"]]
     graded: NotRequired[Annotated[int | None, "units with a decision; null before the grades are there"]]
+    verdict: NotRequired[Annotated[str | None, "adequate, not adequate, not judged; null without a model to judge"]]
 
 
 class ListDocument(TypedDict):

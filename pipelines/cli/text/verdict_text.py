@@ -8,8 +8,8 @@ from pipelines.archive import Run
 from pipelines.cli.options import console, error_console
 
 if TYPE_CHECKING:
-    from pipelines.jobs.adequacy import AdequacyDocument
     from pipelines.jobs.references import ReferencesDocument
+    from pipelines.stages.judge import AdequacyDocument
 
 
 STYLE_OF = {True: "bold green", False: "bold red", None: "bold yellow"}

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +13,20 @@ from lots import lot
 from typer.testing import CliRunner
 
 from inertial.uncertainty.rounding import chance
-from pipelines.archive import Run
+from pipelines.archive import Archive, Run
 from pipelines.cli import app
 from pipelines.cli.run import _next
 from pipelines.cli.summary import summary
 from pipelines.cli.text.verdict_text import judged, print_adequacy
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.sentences import verdict
-from pipelines.jobs.adequacy import adequacy, adequacy_of
+from pipelines.jobs.adequacy import adequacy_of
+from pipelines.jobs.model_change import change_from_options
 from pipelines.report.context import ReportContext
 from pipelines.report.numbers import significant
 from pipelines.report.panels import model_adequacy
+from pipelines.rerun.rerun import again
+from pipelines.stages.judge import adequacy, judge, told_by, verdict_of
 
 MODEL = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]
 FIGURES = ("rms_ug", "floor_ug", "p_value")
@@ -112,6 +116,40 @@ def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.C
     cards = re.findall(r"<b>(.*?)</b>", panel)
     assert cards == [f"{significant(document[n])} µg" for n in FIGURES[:2]] + [chance(document["p_value"])]
     assert f"tumbleline diagnose {run.id}" in panel
+
+
+def test_the_verdict_of_a_run_is_read_from_its_archive(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inertial.criticism.verdict.judged", None)  # nothing is judged again
+    document = adequacy_of(run)
+    assert document is not None
+    [row] = run.table("verdict").to_dict("records")
+    assert row["model"] == ",".join(run.about["recipe"]["effects"])
+    assert row["p_value"] == document["p_value"]
+    [listed] = json.loads(_command("list", "--json", "--archive", run.archive.root))["runs"]
+    assert listed["verdict"] == row["verdict"] == ("adequate" if document["adequate"] else "not adequate")
+
+
+def test_another_model_of_a_run_has_a_verdict_of_its_own(run: Run) -> None:
+    archive = Archive(run.archive.root)
+    other = again(
+        archive, run.id, change_from_options(effects=",".join([*run.about["recipe"]["effects"], "third_order"]))
+    ).new
+    document = adequacy_of(archive.run(other))
+    assert document is not None
+    whole = json.loads(_command("diagnose", other, "--json", "--archive", run.archive.root))
+    assert (document["adequate"], document["p_value"]) == (whole["adequate"], whole["error"]["p_value"])
+
+
+@pytest.mark.parametrize("made", [_plain, _hidden, _knocked, _few, _swapped])
+def test_a_verdict_comes_back_from_its_table_and_is_that_of_a_diagnosis(made: Callable[[], pd.DataFrame]) -> None:
+    table = made()
+    effects = MODEL if made is not _few else MODEL[:3]
+    stored = verdict_of(judge(table, None, effects)["verdict"])
+    assert stored == told_by(diagnose(table, None, effects), table["unit"].nunique())
+
+
+def test_a_run_without_a_model_has_no_verdict() -> None:
+    assert verdict_of(judge(_plain(), None, ())["verdict"]) is None
 
 
 def test_a_judged_run_keeps_its_tables_and_hashes(run: Run) -> None:

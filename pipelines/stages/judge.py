@@ -1,0 +1,146 @@
+"""The verdict on the model of a run: whether it is adequate, with residual, noise and probability; one row of the archive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+from typing_extensions import TypedDict
+
+from inertial import effects as catalogue
+from inertial.errors import InertialError
+from pipelines.tables.frames import empty_table, rows_of
+from pipelines.tables.sound_lot import error_of, every_unit_faulty, generator, sound_lot
+from schemas.errors import DataRejected, RecipeInvalid
+from schemas.tables import ADEQUATE, NOT_ADEQUATE, NOT_JUDGED
+
+_TEXTS = {True: ADEQUATE, False: NOT_ADEQUATE, None: NOT_JUDGED}
+_FIGURES = ("rms_ug", "floor_ug", "p_value")
+
+
+class AdequacyDocument(TypedDict):
+    """Whether the model of a run is adequate: the verdict of ``diagnose`` on the same run."""
+
+    adequate: Annotated[bool | None, "null: cannot be judged, see `reason`"]
+    reason: Annotated[str | None, "why it cannot be judged, with what is missing"]
+    rms_ug: Annotated[float | None, "root mean square residual of the units without a data fault, µg"]
+    floor_ug: Annotated[float | None, "noise of the measurement: white noise and wander between the dwells, µg"]
+    p_value: Annotated[float | None, "probability of such a residual if the model is adequate, at least 1e-300"]
+    named: Annotated[bool, "whether an effect, a driver or an error of handling is found that the model lacks"]
+    units: Annotated[int, "number of units that were judged"]
+    faulty: Annotated[list[str], "units that were left out because of a data fault"]
+
+
+def judge(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> dict[str, pd.DataFrame]:
+    """The table ``verdict`` of a run; without rows where it has no model, as without a multi-position test."""
+    return {"verdict": verdict_table(verdict_on(dwells, history, effects) if effects else None, effects)}
+
+
+def verdict_on(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
+    """The verdict; where the data or an effect are not usable, the reason."""
+    if dwells.empty:
+        return _not_judged("every unit was refused, so that no dwell is left; see the reasons of each unit")
+    try:
+        return adequacy(dwells, history, effects)
+    except (DataRejected, RecipeInvalid, InertialError) as problem:
+        return _not_judged(str(problem).rstrip("."))
+
+
+def adequacy(dwells: pd.DataFrame, history: pd.DataFrame | None, effects: Sequence[str]) -> AdequacyDocument:
+    """The verdict of dwells on a model: what a diagnosis says of it, without classes, drivers and proposals.
+
+    Raises
+    ------
+    DataRejected
+        There are no dwells, or too few to judge anything.
+    InertialError
+        An effect is unknown, or the dwells lack a quantity of the model.
+    """
+    from inertial.criticism.verdict import judged  # loads the search for effects: a run without dwells does not need it
+
+    catalogue.get_all(list(effects))
+    measurement, faults, lot = sound_lot(dwells, history, effects)
+    faulty = sorted({measurement.units[fault.unit] for fault in faults})
+    if lot is None:
+        return _not_judged(every_unit_faulty(faults), faulty)
+    with threadpool_limits(1):
+        verdict = judged(lot, effects, generator())
+    error = error_of(verdict)
+    return {
+        "adequate": verdict.adequate,
+        "reason": verdict.unjudged or None,
+        "rms_ug": error["rms_ug"],
+        "floor_ug": error["floor_ug"],
+        "p_value": error["p_value"],
+        "named": verdict.named,
+        "units": len(measurement.units) - len(faulty),
+        "faulty": faulty,
+    }
+
+
+def told_by(diagnosis: Mapping[str, Any], units: int) -> AdequacyDocument:
+    """The verdict that a diagnosis of the same dwells of some units, and of the same model, has told."""
+    faulty = sorted({unit for fault in diagnosis["blocked_by"] for unit in fault["units"]})
+    error = diagnosis["error"]
+    return {
+        "adequate": diagnosis["adequate"],
+        "reason": diagnosis["reason"],
+        "rms_ug": error["rms_ug"],
+        "floor_ug": error["floor_ug"],
+        "p_value": error["p_value"],
+        "named": bool(diagnosis["classes"] or diagnosis["unexplained"]),
+        "units": units - len(faulty) if diagnosis["adequate"] is not None or error["rms_ug"] is not None else 0,
+        "faulty": faulty,
+    }
+
+
+def verdict_table(verdict: AdequacyDocument | None, effects: Sequence[str]) -> pd.DataFrame:
+    """A verdict on a model as the table ``verdict``; without rows where there is none."""
+    if verdict is None:
+        return empty_table(
+            texts="model verdict reason faulty", numbers=" ".join(_FIGURES), whole="units", flags="named"
+        )
+    figures = dict(zip(_FIGURES, (verdict["rms_ug"], verdict["floor_ug"], verdict["p_value"]), strict=True))
+    figures = {name: np.nan if value is None else value for name, value in figures.items()}
+    row = {
+        "model": ",".join(effects),
+        "verdict": _TEXTS[verdict["adequate"]],
+        "reason": verdict["reason"] or "",
+        **figures,
+    }
+    more = {"named": verdict["named"], "units": verdict["units"], "faulty": ", ".join(verdict["faulty"])}
+    return pd.DataFrame([{**row, **more}])
+
+
+def verdict_of(table: pd.DataFrame) -> AdequacyDocument | None:
+    """The verdict of a table ``verdict``; None where it has no row."""
+    if table.empty:
+        return None
+    (row,) = rows_of(table)
+    rms, floor, p = (None if np.isnan(row[name]) else float(row[name]) for name in _FIGURES)
+    return {
+        "adequate": {text: value for value, text in _TEXTS.items()}[str(row["verdict"])],
+        "reason": str(row["reason"]) or None,
+        "rms_ug": rms,
+        "floor_ug": floor,
+        "p_value": p,
+        "named": bool(row["named"]),
+        "units": int(row["units"]),
+        "faulty": str(row["faulty"]).split(", ") if row["faulty"] else [],
+    }
+
+
+def _not_judged(reason: str, faulty: Sequence[str] = ()) -> AdequacyDocument:
+    return {
+        "adequate": None,
+        "reason": reason,
+        "rms_ug": None,
+        "floor_ug": None,
+        "p_value": None,
+        "named": False,
+        "units": 0,
+        "faulty": list(faulty),
+    }
