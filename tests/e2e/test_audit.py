@@ -1,17 +1,19 @@
 """The audit and the questions in SQL, from the command line, on a generated archive whose hidden events are known."""
 
 import json
+import os
+import re
 import shutil
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
-
-from in_process import given
+from each import each
+from in_process import document_of, given, refused, text_of
+from root_process import ROOT, python
 from s3_server import CREDENTIALS, s3_bucket
 
 from benchmarks.generated_archive import write_archive
@@ -24,10 +26,12 @@ from pipelines.audit.findings import findings
 from pipelines.audit.index import up_to_date
 from pipelines.audit.rules import load_rules
 from pipelines.audit.sql import ask
+from pipelines.flows.local import local_server
 from pipelines.tables.json_values import json_value
 from schemas.errors import RecipeInvalid, WrongUse
 
 UNTIL = "2022-01-31"
+NAMESPACES = ("www.w3.org", "purl.org", "creativecommons.org")
 
 
 @pytest.fixture(scope="module")
@@ -37,54 +41,56 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def told(folder: Path) -> str:
+@pytest.fixture
+def copy(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "archive"))
+
+
+def audited(archive: Archive):
+    return audit(archive, load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
+
+
+def told(archive: Archive) -> str:
     """The whole document of an audit, as text."""
-    audited = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
-    return json.dumps(json_value(document(audited, findings(audited), "archive")), sort_keys=True)
+    found = audited(archive)
+    return json.dumps(json_value(document(found, findings(found), "archive")), sort_keys=True)
+
+
+def content(folder: Path, pattern: str = "*") -> dict[Path, bytes]:
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob(pattern) if path.is_file()}
 
 
 def test_the_command_tells_findings_by_who_must_act_and_leaves_one(made, tmp_path):
-    page = tmp_path / "audit.html"
-    status, out, err = given(
-        "audit", "--archive", str(made), "--until", UNTIL, "--page", str(page), "--json", "--workers", "1"
-    )
-    document = json.loads(out)
-    assert status == 1
-    assert err == ""
-    assert document["counts"]["runs"] == 24
-    order = [finding["who"] for finding in document["findings"]]
+    page, words = tmp_path / "audit.html", ("audit", "--archive", made, "--until", UNTIL, "--workers", "1")
+    found = document_of(*words, "--page", page, status=1)
+    assert found["counts"]["runs"] == 24
+    order = [finding["who"] for finding in found["findings"]]
     assert order == sorted(order, key=["quality", "station", "line", "product", "archive"].index)
-    assert document["due"]["units"] > 100
+    assert found["due"]["units"] > 100
     text = page.read_text(encoding="utf-8")
     assert "<svg" in text
-    assert "http://" not in text.replace("http://www.w3.org", "").replace("http://purl.org", "").replace(
-        "http://creativecommons.org", ""
-    )
-    status, shown, _ = given("audit", "--archive", str(made), "--until", UNTIL, "--workers", "1")
-    assert status == 1
-    assert document["findings"][0]["message"] in " ".join(shown.split())
+    assert set(re.findall(r"http://[\w.]+", text)) <= {f"http://{name}" for name in NAMESPACES}
+    assert found["findings"][0]["message"] in text_of(*words, status=1)
 
 
 def test_the_index_is_no_second_truth(made):
-    first = told(made)
+    first = told(Archive(made))
     shutil.rmtree(made / "index")
-    assert told(made) == first
-    assert told(made) == first  # and from an index that is there
+    assert told(Archive(made)) == first
+    assert told(Archive(made)) == first  # and from an index that is there
 
 
-def test_only_changed_runs_are_read_again_and_a_changed_byte_leaves_out_its_run(made, tmp_path):
-    copy = tmp_path / "archive"
-    shutil.copytree(made, copy)
+def test_only_changed_runs_are_read_again_and_a_changed_byte_leaves_out_its_run(copy):
     first = up_to_date(Archive(copy))
     assert (first.made + first.kept, first.table("runs").num_rows) == (24, 24)
     assert up_to_date(Archive(copy)).made == 0
     run = sorted(path.name for path in (copy / "runs").iterdir())[3]
     table = copy / "runs" / run / "figures.parquet"
     table.write_bytes(table.read_bytes()[:-1] + b"x")
-    audited = audit(Archive(copy), load_rules(), Scope(day_of("2021-01-01"), day_of(UNTIL)))
-    assert [name for name, _ in audited.problems] == [run]
-    assert [f.subject for f in findings(audited) if f.who == "archive"] == [run]
-    assert run not in set(audited.all.run)
+    found = audited(Archive(copy))
+    assert [name for name, _ in found.problems] == [run]
+    assert [f.subject for f in findings(found) if f.who == "archive"] == [run]
+    assert run not in set(found.all.run)
     shutil.rmtree(copy / "runs" / run)
     again = up_to_date(Archive(copy))
     assert run not in again.table("runs").column("run").to_pylist()
@@ -92,13 +98,14 @@ def test_only_changed_runs_are_read_again_and_a_changed_byte_leaves_out_its_run(
 
 
 def test_parts_have_the_same_bytes_whoever_makes_them(made, tmp_path):
-    one, two = tmp_path / "one", tmp_path / "two"
-    for folder, workers in ((one, 1), (two, 2)):
+    parts = []
+    for name, workers in (("one", 1), ("two", 2)):
+        folder = tmp_path / name
         shutil.copytree(made, folder, ignore=shutil.ignore_patterns("index"), copy_function=shutil.copy2)
         up_to_date(Archive(folder), workers=workers)
-    files = sorted(path.relative_to(one) for path in (one / "index").rglob("*.parquet"))
-    assert files
-    assert [path for path in files if (one / path).read_bytes() != (two / path).read_bytes()] == []
+        parts.append(content(folder / "index", "*.parquet"))
+    assert parts[0]
+    assert parts[0] == parts[1]
 
 
 def test_an_archive_that_cannot_be_written_is_audited_too(made, tmp_path, monkeypatch):
@@ -113,17 +120,14 @@ def test_an_archive_that_cannot_be_written_is_audited_too(made, tmp_path, monkey
     assert index.up_to_date(Archive(made)).table("runs").num_rows == 24
 
 
-def test_a_re_run_of_a_capture_is_not_a_second_calibration(made, tmp_path):
-    copy = tmp_path / "archive"
-    shutil.copytree(made, copy)
+def test_a_re_run_of_a_capture_is_not_a_second_calibration(made, copy):
     run = min((copy / "runs").iterdir())
     again = copy / "runs" / f"{run.name}x"
     shutil.copytree(run, again)
     about = json.loads((again / "run.json").read_text())
-    (again / "run.json").write_text(
-        json.dumps({**about, "rerun_of": run.name, "measured": about["when"], "when": "2026-01-01T00:00:00+00:00"})
-    )
-    assert told(copy) == told(made)
+    about |= {"rerun_of": run.name, "measured": about["when"], "when": "2026-01-01T00:00:00+00:00"}
+    (again / "run.json").write_text(json.dumps(about))
+    assert told(Archive(copy)) == told(Archive(made))
 
 
 def test_questions_in_sql_see_the_same_from_index_and_files(made):
@@ -134,26 +138,26 @@ def test_questions_in_sql_see_the_same_from_index_and_files(made):
     assert counted == (sum(len(archive.run(info.id).table("dwells")) for info in archive.runs()), 24)
 
 
-@pytest.mark.parametrize(
-    ("question", "words"),
-    [
-        ("SELECT * FROM grade", "did you mean grades?"),
-        ("SELEC 1", "syntax error"),
-        ("DROP TABLE runs", "found drop, one SELECT is needed"),
-        ("SELECT 1; SELECT 2", "one query at a time"),
-        ("COPY (SELECT 1) TO 'x.csv'", "found copy"),
-        ("SELECT * FROM read_text('../secret')", "disabled by configuration"),
-        ("SELECT nothing FROM runs", "nothing"),
-        ("", "no statement"),
-        ("EXPLAIN ANALYZE COPY (SELECT 1) TO 'x.csv'", "found explain of copy, one SELECT is needed"),
-        ("EXPLAIN ANALYZE CREATE TABLE t AS SELECT 1", "found explain of create"),
-        ("SELECT * FROM archive", "no view is called 'archive'"),  # a variable of the caller is no view
-    ],
-)
-def test_a_question_that_cannot_be_answered_is_refused_clearly(made, question, words):
-    with pytest.raises(WrongUse, match=r"^query: ") as refused:
+UNANSWERED = {
+    "SELECT * FROM grade": "did you mean grades?",
+    "SELEC 1": "syntax error",
+    "DROP TABLE runs": "found drop, one SELECT is needed",
+    "SELECT 1; SELECT 2": "one query at a time",
+    "COPY (SELECT 1) TO 'x.csv'": "found copy",
+    "SELECT * FROM read_text('../secret')": "disabled by configuration",
+    "SELECT nothing FROM runs": "nothing",
+    "": "no statement",
+    "EXPLAIN ANALYZE COPY (SELECT 1) TO 'x.csv'": "found explain of copy, one SELECT is needed",
+    "EXPLAIN ANALYZE CREATE TABLE t AS SELECT 1": "found explain of create",
+    "SELECT * FROM archive": "no view is called 'archive'",  # a variable of the caller is no view
+}
+
+
+@each(UNANSWERED)
+def test_a_question_that_cannot_be_answered_is_refused_clearly(question, made):
+    with pytest.raises(WrongUse, match=r"^query: ") as problem:
         ask(Archive(made), question)
-    assert words in str(refused.value)
+    assert UNANSWERED[question] in str(problem.value)
 
 
 ATTACKS = (  # {t} is a table of the archive, {d} a folder in it
@@ -184,43 +188,39 @@ ATTACKS = (  # {t} is a table of the archive, {d} a folder in it
 def test_no_question_writes_or_reads_a_file_of_its_own_choice(made):
     table = min((made / "runs").glob("*/dwells.parquet"))
     ask(Archive(made), "SELECT count(*) FROM runs")  # the index is there
-    before = {path: path.read_bytes() for path in made.rglob("*") if path.is_file()}
+    before = content(made)
     for attack in ATTACKS:
         question = attack.format(t=table, d=table.parent)
         with pytest.raises(WrongUse, match=r"^query: "):
             ask(Archive(made), question)
-        assert {path for path in made.rglob("*") if path.is_file()} == before.keys(), question
-    assert {path: path.read_bytes() for path in before} == before
+        assert {path.relative_to(made) for path in made.rglob("*") if path.is_file()} == before.keys(), question
+    assert content(made) == before
 
 
-@pytest.mark.parametrize(
-    "question",
+@each(
     [
         "EXPLAIN SELECT * FROM dwells", "EXPLAIN ANALYZE SELECT count(*) FROM dwells", "explain (format json) FROM units",
         "-- how many\nEXPLAIN /* so */ ANALYZE WITH q AS (SELECT 1) SELECT * FROM q", "DESCRIBE units",
         "SUMMARIZE units", "FROM units", "TABLE units", "VALUES (1)", "/* first */ SELECT 1 -- last",
     ],
 )  # fmt: skip
-def test_every_way_to_read_is_answered(made, question):
+def test_every_way_to_read_is_answered(question, made):
     assert ask(Archive(made), question).rows
 
 
 def test_the_query_command_prints_a_table_json_and_csv(made):
-    question = "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station"
-    status, out, _ = given("query", question, "--archive", str(made), "--json")
-    assert (status, json.loads(out)["rows"][0]) == (0, {"station": "line-1", "n": 6})
-    assert given("query", question, "--archive", str(made), "--csv")[1].splitlines()[:2] == ["station,n", "line-1,6"]
-    assert "line-1" in given("query", question, "--archive", str(made))[1]
-    assert given("query", question, "--archive", str(made), "--csv", "--json")[0] == 2
+    words = ("query", "SELECT station, count(*) AS n FROM runs GROUP BY station ORDER BY station", "--archive", made)
+    assert document_of(*words, status=0)["rows"][0] == {"station": "line-1", "n": 6}
+    assert given(*words, "--csv")[1].splitlines()[:2] == ["station,n", "line-1,6"]
+    assert "line-1" in text_of(*words)
+    refused(*words, "--csv", "--json")
 
 
 def test_what_cannot_be_audited_is_refused(made, tmp_path):
-    status, _, err = given("audit", "--archive", str(made), "--device", "ADXL335")
-    assert (status, "did you mean ADXL355?" in err) == (2, True)
-    status, _, err = given("audit", "--archive", str(made), "--since", "2024-01-01", "--until", "2023-01-01")
-    assert (status, "a period is needed" in err) == (2, True)
-    status, _, err = given("audit", "--archive", str(tmp_path / "none"))
-    assert (status, "has no calibration" in err) == (2, True)
+    words = ("audit", "--archive", made)
+    assert "did you mean ADXL355?" in refused(*words, "--device", "ADXL335")
+    assert "a period is needed" in refused(*words, "--since", "2024-01-01", "--until", "2023-01-01")
+    assert "has no calibration" in refused("audit", "--archive", tmp_path / "none")
 
 
 def test_rules_say_what_is_wrong_with_them(tmp_path):
@@ -246,9 +246,9 @@ def test_rules_say_what_is_wrong_with_them(tmp_path):
 def test_every_hidden_event_of_some_years_is_found(tmp_path):
     folder = tmp_path / "archive"
     truth = write_archive(folder, 500, years=5.0, seed=2, workers=2)
-    audited = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of("2026-01-04")))
+    found = audit(Archive(folder), load_rules(), Scope(day_of("2021-01-01"), day_of("2026-01-04")))
     by_kind: dict[str, list] = {}
-    for finding in findings(audited):
+    for finding in findings(found):
         by_kind.setdefault(finding.kind, []).append(finding)
     assert {f.subject for f in by_kind["exchanged"]} == set(truth["swap"]["units"])
     assert {f.evidence["run"] for f in by_kind["exchanged"]} == {truth["swap"]["run"]}
@@ -258,34 +258,31 @@ def test_every_hidden_event_of_some_years_is_found(tmp_path):
     assert moved.evidence["earliest"] <= truth["level"]["date"][:10] <= moved.evidence["latest"]
     assert moved.evidence["shift_urad"] == pytest.approx(300.0, abs=20.0)
     level_day = day_of(truth["level"]["date"])
-    since = (audited.all.station == "line-2") & (audited.all.day >= level_day) & audited.product
-    assert set(moved.units) == {str(unit) for unit in audited.all.unit[since]}
+    since = (found.all.station == "line-2") & (found.all.day >= level_day) & found.product
+    assert set(moved.units) == {str(unit) for unit in found.all.unit[since]}
     [knocked] = by_kind["slot_moved"]
     assert knocked.evidence["where"] == f"slot {truth['slot']['slot']}"
     assert knocked.evidence["earliest"] <= truth["slot"]["date"][:10] <= knocked.evidence["latest"]
     assert [f.subject for f in by_kind["odd_lot"]] == [truth["bad_lot"]["run"]]
-    assert {study.first_day for study in audited.studies} != set()
+    assert {study.first_day for study in found.studies} != set()
     assert "standard" not in by_kind  # the check standards of this factory stand still
     assert "foreign" not in by_kind
-    assert date_of(audited.scope.until) == "2026-01-04"
+    assert date_of(found.scope.until) == "2026-01-04"
 
 
 @pytest.mark.slow
-def test_an_audit_on_dask_workers_is_the_same(made, tmp_path):
-    copy = tmp_path / "archive"
-    shutil.copytree(made, copy, ignore=shutil.ignore_patterns("index"))
-    command = [sys.executable, "-m", "pipelines.cli", "audit", "--archive", str(copy), "--until", UNTIL, "--json"]
-    done = subprocess.run(
-        [*command, "--dask", "local"], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
-    )
-    assert done.returncode == 1, done.stderr
-    parts = {path.name: path.read_bytes() for path in (copy / "index").rglob("*.parquet")}
-    shutil.rmtree(copy / "index")
-    here = subprocess.run(
-        [*command, "--workers", "1"], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
-    )
-    assert here.stdout == done.stdout
-    assert {path.name: path.read_bytes() for path in (copy / "index").rglob("*.parquet")} == parts
+def test_an_audit_on_dask_workers_is_the_same(copy):
+    shutil.rmtree(copy / "index", ignore_errors=True)
+    words = [sys.executable, "-m", "pipelines.cli", "audit", "--archive", str(copy), "--until", UNTIL, "--json"]
+    outputs, parts = [], []
+    for how in (("--dask", "local"), ("--workers", "1")):
+        done = subprocess.run([*words, *how], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False)
+        assert done.returncode == 1, done.stderr
+        outputs.append(done.stdout)
+        parts.append(content(copy / "index", "*.parquet"))
+        shutil.rmtree(copy / "index")
+    assert outputs[0] == outputs[1]
+    assert parts[0] == parts[1]
 
 
 @pytest.mark.slow
@@ -294,27 +291,42 @@ def test_an_archive_in_an_object_store_gives_the_same_audit_and_answers(made, mo
         monkeypatch.setenv(name, value)
     with s3_bucket() as query:
         store = Archive(f"s3://factory/archive?{query}")
-        for path in made.rglob("*"):
-            name = path.relative_to(made)
-            if path.is_file() and name.parts[0] != "index":
-                place = store.root
-                for part in name.parts:
-                    place = place / part
-                place.write_bytes(path.read_bytes())
-        scope = Scope(day_of("2021-01-01"), day_of(UNTIL))
-        audited = audit(store, load_rules(), scope)
-        assert json.dumps(json_value(document(audited, findings(audited), "archive")), sort_keys=True) == told(made)
+        for name, data in content(made).items():
+            if name.parts[0] != "index":
+                (store.root / str(name)).write_bytes(data)
+        assert told(store) == told(Archive(made))
         assert up_to_date(store).made == 0
-        for question in (
-            "SELECT run, unit, bias_x FROM parameters ORDER BY ALL",
-            "SELECT run, unit, outcome FROM grades ORDER BY ALL",
-        ):
+        for columns in ("bias_x FROM parameters", "outcome FROM grades"):
+            question = f"SELECT run, unit, {columns} ORDER BY ALL"
             assert ask(store, question).rows == ask(Archive(made), question).rows
 
 
-def test_validity_is_looked_up_without_a_table_library(made, tmp_path):
-    copy = tmp_path / "archive"
-    shutil.copytree(made, copy)
+@pytest.mark.slow
+def test_the_weekly_audit_leaves_its_findings_as_artifacts(tmp_path):
+    archive, folder, home = tmp_path / "archive", tmp_path / "pages", tmp_path / "orchestrator"
+    write_archive(archive, 16, years=1.0, seed=5, workers=1)
+    with local_server(home) as address:
+        environment = {**os.environ, **address, "PYTHONPATH": str(ROOT)}
+        python(environment, "-m", "prefect", "work-pool", "create", "line", "--type", "process")
+        names = python(environment, "-m", "pipelines.flows.deploy", "deploy/prefect.yaml").split()
+        parameters = json.dumps({"archive": str(archive), "pages": str(folder), "until": "2023-12-31"})
+        python(environment, "-m", "prefect", "deployment", "run", "audit_archive/weekly-audit", "--params", parameters)
+        python(environment, "-m", "prefect", "worker", "start", "--pool", "line", "--run-once", "--limit", "1")
+        schedules = python(environment, "-m", "prefect", "deployment", "schedule", "ls", "audit_archive/weekly-audit")
+    assert "audit_archive/weekly-audit" in names
+    assert "0 5 * * 1" in schedules
+    with closing(sqlite3.connect(f"file:{home / 'prefect.db'}?mode=ro", uri=True)) as database:
+        artifacts = dict(database.execute("select key, data from artifact where key is not null").fetchall())
+        states = database.execute("select state_type from flow_run where state_type != 'SCHEDULED'").fetchall()
+    assert states == [("COMPLETED",)]
+    messages = [one["message"] for one in json.loads((folder / "audit-2023-12-31.json").read_text("utf-8"))["findings"]]
+    assert messages
+    assert [row["finding"] for row in json.loads(json.loads(artifacts["tumbleline-audit"]))] == messages
+    assert "# Audit until 2023-12-31" in artifacts["tumbleline-audit-summary"]
+    assert "<svg" in (folder / "audit-2023-12-31.html").read_text(encoding="utf-8")
+
+
+def test_validity_is_looked_up_without_a_table_library(copy):
     archive = Archive(copy)
     info = archive.runs()[0]
     unit = info.units[0]

@@ -9,15 +9,13 @@ from pathlib import Path
 
 import pytest
 from capture_double import CaptureDouble, small_job
-from pydantic import TypeAdapter
-from typer.testing import CliRunner
+from each import each
+from in_process import document_of, given, text_of
 
 from pipelines.archive import Archive, backup
 from pipelines.archive.backup import copy_archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.cli import app
-from pipelines.cli.documents.archive import ArchiveRestoreDocument
 from pipelines.integrity.archive import verify
 from pipelines.orchestrator.database import copy_database, restore_database
 from schemas.errors import ArchiveUnusable, WrongUse
@@ -42,6 +40,13 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture
+def line(made: Path, tmp_path: Path) -> tuple[Archive, Archive]:
+    """A copy of that archive, to be written to, and the place of its backup."""
+    shutil.copytree(made, tmp_path / "line")
+    return Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+
+
 def content(root: Path) -> dict[str, bytes]:
     """Every file of an archive but the derived ones."""
     files = {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
@@ -50,20 +55,15 @@ def content(root: Path) -> dict[str, bytes]:
 
 def test_a_copy_restored_is_the_archive_byte_for_byte(made: Path, tmp_path: Path) -> None:
     root, copy, back = made / "archive", tmp_path / "copy", tmp_path / "back"
-    result = CliRunner().invoke(app, ["archive", "backup", str(copy), "--archive", str(root)])
-    assert result.exit_code == 0, result.output
-    result = CliRunner().invoke(app, ["archive", "restore", str(copy), "--archive", str(back)])
-    assert result.exit_code == 0, result.output
-    assert "nothing is wrong" in result.output
-    again = CliRunner().invoke(app, ["archive", "restore", str(copy), "--archive", str(tmp_path / "more"), "--json"])
-    assert TypeAdapter(ArchiveRestoreDocument).validate_json(again.stdout, extra="forbid")["whole"]
+    text_of("archive", "backup", copy, "--archive", root, status=0)
+    assert "nothing is wrong" in text_of("archive", "restore", copy, "--archive", back, status=0)
+    assert document_of("archive", "restore", copy, "--archive", tmp_path / "more")["whole"]
     assert content(back) == content(root)
     assert verify(Archive(back), keys={}).head == verify(Archive(root), keys={}).head
 
 
-def test_a_further_copy_adds_what_is_new_and_a_continued_run_is_complete_in_it(made: Path, tmp_path: Path) -> None:
-    shutil.copytree(made, tmp_path / "line")
-    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+def test_a_further_copy_adds_what_is_new_and_a_continued_run_is_complete_in_it(line, tmp_path: Path) -> None:
+    archive, copy = line
     first = copy_archive(archive, copy)
     assert copy_archive(archive, copy).files == 0
     measure(tmp_path / "line", 2)  # goes on with the run that was interrupted
@@ -101,9 +101,8 @@ def test_a_copy_that_was_torn_is_completed_and_is_sound_at_any_point(
     assert content(copy.root) == content(archive.root)
 
 
-def test_a_copy_while_a_lot_is_measured_is_sound(made: Path, tmp_path: Path) -> None:
-    shutil.copytree(made, tmp_path / "line")
-    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+def test_a_copy_while_a_lot_is_measured_is_sound(line, tmp_path: Path) -> None:
+    archive, copy = line
     writer = threading.Thread(target=measure, args=(tmp_path / "line", 3))
     writer.start()
     while writer.is_alive():
@@ -115,9 +114,8 @@ def test_a_copy_while_a_lot_is_measured_is_sound(made: Path, tmp_path: Path) -> 
     assert verify(copy, keys={}).whole
 
 
-def test_a_copy_during_which_a_run_ends_is_sound(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shutil.copytree(made, tmp_path / "line")
-    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+def test_a_copy_during_which_a_run_ends_is_sound(line, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    archive, copy = line
     names, listed = backup._names, list[str]()
 
     def ends_after_the_chain_is_listed(folder: Path, prefix: str, *links: list[str]) -> set[str]:
@@ -134,17 +132,16 @@ def test_a_copy_during_which_a_run_ends_is_sound(made: Path, tmp_path: Path, mon
     assert verify(copy, keys={}).whole
 
 
-def test_an_older_copy_restored_leaves_the_checkpoint_of_records_measured_since(made: Path, tmp_path: Path) -> None:
-    shutil.copytree(made, tmp_path / "line")
-    line, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
-    copy_archive(line, copy)
-    capture = next(path for path in (line.root / "captures").iterdir() if path.is_dir())
+def test_an_older_copy_restored_leaves_the_checkpoint_of_records_measured_since(line) -> None:
+    archive, copy = line
+    copy_archive(archive, copy)
+    capture = next(path for path in (archive.root / "captures").iterdir() if path.is_dir())
     newest = max(path for path in capture.iterdir() if (path / "record.json").is_file())
     shutil.copytree(newest, capture / f"{int(newest.name) + 1:05d}")  # measured after the backup
     state = capture / "state" / f"{int(newest.name) + 1:05d}.bin"
     state.parent.mkdir(exist_ok=True)
     state.write_bytes(b"checkpoint")
-    copy_archive(copy, line)
+    copy_archive(copy, archive)
     assert state.is_file()
 
 
@@ -204,78 +201,68 @@ def test_a_damaged_copy_of_a_database_is_refused_and_the_database_kept(tmp_path:
         copy_database(str(live), torn)
 
 
-def test_the_command_keeps_the_newest_copies_of_the_database(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The database of the server of this line."""
     monkeypatch.setenv("PREFECT_HOME", str(tmp_path))
     monkeypatch.delenv("PREFECT_SERVER_DATABASE_CONNECTION_URL", raising=False)
     database(tmp_path / "prefect.db", 3)
+    return tmp_path / "prefect.db"
+
+
+def test_the_command_keeps_the_newest_copies_of_the_database(made: Path, tmp_path: Path, server: Path) -> None:
     copies = tmp_path / "copies"
     copies.mkdir()
     for day in range(1, 6):
         (copies / f"orchestrator-2026010{day}T000000.db").touch()
-    command = [
-        "archive",
-        "backup",
-        str(tmp_path / "copy"),
-        "--archive",
-        str(made / "archive"),
-        "--database",
-        str(copies),
-    ]
-    result = CliRunner().invoke(app, [*command, "--keep", "2"])
-    assert result.exit_code == 0, result.output
+    words = ("archive", "backup", tmp_path / "copy", "--archive", made / "archive", "--database", copies)
+    text_of(*words, "--keep", "2", status=0)
     kept = sorted(path.name for path in copies.iterdir())
     assert kept[0] == "orchestrator-20260105T000000.db"
-    assert rows_of(copies / kept[1]) == 3
+    assert rows_of(copies / kept[1]) == rows_of(server)
 
 
-@pytest.mark.parametrize("suffix", [".json", ".parquet"])
-def test_a_damaged_file_of_the_archive_does_not_replace_the_sound_one_of_the_copy(
-    made: Path, tmp_path: Path, suffix: str
+def test_a_refused_restore_of_the_archive_leaves_the_database(made: Path, tmp_path: Path, server: Path) -> None:
+    database(tmp_path / "old.db", 1)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "file").touch()
+    words = ("archive", "restore", made / "archive", "--archive", tmp_path / "other")
+    assert given(*words, "--database", tmp_path / "old.db")[0] != 0
+    assert rows_of(server) == 3
+
+
+SPOILT = {
+    "runs/*/coefficients.json": ("short",),
+    "runs/*/coefficients.parquet": ("short",),
+    "captures/*/*/samples.parquet": ("short", "empty", "torn"),
+    "captures/*/*/record.json": ("short", "empty", "torn"),
+    "captures/*/complete.json": ("short", "empty", "torn"),
+}
+
+
+@each([(pattern, how) for pattern, kinds in SPOILT.items() for how in kinds], " ".join)
+def test_a_damaged_file_does_not_replace_the_sound_one_of_the_copy_nor_stay_in_it(
+    case: tuple[str, str], made: Path, tmp_path: Path
 ) -> None:
+    pattern, how = case
     shutil.copytree(made, tmp_path / "line")
     archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
     copy_archive(archive, copy)
-    damaged = next((tmp_path / "line" / "archive").glob("runs/*/coefficients.json")).with_suffix(suffix)
-    name = damaged.relative_to(tmp_path / "line" / "archive")
+    damaged = min((tmp_path / "line" / "archive").glob(pattern))
+    there = tmp_path / "copy" / damaged.relative_to(tmp_path / "line" / "archive")
     sound = damaged.read_bytes()
-    damaged.write_bytes(sound[:-1])
-    with pytest.raises(ArchiveUnusable, match=rf"1 files of .* damaged .*coefficients\{suffix}"):
+    wrong = {"short": sound[:-1], "empty": b"", "torn": sound[:10] + bytes(20) + sound[10:]}[how]
+    damaged.write_bytes(wrong)
+    with pytest.raises(ArchiveUnusable, match=rf"1 files of .* damaged .*{damaged.name}"):
         copy_archive(archive, copy)
-    assert (tmp_path / "copy" / name).read_bytes() == sound
+    assert there.read_bytes() == sound
     assert verify(copy, keys={}).whole
     damaged.write_bytes(sound)
     assert copy_archive(archive, copy).files == 0
-
-
-@pytest.mark.parametrize("name", ["samples.parquet", "record.json", "complete.json"])
-def test_damaged_samples_and_records_of_a_capture_do_not_replace_the_sound_ones(
-    made: Path, tmp_path: Path, name: str
-) -> None:
-    shutil.copytree(made, tmp_path / "line")
-    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
-    copy_archive(archive, copy)
-    damaged = min((tmp_path / "line" / "archive" / "captures").rglob(name))
-    sound = damaged.read_bytes()
-    for wrong in (sound[:-1], b"", sound[:10] + b"\x00" * 20 + sound[10:]):
-        damaged.write_bytes(wrong)
-        with pytest.raises(ArchiveUnusable, match=rf"1 files of .* damaged .*{name}"):
-            copy_archive(archive, copy)
-        there = tmp_path / "copy" / damaged.relative_to(tmp_path / "line" / "archive")
+    if damaged.suffix == ".parquet":  # and the other way round: a damaged file of the copy is mended from the sound one
+        there.write_bytes(wrong)
+        assert copy_archive(archive, copy).files == 1
         assert there.read_bytes() == sound
-    damaged.write_bytes(sound)
-    assert copy_archive(archive, copy).files == 0
-
-
-def test_a_damaged_file_of_the_copy_is_mended_from_the_sound_one(made: Path, tmp_path: Path) -> None:
-    archive, copy = Archive(made / "archive"), Archive(tmp_path / "copy")
-    copy_archive(archive, copy)
-    samples = min((tmp_path / "copy" / "captures").rglob("samples.parquet"))
-    sound = samples.read_bytes()
-    samples.write_bytes(sound[:-1])
-    assert copy_archive(archive, copy).files == 1
-    assert samples.read_bytes() == sound
 
 
 def test_a_database_that_a_server_has_open_is_not_replaced(tmp_path: Path) -> None:
@@ -292,23 +279,8 @@ def test_a_database_that_a_server_has_open_is_not_replaced(tmp_path: Path) -> No
     assert rows_of(live) == 5
 
 
-def test_a_refused_restore_of_the_archive_leaves_the_database(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PREFECT_HOME", str(tmp_path))
-    monkeypatch.delenv("PREFECT_SERVER_DATABASE_CONNECTION_URL", raising=False)
-    database(tmp_path / "prefect.db", 5)
-    database(tmp_path / "old.db", 1)
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "file").touch()
-    words = ["archive", "restore", str(made / "archive"), "--archive", str(tmp_path / "other")]
-    assert CliRunner().invoke(app, [*words, "--database", str(tmp_path / "old.db")]).exit_code != 0
-    assert rows_of(tmp_path / "prefect.db") == 5
-
-
-def test_the_seal_of_an_entry_that_is_written_while_the_files_are_listed_is_copied(made: Path, tmp_path: Path) -> None:
-    shutil.copytree(made, tmp_path / "line")
-    archive, copy = Archive(tmp_path / "line" / "archive"), Archive(tmp_path / "copy")
+def test_the_seal_of_an_entry_that_is_written_while_the_files_are_listed_is_copied(line, tmp_path: Path) -> None:
+    archive, copy = line
     (seal, *_) = sorted((archive.root / "runs").glob("*/sealed.json"))
     seal.rename(tmp_path / "sealed.json")
     later = threading.Timer(0.3, lambda: shutil.move(tmp_path / "sealed.json", seal))

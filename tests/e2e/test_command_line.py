@@ -1,112 +1,156 @@
-"""The command line on the simulated station: what it prints, where, and with which status."""
+"""The command line on the simulated station: what it prints, where, with which status, how fast; lists, threads, the tab key."""
 
 import json
+import os
 import resource
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from capture_double import recipe_file
-from typer.testing import CliRunner
+from each import each
+from in_process import document_of, given, text_of, typed_document
+from root_process import ROOT
 
-from pipelines.cli import app
+from deploy.release import unpack
+from inertial.counts import number_of
+from pipelines.archive import Archive
+from pipelines.cli import COMMANDS, THREADS, _OnDemand
+from pipelines.cli.candidates import SOURCES, candidates_of
+
+KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An archive with one run of a small lot, made by the command itself without the orchestrator."""
     folder = tmp_path_factory.mktemp("line")
-    result = CliRunner().invoke(
-        app, ["run", recipe_file(folder), "--direct", "--json", "--archive", str(folder / "archive")]
-    )
-    assert result.exit_code in (0, 1), result.output
-    (folder / "run.json").write_text(result.stdout, encoding="utf-8")
-    (folder / "run.err").write_text(result.stderr, encoding="utf-8")
+    status, out, err = given("run", recipe_file(folder), "--direct", "--json", "--archive", folder / "archive")
+    assert status in (0, 1), err
+    (folder / "run.json").write_text(out, encoding="utf-8")
+    (folder / "run.err").write_text(err, encoding="utf-8")
     return folder / "archive"
 
 
-def ask(archive: Path, *arguments: str) -> dict:
-    result = CliRunner().invoke(app, [*arguments, "--json", "--archive", str(archive)])
-    assert result.exit_code in (0, 1), result.output
-    return json.loads(result.stdout)
-
-
-def test_run_prints_one_json_document_and_tells_its_stages_elsewhere(archive: Path) -> None:
-    document = json.loads((archive.parent / "run.json").read_text(encoding="utf-8"))
+def test_run_prints_one_document_and_tells_its_stages_elsewhere(archive: Path) -> None:
+    document = typed_document("run", (archive.parent / "run.json").read_text(encoding="utf-8"))
     assert [unit["unit"] for unit in document["units"]] == ["A1", "A2", "A3"]
     assert document["passed"] + document["failed"] + document["refused"] == 3
     assert Path(document["report"]).is_file()
+    figure = document["units"][0]["figures"]["verification_norm_ug"]
+    assert (figure["limit"], figure["unit_text"], "ILAC-G8" in figure["rule"]) == (1000.0, "µg", True)
     told = (archive.parent / "run.err").read_text(encoding="utf-8")
     assert [line.split()[0] for line in told.splitlines() if line][:3] == ["capture", "validate", "reduce"]
-
-
-def test_every_figure_has_value_uncertainty_limit_and_rule(archive: Path) -> None:
-    unit = json.loads((archive.parent / "run.json").read_text(encoding="utf-8"))["units"][0]
-    figure = unit["figures"]["verification_norm_ug"]
-    assert figure["limit"] == 1000.0
-    assert figure["unit_text"] == "µg"
-    assert "ILAC-G8" in figure["rule"]
-
-
-def test_list_show_and_report_find_the_run(archive: Path) -> None:
-    run = ask(archive, "list")["runs"][0]
-    assert run["finished"]
-    assert ask(archive, "show", run["id"])["tables"][:3] == ["allan", "budget", "budget_covariance"]
-    assert ask(archive, "report")["report"].endswith("report.html")
+    printed = text_of("show", "--archive", archive)
+    assert all(unit in printed for unit in ("A1", "A2", "A3", "report"))
 
 
 def test_every_statistic_of_the_static_record_of_a_run_is_made_from_its_samples(archive: Path) -> None:
-    usual = ask(archive, "allan", "latest")
-    total = ask(archive, "allan", "latest", "--statistic", "total")
+    words = ("allan", "latest", "--archive", archive)
+    usual, total = document_of(*words), document_of(*words, "--statistic", "total")
     assert (total["statistic"], total["deviation_unit"], usual["deviation_unit"]) == ("total", "µg", "µg")
-    assert [curve["channel"] for curve in total["curves"]] == [curve["channel"] for curve in usual["curves"]]
     assert total["terms"] == usual["terms"]
     for mine, own in zip(total["curves"], usual["curves"], strict=True):
+        assert mine["channel"] == own["channel"]
         # at one sample the total deviation has two more differences than the Allan deviation, and no other
         assert mine["deviation"][0] == pytest.approx(own["deviation"][0], rel=0.01)
-    assert ask(archive, "allan", "latest", "--statistic", "mtie")["deviation_unit"] == "m/s"
-
-
-def test_show_prints_a_table(archive: Path) -> None:
-    rows = ask(archive, "show", "latest", "coefficients")["rows"]
-    assert rows[0]["effect"] == "bias"
-    assert rows[0]["unit_text"] == "LSB"
-
-
-def test_tables_for_people_name_every_slot(archive: Path) -> None:
-    result = CliRunner().invoke(app, ["show", "--archive", str(archive)])
-    assert all(unit in result.stdout for unit in ("A1", "A2", "A3"))
-    assert "report" in result.stdout
+    assert document_of(*words, "--statistic", "mtie")["deviation_unit"] == "m/s"
 
 
 def test_fit_with_other_effects_is_a_run_beside_the_old_one(archive: Path) -> None:
-    before = len(ask(archive, "list")["runs"])
-    document = ask(
-        archive, "fit", "small", "--effects", "bias,scale,misalignment,bias_temperature,scale_temperature,second_order"
-    )
-    assert "second_order" in document["effects"]
-    assert len(ask(archive, "list")["runs"]) == before + 1
+    where = ("--archive", archive)
+    before = len(document_of("list", *where)["runs"])
+    effects = "bias,scale,misalignment,bias_temperature,scale_temperature,second_order"
+    assert "second_order" in document_of("fit", "small", "--effects", effects, *where)["effects"]
+    assert len(document_of("list", *where)["runs"]) == before + 1
 
 
-def test_export_writes_what_the_reader_asked_for(archive: Path, tmp_path: Path) -> None:
-    target = tmp_path / "calibration.h"
-    run = json.loads((archive.parent / "run.json").read_text(encoding="utf-8"))["run"]
-    arguments = ["export", run, "--failed", "--format", "c", "--output", str(target), "--archive", str(archive)]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
-    assert "tumbleline_A1" in target.read_text(encoding="utf-8")
+@pytest.fixture
+def listed(tmp_path: Path) -> Archive:
+    """A kept archive of an older version, with one run more that computes its only run again, and one that has just begun."""
+    unpack(KEPT, tmp_path)
+    store = Archive(next(path.parent for path in tmp_path.rglob("runs") if path.is_dir()))
+    old = store.run("latest")
+    measured = {key: old.about[key] for key in ("recipe", "lot", "station")}
+    again = store.open_run("again", {**measured, "rerun_of": old.id}, 1)
+    again.adopt(old, ("grades",))
+    again.save_report("key", "<html></html>", {})
+    store.open_run("begun", {"lot": {"device": "ADXL355", "units": [{"serial": "S1", "slot": 0}]}}, 2)
+    return store
 
 
-def test_help_imports_nothing_heavy() -> None:
-    code = "import sys; from pipelines.cli import app; app(['--help'], standalone_mode=False); print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
-    assert not loaded & {"numpy", "pandas", "scipy", "prefect", "pymodbus", "matplotlib", "pydantic", "pyarrow"}
+def test_the_list_has_result_station_and_origin_of_every_run_within_80_columns(listed: Archive) -> None:
+    words = ("list", "--archive", listed.root)
+    rows = document_of(*words, status=0)["runs"]
+    found = [(row["passed"], row["graded"], bool(row["rerun_of"]), row["station"]) for row in rows]
+    assert found == [(2, 2, False, "simulated"), (2, 2, True, "simulated"), (None, None, False, "")]
+    _, text, _ = given(*words, columns=80)
+    assert " ".join(text.split()).startswith(f"3 runs in {listed.root} ")
+    assert f"{rows[1]['id']} is a re-run of {rows[1]['rerun_of']}" in text
+    assert text.count("2 of 2") == 2
+    for word in (*(row["id"] for row in rows), "simulated", "unfinished", "started (UTC)", "passed"):
+        assert word in text  # no word is broken
+    assert max(len(line) for line in text.splitlines()[1:] if "is a re-run of" not in line) <= 80
+    assert [number_of(count, "run") for count in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+
+
+ASKED = """
+import json, sys
+{change}
+from pipelines.cli import main
+sys.argv = ["tumbleline", *{words}]
+try:
+    main()
+except SystemExit:
+    pass
+loaded = [*sys.modules]
+import threadpoolctl
+import numpy, scipy.linalg
+pools = [one["num_threads"] for one in threadpoolctl.threadpool_info() if one["user_api"] == "blas"]
+sys.stderr.write("\\n" + json.dumps({{"loaded": loaded, "pools": pools}}) + "\\n")
+"""
+HEAVY = {"numpy", "pandas", "scipy", "prefect", "pymodbus", "matplotlib", "pydantic", "pyarrow"}
+LATER = {"scipy.stats", "scipy.io", "matplotlib", "prefect", "pymodbus", "duckdb", "jinja2"}
+FIRST_LINE = """
+import pipelines.cli.diagnose as module
+class Stop:
+    def status(self, text):
+        sys.exit()
+module.error_console = Stop
+"""
+
+
+def process_of(*words: str, change: str = "", **variables: str) -> tuple[set[str], set[int]]:
+    """The modules that a command has loaded in a process of its own, and the numbers of BLAS threads after it."""
+    environment = {key: value for key, value in os.environ.items() if key not in THREADS} | variables
+    code = ASKED.format(words=list(words), change=change)
+    pipes = {"env": environment, "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, "-c", code], check=True, timeout=300, **pipes)
+    found = json.loads(done.stderr.splitlines()[-1])
+    return set(found["loaded"]), set(found["pools"])
+
+
+def test_help_loads_nothing_heavy_and_a_command_what_it_needs_on_one_thread(archive: Path) -> None:
+    assert not process_of("--help")[0] & HEAVY
+    loaded, pools = process_of("plan", "production", "--json")
+    assert ("numpy" in loaded, pools) == (True, {1})
+    # diagnose shows its first line before it loads what only the diagnosis needs
+    loaded, _ = process_of("diagnose", "latest", "--archive", str(archive), change=FIRST_LINE)
+    assert "pandas" in loaded
+    assert not loaded & LATER
+
+
+@pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="BLAS takes no second thread on one processor")
+def test_a_number_of_threads_that_the_user_has_set_is_kept() -> None:
+    assert process_of("--version", OMP_NUM_THREADS="2")[1] == {2}
+    # without the setting there are several: the test could fail
+    assert max(process_of("--version", change="import pipelines.cli; pipelines.cli._one_thread = lambda: None")[1]) > 1
 
 
 def test_help_answers_at_once() -> None:
-    best = min(_processor_seconds([sys.executable, "-m", "pipelines.cli", "--help"]) for _ in range(5))
-    assert best <= 0.3
+    assert min(_processor_seconds([sys.executable, "-m", "pipelines.cli", "--help"]) for _ in range(5)) <= 0.3
 
 
 def _processor_seconds(command: list[str]) -> float:
@@ -117,24 +161,77 @@ def _processor_seconds(command: list[str]) -> float:
     return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
-FIRST_LINE = """
-import sys
-import pipelines.cli.diagnose as module
-
-class Stop:
-    def status(self, text):
-        print(*sys.modules)
-        sys.exit()
-
-module.error_console = Stop
-sys.argv = ["tumbleline", "diagnose", "latest", "--archive", sys.argv[1]]
-from pipelines.cli import main
-main()
+TAB = """
+source "$1"
+COMP_WORDS=("${@:2}")
+COMP_CWORD=$(( ${#COMP_WORDS[@]} - 1 ))
+_tumbleline_completion tumbleline
+printf '%s\\n' "${COMPREPLY[@]}"
 """
+OFFERED = {
+    "dia": {"diagnose"},
+    "run m": {"my"},
+    "report la": {"latest"},
+    "show A": {"A1", "A2"},
+    "extend model.toml third": {"third_order"},
+    "diagnose latest --effects bias,sca": {"bias,scale", "bias,scale_temperature"},
+    "plan opt": {"optimise"},
+    "run --fau": {"--fault"},
+    "correct flight.csv --calibration la": {"latest"},
+    "plan optimise production --wanted third": {"third_order="},
+    "nonsense ": set(),
+}
 
 
-def test_diagnose_shows_its_first_line_before_it_loads_what_only_the_diagnosis_needs(archive: Path) -> None:
-    done = subprocess.run([sys.executable, "-c", FIRST_LINE, str(archive)], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
-    assert "pandas" in loaded
-    assert not loaded & {"scipy.stats", "scipy.io", "matplotlib", "prefect", "pymodbus", "duckdb", "jinja2"}
+@pytest.fixture(scope="module")
+def completing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A home in which the completion is installed, and a working folder with an archive and a recipe."""
+    if shutil.which("bash") is None:
+        pytest.skip("no bash")
+    folder = tmp_path_factory.mktemp("home")
+    unpack(KEPT, folder / "archive")
+    (folder / "recipes").mkdir()
+    (folder / "recipes" / "my.toml").write_text("", encoding="utf-8")
+    done = bash("tumbleline --install-completion; true", folder)
+    assert "bash completion installed" in done.stdout, done.stderr
+    assert ".bash_completions/tumbleline.sh" in (folder / ".bashrc").read_text(encoding="utf-8")
+    return folder
+
+
+def bash(script: str, home: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {"HOME": str(home), "PATH": path, "XDG_CONFIG_HOME": str(home / "config"), "LANG": "C.UTF-8"}
+    command = ["bash", "--norc", "-c", script, "bash", *words]
+    pipes = {"cwd": home, "env": environment, "capture_output": True, "text": True}
+    return subprocess.run(command, check=False, timeout=300, **pipes)
+
+
+@each(OFFERED)
+def test_the_tab_key_offers_in_a_real_bash(words: str, completing: Path) -> None:
+    script = str(completing / ".bash_completions" / "tumbleline.sh")
+    done = bash(TAB, completing, script, "tumbleline", *words.split(" "))
+    assert done.stderr == ""
+    assert OFFERED[words] <= set(done.stdout.split())
+    assert OFFERED[words] or not done.stdout.strip()  # nothing is offered where a word is wrong
+
+
+def leaves(command: object) -> list[object]:
+    below = getattr(command, "commands", {})
+    return [leaf for one in below.values() for leaf in leaves(one)] if below else [command]
+
+
+def test_every_parameter_that_takes_a_name_has_candidates_and_every_source_a_parameter() -> None:
+    parameters = [
+        (name, parameter, str(getattr(parameter, "metavar", "") or ""))
+        for name in COMMANDS
+        for leaf in leaves(_OnDemand(name)._load())
+        for parameter in leaf.params
+    ]
+    names = ("RUN", "RECIPE", "PROFILE", "PRESET", "EFFECT", "SERIAL", "SELECTION")
+    assert [
+        (name, parameter.name, metavar)
+        for name, parameter, metavar in parameters
+        if any(word in metavar.replace("FLOW-RUN", "") for word in names) and candidates_of(parameter) is None
+    ] == []
+    used = {(parameter.name, part) for _, parameter, metavar in parameters for _, part in SOURCES if part in metavar}
+    assert [key for key in SOURCES if key not in used] == []

@@ -1,212 +1,342 @@
-"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report; no certificate."""
+"""A recording made elsewhere all the way, as commands: import, diagnose, extend, fit, history, export, report, certificate.
+
+Without a statement of its references it is noise only and gets no certificate; with one it has a budget and may be certified.
+"""
 
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
-from pydantic import TypeAdapter
-from typer.testing import CliRunner, Result
+from each import each
+from in_process import document_of, given, refused, text_of
+from scipy.spatial.transform import Rotation
 
 from benchmarks.made_recordings import Recording, make, samples_of
-from pipelines.cli import app
-from pipelines.cli.documents.models import ImportedFitDocument
-from schemas.errors import WrongUse
+from pipelines.archive import Archive
+from schemas.errors import DONE
 
-DWELLS = "time=time_s,x=out_x,y=out_y,z=out_z,sd_x=sd_x,sd_y=sd_y,sd_z=sd_z,n=n,duration=duration_s"
-LIMITS = 'name = "bench"\nrule = "simple_acceptance"\n[figures]\nresidual_rms_ug = { max = 300.0, unit = "µg" }\n'
+COLUMNS = "time=time_s,x=out_x,y=out_y,z=out_z"
+DWELLS = f"{COLUMNS},sd_x=sd_x,sd_y=sd_y,sd_z=sd_z,n=n,duration=duration_s"
 PLAIN = "bias,scale,misalignment"
+BENCH = 'name = "bench"\nrule = "simple_acceptance"\n[figures]\nresidual_rms_ug = { max = 300.0, unit = "µg" }\n'
 DRIFTING = Recording(60, "white 280, B 30", warm_up=3000.0, sensor=11)
+LABORATORY = """\
+laboratory = { name = "L", address = "A", email = "a@b.c", country = "DE" }
+customer = { name = "L", address = "A", email = "a@b.c" }
+signatory = { name = "S", role = "R" }
+item = { manufacturer = "M" }
+"""
+REFERENCES = """\
+name = "lab-2"
+
+[[reference]]
+id = "G-01"
+what = "local gravity"
+certificate = "G-2025-7"
+due = 2035-05-02
+
+[[reference]]
+id = "PT-7"
+what = "temperature"
+certificate = "K-26-118"
+due = 2027-03-02
+U = 0.1
+k = 2.0
+unit = "K"
+
+[uncertainty]
+grade_source = "certificates"
+gravity = { value_m_s2 = 9.80942, u_ppm = 200.0, reference = "G-01" }
+thermometer = { measures = "chamber", offset_U_K = 2.0, slope_U_percent = 0.01, k = 2.0, reference = "PT-7" }
+gradient = { u_K = 0.01, source = "nine sensors" }
+reader = { exact = true }
+
+[stability]
+switch_on_ug = 50.0
+horizon_days = 400.0
+source = "history"
+temperature_of = "chamber"
+bias_temperature_ug_K = 150.0
+
+[certificate]
+validity_months = 12
+"""
+HAND_HELD = """\
+name = "hand-held"
+grade = "consumer"
+[figures]
+verification_norm_ug = { max = 3000.0, unit = "µg" }
+bias_error_ug = { max = 3000.0, unit = "µg" }
+zero_g_offset_mg = { max = 150.0, unit = "mg" }
+"""
+STATED = ("--references", "lab.toml", "--measured", "2026-11-20", "--verify", "8", "--zero-output", "32768")
+STANDARD = ("--local-g", "9.80665")
 
 
-def run(*words: str | Path, archive: Path) -> Result:
-    return CliRunner().invoke(app, [*map(str, words), "--archive", str(archive)])
+@pytest.fixture(autouse=True)
+def bench(home: Path) -> Path:
+    """A working folder with statements, limits and a laboratory's file."""
+    texts = {"lab": REFERENCES, "limits": HAND_HELD, "bench": BENCH, "laboratory": LABORATORY}
+    for name, text in texts.items():
+        (home / f"{name}.toml").write_text(text, encoding="utf-8")
+    return home
 
 
-def document(*words: str | Path, archive: Path) -> tuple[dict[str, Any], int]:
-    done = run(*words, "--json", archive=archive)
-    assert done.exit_code in (0, 1), done.output
-    return json.loads(done.stdout), done.exit_code
-
-
-def imported(what: Recording, seed: int, folder: Path, *more: str) -> tuple[dict[str, Any], int]:
-    """A recording imported as dwells."""
-    path = folder / f"hand-{seed}.csv"
+def words_of(what: Recording, seed: int, *more: str) -> tuple[str, ...]:
+    """The import of a recording as dwells."""
+    path = f"hand-{seed}.csv"
     make(what, seed).dwells.to_csv(path, index=False)
-    words = ("--map", DWELLS, "--units", "output=LSB", "--unit", "H1", "--rows", "dwells", "--local-g", "9.80665")
-    return document("import", path, *words, *more, archive=folder / "archive")
+    return ("import", path, "--map", DWELLS, "--units", "output=LSB", "--unit", "H1", "--rows", "dwells", *more)
 
 
-def laboratory(folder: Path) -> Path:
-    """A laboratory's file."""
-    place = '{name = "L", address = "A", email = "a@b.c"'
-    text = f'laboratory = {place}, country = "DE"}}\ncustomer = {place}}}\n'
-    text += 'signatory = {name = "S", role = "R"}\nitem = {manufacturer = "M"}\n'
-    (folder / "laboratory.toml").write_text(text, encoding="utf-8")
-    return folder / "laboratory.toml"
+def imported(what: Recording, seed: int, *more: str, status: int | None = DONE) -> dict[str, Any]:
+    return document_of(*words_of(what, seed, *STANDARD, *more), status=status)
 
 
-def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    archive, model = tmp_path / "archive", tmp_path / "model.toml"
-    (tmp_path / "limits.toml").write_text(LIMITS, encoding="utf-8")
-    first, status = imported(DRIFTING, 71, tmp_path, "--fit", "norm")
-    assert (first["adequate"], status) == (False, 1)
-    fresh, _ = imported(DRIFTING, 72, tmp_path)
+def hand_held(*more: str) -> tuple[str, ...]:
+    """The import of a recording whose references are stated."""
+    return words_of(Recording(48, "white 280, B 30"), 4714, *more)
 
-    diagnosis, _ = document("diagnose", first["run"], archive=archive)
-    assert diagnosis["recommended"] == ["warm_up"]
-    assert run("extend", model, "warm_up", "--effects", PLAIN, "--run", first["run"], archive=archive).exit_code == 2
-    assert CliRunner().invoke(app, ["extend", str(model), "warm_up", "--effects", PLAIN]).exit_code == 0
 
-    fitted, status = document("fit", first["run"], "--model", model, "--limits", "limits.toml", archive=archive)
-    assert (fitted["adequate"], status) == (True, 0)
-    TypeAdapter(ImportedFitDocument).validate_json(json.dumps(fitted), strict=True, extra="forbid")
+def table(run: str, name: str) -> pd.DataFrame:
+    return Archive(None).run(run).table(name)
+
+
+def test_from_a_recording_of_unknown_poses_to_a_report_and_no_certificate() -> None:
+    first = imported(DRIFTING, 71, "--fit", "norm", status=1)
+    fresh = imported(DRIFTING, 72)
+    assert first["adequate"] is False
+    assert document_of("diagnose", first["run"])["recommended"] == ["warm_up"]
+    text_of("extend", "model.toml", "warm_up", "--effects", PLAIN, status=0)
+    fitted = document_of("fit", first["run"], "--model", "model.toml", "--limits", "bench.toml", status=0)
+    assert fitted["adequate"] is True
     assert [unit["outcome"] for unit in fitted["units"]] == ["pass"]
     assert fitted["error"]["rms_ug"] < 0.3 * first["error"]["rms_ug"]
-
-    history, _ = document("history", model, "--dwells", first["run"], "--fresh", fresh["run"], archive=archive)
-    last = history["versions"][-1]
+    *_, last = document_of("history", "model.toml", "--dwells", first["run"], "--fresh", fresh["run"])["versions"]
     assert last["confirmed"] is True, last["text"]
-    assert last["fresh_ug"] < history["versions"][0]["fresh_ug"]
-
-    exported = json.loads(run("export", fitted["run"], archive=archive).stdout)
-    truth = make(DRIFTING, 71)
-    unit = exported["units"][0]
-    np.testing.assert_allclose(unit["bias"][0], truth.bias, atol=3.0)
+    (unit,) = json.loads(given("export", fitted["run"])[1])["units"]
+    np.testing.assert_allclose(unit["bias"][0], make(DRIFTING, 71).bias, atol=3.0)
     assert "warm_up" in str(unit)
+    page = Path(given("report", fitted["run"])[1].strip()).read_text(encoding="utf-8")
+    assert "Coefficients" in page
+    assert "degrees of freedom" in page
+    assert "was imported without a statement of its references (noise only)" in refused("certify", fitted["run"])
+    told = refused("certificate", "H1", "--laboratory", "laboratory.toml")
+    assert "unit H1 has no certificate, one is needed" in told
+    # an adequate model is needed besides, however wide the limits are
+    Path("wide.toml").write_text(BENCH.replace("300.0", "9000.0"), encoding="utf-8")
+    plain = document_of("fit", first["run"], "--effects", PLAIN, "--limits", "wide.toml", status=1)
+    assert ([unit["outcome"] for unit in plain["units"]], plain["adequate"]) == (["pass"], False)
+    assert "is NOT ADEQUATE" in refused("certify", plain["run"])
+    text_of("verify", status=0)
 
-    page = Path(run("report", fitted["run"], archive=archive).stdout.strip())
-    text = page.read_text(encoding="utf-8")
-    assert "Coefficients" in text
-    assert "degrees of freedom" in text
-    problem = run("certify", fitted["run"], archive=archive).exception
-    assert isinstance(problem, WrongUse)
-    assert "was imported without a statement of its references (noise only)" in str(problem)
-    problem = run("certificate", "H1", "--laboratory", laboratory(tmp_path), archive=archive).exception
-    assert isinstance(problem, WrongUse)
-    assert "unit H1 has no certificate, one is needed" in str(problem)
-    assert run("verify", archive=archive).exit_code == 0
 
-
-def test_an_import_a_fit_and_a_diagnosis_of_one_file_say_the_same(tmp_path: Path) -> None:
-    first, _ = imported(Recording(40, "white 280, B 30"), 5, tmp_path, "--fit", "norm")
-    fitted, _ = document("fit", first["run"], "--effects", PLAIN, archive=tmp_path / "archive")
-    judged, _ = document("diagnose", first["run"], archive=tmp_path / "archive")
+def test_an_import_a_fit_and_a_diagnosis_of_one_file_say_the_same() -> None:
+    first = imported(Recording(40, "white 280, B 30"), 5, "--fit", "norm", status=None)
+    fitted = document_of("fit", first["run"], "--effects", PLAIN)
+    judged = document_of("diagnose", first["run"])
     for key in ("rms_ug", "floor_ug", "white_noise_ug", "p_value"):
         assert first["error"][key] == fitted["error"][key] == judged["error"][key]
     assert first["adequate"] is fitted["adequate"] is judged["adequate"]
     assert first["error"]["fit_rms_ug"] == pytest.approx(first["error"]["rms_ug"], rel=1e-3)
 
 
-def test_ten_dwells_and_nine_parameters_are_not_called_adequate(tmp_path: Path) -> None:
-    answer, status = imported(Recording(10), 3, tmp_path, "--fit", "norm")
-    assert (answer["adequate"], status) == (None, 1)
+def test_ten_dwells_and_nine_parameters_are_not_called_adequate() -> None:
+    answer = imported(Recording(10), 3, "--fit", "norm", status=1)
+    assert answer["adequate"] is None
     assert "15 are needed" in answer["reason"]
     assert answer["evidence"]["degrees_of_freedom"] == 1
     assert len(answer["bias_less_six_parameters"]) == 3
 
 
-def test_a_bad_dwell_is_named_and_the_fit_without_it_is_a_run_of_its_own(tmp_path: Path) -> None:
+def test_a_bad_dwell_is_named_and_the_fit_without_it_is_a_run_of_its_own() -> None:
     what = Recording(30, "white 280, B 30", bad=1, bad_ug=5000.0)
     spoilt = make(what, 9).spoilt[0]
-    answer, _ = imported(what, 9, tmp_path, "--fit", "norm")
-    name = f"H1:{spoilt}"
+    answer = imported(what, 9, "--fit", "norm", status=None)
+    without = ("--leave-out", f"H1:{spoilt}")
     assert answer["leave_out"]["dwells"] == [{"unit": "H1", "dwell": spoilt}]
-    assert any(f"--leave-out {name}" in line for line in answer["lines"])
-    fitted, status = document("fit", answer["run"], "--leave-out", name, archive=tmp_path / "archive")
-    assert (fitted["adequate"], fitted["left_out"], status) == (True, [name], 0)
-    judged, status = document("diagnose", answer["run"], "--leave-out", name, archive=tmp_path / "archive")
-    assert (judged["adequate"], status) == (True, 0)
-    again, _ = document("diagnose", fitted["run"], archive=tmp_path / "archive")
-    assert again["error"]["rms_ug"] == judged["error"]["rms_ug"]
+    assert any(" ".join(without) in line for line in answer["lines"])
+    fitted = document_of("fit", answer["run"], *without, status=0)
+    assert (fitted["adequate"], fitted["left_out"]) == (True, [without[1]])
+    judged = document_of("diagnose", answer["run"], *without, status=0)
+    assert document_of("diagnose", fitted["run"])["error"]["rms_ug"] == judged["error"]["rms_ug"]
 
 
-def test_an_import_whose_model_is_not_adequate_gets_no_certificate(tmp_path: Path) -> None:
-    (tmp_path / "limits.toml").write_text(LIMITS.replace("300.0", "9000.0"), encoding="utf-8")
-    answer, _ = imported(DRIFTING, 71, tmp_path)
-    limits = ("--effects", PLAIN, "--limits", tmp_path / "limits.toml")
-    fitted, status = document("fit", answer["run"], *limits, archive=tmp_path / "archive")
-    assert ([unit["outcome"] for unit in fitted["units"]], fitted["adequate"], status) == (["pass"], False, 1)
-    problem = run("certify", fitted["run"], archive=tmp_path / "archive").exception
-    assert isinstance(problem, WrongUse)
-    assert "is NOT ADEQUATE" in str(problem)
-
-
-def test_known_poses_go_the_same_way(tmp_path: Path) -> None:
+def test_known_poses_go_the_same_way() -> None:
     rng = np.random.default_rng(4)
-    force = np.tile(
-        np.concatenate([np.eye(3), -np.eye(3), np.sqrt(0.5) * np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])]), (4, 1)
-    )
+    edges = np.sqrt(0.5) * np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
+    force = np.tile(np.concatenate([np.eye(3), -np.eye(3), edges]), (4, 1))
     n = len(force)
-    table = make(Recording(n), 6).dwells.drop(columns=["out_x", "out_y", "out_z"])
     out = np.array([0.01, -0.02, 0.03]) + force * [1.01, 0.99, 1.0] + 3e-5 * rng.standard_normal((n, 3))
-    sd = {f"sd_{axis}": 3e-5 * np.sqrt(table["n"]) for axis in "xyz"}
-    table = table.assign(
-        **sd, out_x=out[:, 0], out_y=out[:, 1], out_z=out[:, 2], fx=force[:, 0], fy=force[:, 1], fz=force[:, 2]
-    )
-    table.assign(hum=40.0 + np.arange(n) % 7).to_csv(tmp_path / "poses.csv", index=False)
-    words = (
-        "--map",
-        f"{DWELLS},force_x=fx,force_y=fy,force_z=fz,hum=hum",
-        "--units",
-        "output=g",
-        "--unit",
-        "P1",
-        "--rows",
-        "dwells",
-    )
-    answer, _ = document("import", tmp_path / "poses.csv", *words, archive=tmp_path / "archive")
-    fitted, status = document("fit", answer["run"], "--effects", f"{PLAIN},covariate:hum", archive=tmp_path / "archive")
-    assert (fitted["adequate"], status) == (True, 0)
-    unit = json.loads(run("export", fitted["run"], archive=tmp_path / "archive").stdout)["units"][0]
+    dwells = make(Recording(n), 6).dwells.assign(hum=40.0 + np.arange(n) % 7)
+    for k, axis in enumerate("xyz"):
+        dwells[f"out_{axis}"], dwells[f"f{axis}"] = out[:, k], force[:, k]
+        dwells[f"sd_{axis}"] = 3e-5 * np.sqrt(dwells["n"])
+    dwells.to_csv("poses.csv", index=False)
+    columns = f"{DWELLS},force_x=fx,force_y=fy,force_z=fz,hum=hum"
+    words = ("poses.csv", "--map", columns, "--units", "output=g", "--unit", "P1", "--rows", "dwells")
+    run = document_of("import", *words)["run"]
+    fitted = document_of("fit", run, "--effects", f"{PLAIN},covariate:hum", status=0)
+    assert fitted["adequate"] is True
+    unit = json.loads(given("export", fitted["run"])[1])["units"][0]
     np.testing.assert_allclose(unit["bias"][0], [0.01, -0.02, 0.03], atol=1e-4)
-    assert run("report", fitted["run"], archive=tmp_path / "archive").exit_code == 0
+    text_of("report", fitted["run"], status=0)
 
 
-def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth(tmp_path: Path) -> None:
+def test_samples_in_the_hand_become_dwells_that_agree_with_the_truth() -> None:
     what = Recording(26, "white 100, axes 1:2:3", sensor=3)
-    samples_of(what, 31).round({"x": 2, "y": 2, "z": 2}).to_csv(tmp_path / "hand.csv", index=False)
-    words = (
-        "--map",
-        "time=time_s,x=x,y=y,z=z",
-        "--units",
-        "output=LSB",
-        "--unit",
-        "H2",
-        "--local-g",
-        "9.80665",
-        "--fit",
-        "norm",
-    )
-    answer, _ = document("import", tmp_path / "hand.csv", *words, archive=tmp_path / "archive")
+    samples_of(what, 31).round({"x": 2, "y": 2, "z": 2}).to_csv("hand.csv", index=False)
+    words = ("--map", "time=time_s,x=x,y=y,z=z", "--units", "output=LSB", "--unit", "H2", *STANDARD, "--fit", "norm")
+    answer = document_of("import", "hand.csv", *words)
     assert 24 <= answer["dwells"] <= 28
-    truth = make(what, 31)
-    off = np.abs(np.array(answer["bias"]) - truth.bias)
+    off = np.abs(np.array(answer["bias"]) - make(what, 31).bias)
     assert np.all(off < 4.0 * np.array(answer["bias_u_record"]) + 0.5)
 
 
-def test_advice_for_an_import_that_was_not_fitted(tmp_path: Path) -> None:
-    answer, _ = imported(Recording(20), 2, tmp_path)
-    for words, advice in (
-        (("export", answer["run"]), f"fit it with 'tumbleline fit {answer['run']} --effects"),
-        (("report", answer["run"]), f"fit it with 'tumbleline fit {answer['run']} --effects"),
-        (("certify", answer["run"]), f"tumbleline fit {answer['run']} --limits FILE"),
-    ):
-        problem = run(*words, archive=tmp_path / "archive").exception
-        assert isinstance(problem, WrongUse)
-        assert advice in str(problem)
-
-
-def test_a_fit_that_fails_leaves_no_run(tmp_path: Path) -> None:
-    answer, _ = imported(Recording(20), 2, tmp_path)
-    archive = tmp_path / "archive"
+def test_an_import_that_was_not_fitted_is_advised_and_a_fit_that_fails_leaves_no_run() -> None:
+    run = imported(Recording(20), 2)["run"]
+    for command in ("export", "report"):
+        _, _, err = given(command, run)
+        assert f"fit it with 'tumbleline fit {run} --effects" in " ".join(err.split())
+    assert f"tumbleline fit {run} --limits FILE" in refused("certify", run)
     for command in ("fit", "rerun"):
-        done = run(command, answer["run"], "--effects", f"{PLAIN},supply_sensitivity", archive=archive)
-        assert "supply" in done.output + str(done.exception)
-        assert done.exit_code == 1
-        listed, _ = document("list", archive=archive)
-        assert [one["id"] for one in listed["runs"]] == [answer["run"]]
+        status, out, err = given(command, run, "--effects", f"{PLAIN},supply_sensitivity")
+        assert "supply" in out + err
+        assert status != 0
+        assert [one["id"] for one in document_of("list")["runs"]] == [run]
+
+
+def test_from_a_recording_with_stated_references_to_its_certificate() -> None:
+    first = document_of(*hand_held(*STATED, "--fit", "norm"))
+    assert any(remark.startswith("held out for verification: H1: ") for remark in first["remarks"])
+    fitted = document_of("fit", first["run"], "--limits", "limits.toml")
+    assert fitted["units"][0]["outcome"] == "pass", fitted
+    verified = table(fitted["run"], "verification")
+    assert len(verified) == 8
+    assert verified["error_ug"].abs().max() < 4.0 * verified["uncertainty_ug"].max()
+    sums = table(fitted["run"], "uncertainties").set_index(["quantity", "axis"])
+    # local gravity is the scale, one to one, and the thermometer's 1 K the bias of a device of 150 µg/K
+    assert sums.loc[("scale", "x"), "u_b"] == pytest.approx(200.0, rel=0.02)
+    assert sums.loc[("bias", "z"), "u_b"] == pytest.approx(150.0, rel=0.02)
+    # verification on the same g cannot show it
+    assert sums.loc[("bias_error", "x"), "shown"] < 1.0
+    assert sums.loc[("bias_error", "x"), "unseen"] > 100.0
+    assert not {("misalignment", axis) for axis in ("yx", "zx", "zy")} & set(sums.index)
+    text_of("report", fitted["run"], status=0)
+    (certified,) = document_of("certify", fitted["run"])["certified"]
+    assert (certified["certificate"], certified["station"]) == ("H1/1", "lab-2")
+    page = Archive(None).run(fitted["run"]).report.read_text(encoding="utf-8")
+    for words in ("H1/1", "Uncertainty budget", "G-2025-7", "dwells were held out of the fit", "of the worst axis"):
+        assert words in page
+    assert "not stated: level" not in page
+    assert "H1/1" in text_of("export", fitted["run"])
+    text_of("certificate", "H1", status=0)
+    assert "local gravity" in Path("H1_1.xml").read_text(encoding="utf-8")
+    text_of("verify", status=0)
+
+
+def test_without_a_statement_an_import_stays_noise_only() -> None:
+    first = document_of(*hand_held("--local-g", "9.80942", "--zero-output", "32768", "--verify", "15%"))
+    fitted = document_of("fit", first["run"], "--limits", "limits.toml")
+    assert set(table(fitted["run"], "grades")["basis"]) == {"noise only"}
+    assert "import the recording again with --references FILE" in refused("certify", fitted["run"])
+
+
+RULES = {
+    "rests on assumed uncertainties": ('grade_source = "certificates"', 'grade_source = "assumed"'),
+    "no error over the period of validity (12 months)": ("horizon_days = 400.0", "horizon_days = 40.0"),
+    # the fast part has tests/unit/test_certify.py and tests/faults/test_archive_trouble.py
+    "not stated: thermometer": ("thermometer = ", "timing = { wait_u_s = 0.1, source = 'tests' }\n# thermometer = "),
+    "reference standard PT-7 (certificate K-26-118) was due on 2026-11-19": ("due = 2027-03-02", "due = 2026-11-19"),
+}
+
+
+@pytest.mark.parametrize(
+    "words", [pytest.param(one, marks=[pytest.mark.slow] if k > 1 else []) for k, one in enumerate(RULES)]
+)
+def test_the_rules_of_the_budget_hold_for_an_import(words: str) -> None:
+    Path("lab.toml").write_text(REFERENCES.replace(*RULES[words]), encoding="utf-8")
+    fitted = document_of("fit", document_of(*hand_held(*STATED))["run"], "--limits", "limits.toml")
+    assert words in refused("certify", fitted["run"])
+
+
+SLIPS = {
+    "they differ by -282 ppm; leave --local-g out": ("u_ppm = 200.0", "u_ppm = 0.5", *STANDARD),
+    "9.80665 is standard gravity, not a site's value": ("value_m_s2 = 9.80942", "value_m_s2 = 9.80665"),
+    "no [[reference]] is called 'PT-8'": ('reference = "PT-7"', 'reference = "PT-8"'),
+    "key 'uncertainty.gravity' is missing": ("gravity = ", "# gravity = "),
+    "offset_U_K": ("offset_U_K = 2.0", "offset_K = 2.0"),
+    "--measured 2999-01-01 lies in the future": ("", "", "--measured", "2999-01-01"),
+    "measured": ("", "", "--measured", "yesterday"),
+    "leaves 8 of them, 12 are needed for the fit": ("", "", "--verify", "40"),
+    "a number of dwells or a share such as 20% is needed": ("", "", "--verify", "some"),
+}
+
+
+@each(SLIPS)
+def test_a_statement_with_a_slip_is_refused(words: str) -> None:
+    old, new, *more = SLIPS[words]
+    Path("lab.toml").write_text(REFERENCES.replace(old, new) if old else REFERENCES, encoding="utf-8")
+    assert words in refused(*hand_held(*STATED, *more))
+
+
+def test_the_day_of_the_measurement_is_needed_beside_references() -> None:
+    assert "add --measured YYYY-MM-DD" in refused(*hand_held("--references", "lab.toml"))
+
+
+def test_a_level_error_of_a_plate_is_named_where_the_headings_are_given() -> None:
+    """24 placements on a plate that is 3 mrad and −2 mrad out of level: six faces, four headings each."""
+    rng = np.random.default_rng(3)
+    up = np.array([3e-3, -2e-3, 1.0])
+    rows, labels, poses, headings = [], [], [], []
+    for face in ("+x", "-x", "+y", "-y", "+z", "-z"):
+        vertical = np.eye(3)["xyz".index(face[1])] * (1.0 if face[0] == "+" else -1.0)
+        pointer = np.eye(3)[1 if face[1] == "x" else 0]
+        for heading in (0, 90, 180, 270):
+            ahead = [np.cos(np.radians(heading)), np.sin(np.radians(heading)), 0.0]
+            to_lab = Rotation.align_vectors([[0.0, 0.0, 1.0], ahead], [vertical, pointer])[0]
+            samples = to_lab.inv().apply(up) * [1.01, 0.99, 1.0] + [0.01, 0.02, -0.03]
+            label = f"{face}{heading}".replace("+", "p").replace("-", "m")
+            rows.append(samples + 2e-4 * rng.standard_normal((200, 3)))
+            labels += [label] * 200
+            poses.append(f"{label}={face}")
+            headings.append(f"{label}={heading}")
+    frame = pd.DataFrame(np.concatenate(rows), columns=["x", "y", "z"]).assign(label=labels)
+    frame.to_csv("plate.csv", index=False)
+    words = ("plate.csv", "--map", "x=x,y=y,z=z,dwell=label", "--units", "output=g", "--rate", "100", "--unit", "P")
+    known = ("import", *words, "--poses", ",".join(poses), *STANDARD, "--headings")
+    run = document_of(*known, ",".join(headings))["run"]
+    assert [group["effects"] for group in document_of("diagnose", run)["classes"]] == [["level_error"]]
+    fitted = document_of("fit", run, "--effects", f"{PLAIN},level_error")
+    assert fitted["adequate"] is True
+    found = table(fitted["run"], "coefficients")
+    level = found[found["effect"] == "level_error"].set_index("name")["value"]
+    assert [level["level_1"], level["level_2"]] == pytest.approx([3e-3, -2e-3], abs=5e-5)
+    assert "a heading for every pose is needed" in refused(*known, ",".join(headings[:-1]))
+
+
+def test_a_file_of_one_plane_is_calibrated_in_that_plane() -> None:
+    rng = np.random.default_rng(5)
+    angle = np.radians(15.0 * np.arange(24))
+    force = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
+    out = force * [1.01, 0.99, 1.005] + [0.01, 0.02, -0.03] + 2e-5 * rng.standard_normal((24, 3))
+    columns = {f"out_{axis}": out[:, k] for k, axis in enumerate("xyz")}
+    frame = pd.DataFrame({**columns, **{f"f{axis}": force[:, k] for k, axis in enumerate("xyz")}})
+    frame.assign(time_s=30.0 * np.arange(24), sd=2e-4, n=100).to_csv("tilt.csv", index=False)
+    words = ("import", "tilt.csv", "--units", "output=g,time=s", "--unit", "T", "--rows", "dwells", *STANDARD, "--map")
+    mapped = f"{COLUMNS},sd_x=sd,sd_y=sd,sd_z=sd,n=n"
+    unknown = document_of(*words, mapped, "--fit", "norm")
+    assert (unknown["adequate"], unknown["across"]) == (True, "y")
+    assert "scale of y" in unknown["open"]
+    assert unknown["bias"] == pytest.approx([0.01, 0.02, -0.03], abs=5e-5)
+    fitted = document_of("fit", document_of(*words, f"{mapped},force_x=fx,force_y=fy,force_z=fz")["run"])
+    assert fitted["adequate"] is True
+    assert fitted["open"][0] == "scale of y"
+    found = table(fitted["run"], "coefficients")
+    scale = found[found["effect"] == "scale"].set_index("axis")["value"]
+    assert dict(scale) == pytest.approx({"x": 1.01, "z": 1.005}, abs=5e-5)
+    for command in ("export", "certify"):
+        assert "the scale of y is not known" in refused(command, fitted["run"])

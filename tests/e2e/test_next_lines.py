@@ -5,27 +5,26 @@ The modules that print such commands are discovered: each has a case here, or it
 """
 
 import ast
-import contextlib
 import re
-import sys
 from pathlib import Path
 
+import inquiries
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, small_job
-from in_process import given
+from capture_double import finished_run
+from in_process import document_of, given, text_of, typed_document
+from root_process import ROOT
 from typed_commands import printed_commands
 
 from pipelines.archive import Archive
-from pipelines.archive.signatures import VARIABLE
-from pipelines.chain.runner import Runner
 from pipelines.cli.history import removal
+
+from truth import Run, Spec, make_run  # isort: skip
 
 HERE = "tests/e2e/test_next_lines.py::"
 ELSEWHERE = {
-    "diagnosis_text": "tests/e2e/test_printed_next_lines.py::"
-    "test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines",
+    "diagnosis_text": HERE + "test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines",
     "diagnose": HERE + "test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it",
     "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
     "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
@@ -37,18 +36,13 @@ ELSEWHERE = {
 PRINTING = {"command_line", "print_next", "print_extension", "removal"}
 """Functions that make or print a command to give next."""
 
-ROOT = Path(__file__).resolve().parents[2]
-
 
 @pytest.fixture(scope="module")
-def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def kept_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a blank in its name: the recipe and the archive of one run, and a recording."""
     folder = tmp_path_factory.mktemp("a") / "my line"
     folder.mkdir()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(VARIABLE, "")
-        runner = Runner(small_job(folder), Archive(folder / "kept runs"), measure=CaptureDouble())
-        list(runner.all())
+    finished_run(folder).archive.root.rename(folder / "kept runs")
     (folder / "m.toml").write_text(MODEL, encoding="utf-8")
     _norms().to_csv(folder / "norms.csv", index=False)
     return folder
@@ -103,9 +97,8 @@ CASES = {"rerun": _rerun, "run": _run, "history": _refuted, "import_text": _impo
 
 
 @pytest.mark.parametrize("module", CASES)
-def test_the_lines_to_give_next_run_as_they_are_printed(module: str, line: Path, monkeypatch) -> None:
-    monkeypatch.setenv(VARIABLE, "")
-    status, out, err = CASES[module](line)
+def test_the_lines_to_give_next_run_as_they_are_printed(module: str, kept_runs: Path) -> None:
+    status, out, err = CASES[module](kept_runs)
     assert status in {0, 1}, err
     lines = printed_commands(out)
     assert lines
@@ -132,49 +125,43 @@ def test_every_module_that_prints_a_command_to_give_next_is_run_by_a_test() -> N
         assert f"def {name}(" in (ROOT / file).read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
-def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(tmp_path: Path) -> None:
-    """A lot on the simulated station with a mechanism in it: diagnosed, extended, measured again, judged."""
-    import inquiries
+def pasted(lines: list[list[str]]) -> str:
+    """Give commands as they are printed, runs without the orchestrator, which is tested elsewhere; what the last one prints."""
+    for words in lines:
+        status, out, err = given(*words, *(["--direct"] if words[0] == "run" else []))
+        assert status in {0, 1}, (words, err)
+    return " ".join(out.split())
 
-    recipe = inquiries.recipe_file(tmp_path, "fibonacci24")
-    station = inquiries.station_file(tmp_path, hardening=400e-6)
-    place = ("--archive", tmp_path / "kept runs")
-    assert given("run", recipe, "--station", station, "--direct", *place)[0] in {0, 1}
-    status, out, err = given("diagnose", "latest", *place)
-    assert status == 1, err
+
+@pytest.fixture
+def hardening(home: Path) -> tuple[object, ...]:
+    """Options of a lot on the simulated station with a mechanism hidden in it."""
+    return ("--station", inquiries.station_file(home, hardening=400e-6), "--direct", "--archive", home / "kept runs")
+
+
+@pytest.mark.slow
+def test_the_lines_after_a_diagnosis_of_a_run_measure_it_again_and_judge_by_it(home: Path, hardening) -> None:
+    """Diagnosed, extended, measured again, judged."""
+    recipe, where = inquiries.recipe_file(home, "fibonacci24"), hardening[-2:]
+    text_of("run", recipe, *hardening)
+    _, out, _ = given("diagnose", "latest", *where)
     lines = printed_commands(out)
     assert [words[0] for words in lines] == ["extend", "run", "history"]
-    with contextlib.chdir(tmp_path):
-        for words in lines:
-            direct = ["--direct"] if words[0] == "run" else []  # the orchestrator is tested elsewhere
-            status, out, err = given(*words, *direct)
-            assert status in {0, 1}, (words, err)
-    assert re.search(r"(?<!not )confirmed:", " ".join(out.split()))
-    status, out, err = given("improve", "latest", "--out", tmp_path / "again.toml", "--yes", *place)
-    assert status == 0, err
+    assert re.search(r"(?<!not )confirmed:", pasted(lines))
+    _, _, err = given("improve", "latest", "--out", home / "again.toml", "--yes", *where)
     assert "fresh run: ambiguous-" in err  # the first run is a fresh run of the second
 
 
 @pytest.mark.slow
-def test_improve_lets_the_station_measure_the_fresh_run(tmp_path: Path) -> None:
-    import json
-
-    import inquiries
-
-    recipe = inquiries.recipe_file(tmp_path, "fibonacci24")
-    station = inquiries.station_file(tmp_path, hardening=400e-6)
-    kept = Archive(tmp_path / "kept runs")
-    given("run", recipe, "--station", station, "--direct", "--archive", kept.root)
-    words = ("improve", "latest", "--out", tmp_path / "m.toml", "--yes", "--json", "--archive", kept.root)
-    status, out, err = given(*words, "--no-measure")
-    document = json.loads(out)
-    assert (status, document["fresh"]) == (0, None), err
+def test_improve_lets_the_station_measure_the_fresh_run(home: Path, hardening) -> None:
+    kept = Archive(home / "kept runs")
+    text_of("run", inquiries.recipe_file(home, "fibonacci24"), *hardening)
+    words = ("improve", "latest", "--out", home / "m.toml", "--yes", "--archive", kept.root)
+    document = document_of(*words, "--no-measure", status=0)
+    assert document["fresh"] is None
     assert [line.split()[1] for line in document["next"]] == ["run", "history"]
-    (tmp_path / "m.toml").unlink()
-    status, out, err = given(*words)
-    document = json.loads(out)
-    assert status == 0, err
+    (home / "m.toml").unlink()
+    document = document_of(*words, status=0)
     assert document["ladder"][-1]["confirmed"] is True
     assert document["next"] == []
     assert [kept.run(info.id).about["lot"]["repeat"] for info in kept.runs()] == [0, 1]
@@ -182,49 +169,101 @@ def test_improve_lets_the_station_measure_the_fresh_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_lines_after_an_investigation_name_the_judged_model(tmp_path: Path) -> None:
-    import inquiries
-
-    recipe = inquiries.recipe_file(tmp_path)
-    station = inquiries.station_file(tmp_path, hardening=400e-6)
-    place = ("--archive", tmp_path / "kept runs")
-    _, out, err = given("investigate", recipe, "--station", station, "--direct", "--yes", *place)
+def test_the_lines_after_an_investigation_name_the_judged_model(home: Path, hardening) -> None:
+    _, out, err = given("investigate", inquiries.recipe_file(home), "--yes", *hardening)
     lines = printed_commands(out)
     assert [words[0] for words in lines] == ["extend", "run", "history"], (out, err)
     assert lines[0][lines[0].index("--effects") + 1] == "bias,scale,misalignment"
-    with contextlib.chdir(tmp_path):
-        for words in lines:
-            status, out, err = given(*words, *(["--direct"] if words[0] == "run" else []))
-            assert status in {0, 1}, (words, err)
+    pasted(lines)
 
 
 @pytest.mark.slow
-def test_the_lines_after_an_improvement_decide_between_alternatives(tmp_path: Path) -> None:
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
-    from truth import Spec, make_run
-
+def test_the_lines_after_an_improvement_decide_between_alternatives(home: Path) -> None:
     made = make_run(Spec(effects=("second_order",), sizes=(4.0,), plan="six", soaks="one", repeats=4, units=3), 5)
-    made.dwells.to_parquet(tmp_path / "dwells.parquet")
-    made.fresh.to_parquet(tmp_path / "fresh.parquet")
-    with contextlib.chdir(tmp_path):
-        _, out, _ = given("improve", "dwells.parquet", "--effects", "bias,scale,misalignment", "--yes")
-        lines = printed_commands(out)
-        assert len(lines) > 1  # one for each effect of the class
-        status, out, err = given(*lines[0])
-        assert status in {0, 1}, err
-        for words in printed_commands(out):
-            status, _, err = given(*words)
-            assert status in {0, 1}, (words, err)
+    written(made, {"dwells": "dwells.parquet", "fresh": "fresh.parquet"})
+    _, out, _ = given("improve", "dwells.parquet", "--effects", "bias,scale,misalignment", "--yes")
+    lines = printed_commands(out)
+    assert len(lines) > 1  # one for each effect of the class
+    _, out, _ = given(*lines[0])
+    pasted(printed_commands(out))
 
 
 @pytest.mark.slow
-def test_the_lines_of_the_demonstration_run_by_hand(tmp_path: Path) -> None:
-    folder = tmp_path / "my game"
-    status, out, err = given("demo", "--effect", "cubic_transfer", "--seed", "1", "--auto", "--folder", folder)
+def test_the_lines_of_the_demonstration_run_by_hand(home: Path) -> None:
+    status, out, err = given("demo", "--effect", "cubic_transfer", "--seed", "1", "--auto", "--folder", "my game")
     assert status == 0, err
-    (folder / "model.toml").unlink()
+    Path("my game/model.toml").unlink()
     lines = printed_commands(out)
     assert [words[0] for words in lines] == ["compare", "diagnose", "extend", "compare"]
-    for words in lines:
-        status, _, err = given(*words)
-        assert status in {0, 1}, (words, err)
+    pasted(lines)
+
+
+def written(run: Run, names: dict[str, str]) -> None:
+    """Tables of a made run as files in the working folder."""
+    for table, name in names.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        getattr(run, table).to_parquet(name)
+
+
+@pytest.fixture(scope="module")
+def lagging() -> Run:
+    """A lot whose devices remember the temperature."""
+    return make_run(Spec(effects=("thermal_lag",), sizes=(4.0,), plan="six", soaks="ramps", units=3), 12)
+
+
+pastable = pytest.mark.usefixtures("home", "no_next_measurement")
+
+
+@pastable
+def test_the_printed_lines_carry_the_history_and_confirm_the_effect(lagging: Run) -> None:
+    names = {
+        "dwells": "a/run7.parquet", "history": "b/temperatures.parquet", "fresh": "a/again.parquet",
+        "fresh_history": "b/again-temperatures.parquet",
+    }  # fmt: skip
+    written(lagging, names)
+    _, out, _ = given("diagnose", "a/run7.parquet", "--history", "b/temperatures.parquet")
+    lines = printed_commands(out.split("Next:", 1)[1])
+    assert [words[0] for words in lines] == ["extend", "history"]
+    assert lines[1][lines[1].index("--history") + 1] == "b/temperatures.parquet"
+    told = "give it to history with --fresh and its temperatures with --fresh-history"
+    assert told in " ".join(out.split())
+    pasted(lines)
+    again = ["--fresh", "a/again.parquet", "--fresh-history", "b/again-temperatures.parquet"]
+    out = pasted([[*lines[1], *again]])
+    assert re.search(r"(?<!not )confirmed:", out)
+    assert "warning" not in out
+    assert "remove it from the model" not in out
+
+
+@pastable
+def test_files_beside_the_dwells_are_found_and_stand_in_the_printed_lines(lagging: Run) -> None:
+    names = {
+        "dwells": "dwells.parquet", "history": "history.parquet", "fresh": "fresh.parquet",
+        "fresh_history": "fresh-history.parquet",
+    }  # fmt: skip
+    written(lagging, names)
+    _, out, err = given("diagnose", "dwells.parquet")
+    assert "history: history.parquet, found beside the dwells" in err
+    lines = printed_commands(out.split("Next:", 1)[1])
+    assert lines[-1][lines[-1].index("--history") + 1] == "history.parquet"
+    pasted(lines[:1])
+    assert document_of(*lines[1])["versions"][-1]["confirmed"] is True
+    # the fresh run's own history stands beside it as well
+    _, out, err = given(*lines[-1][: lines[-1].index("--fresh")], "--fresh", "fresh.parquet", "--json")
+    row = typed_document("history", out)["versions"][-1]
+    assert "fresh-history.parquet, found beside" in err
+    assert (row["confirmed"], row["warnings"]) == (True, [])
+
+
+@pastable
+def test_without_a_history_the_effect_is_warned_of_and_never_refuted(lagging: Run) -> None:
+    written(lagging, {"dwells": "a/run7.parquet", "history": "b/then.parquet", "fresh": "c/again.parquet"})
+    model = "bias,scale,misalignment,bias_temperature,scale_temperature,thermal_lag"
+    told = text_of("compare", "a/run7.parquet", "--effects", model)
+    assert "thermal_lag depends on the temperature between the dwells, and no history was given" in told
+    text_of("extend", "m.toml", "thermal_lag")
+    files = ("--dwells", "a/run7.parquet", "--history", "b/then.parquet", "--fresh", "c/again.parquet")
+    told = text_of("history", "m.toml", *files, status=0)
+    assert "no history of the fresh run was given" in told
+    assert "remove it from the model" not in told
+    assert document_of("history", "m.toml", *files)["versions"][-1]["confirmed"] is None

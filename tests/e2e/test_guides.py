@@ -1,0 +1,232 @@
+"""The commands of README and guides run in the order in which they stand there, and print what stands below them."""
+
+import re
+import shlex
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import printed_pages as pages
+import pytest
+from capture_double import finished_run, small_run
+from in_process import given
+
+from benchmarks.generated_archive import write_archive
+
+MODEL = """
+[model]
+name = "third"
+version = 1
+effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]
+"""
+
+
+def nothing(_page: str) -> None:
+    """A page whose commands need nothing."""
+
+
+def line(_page: str) -> None:
+    """The archive of one run."""
+    run = finished_run(Path.cwd())
+    Path("sent-by-mail.parquet").write_bytes((run.path / "grades.parquet").read_bytes())
+
+
+def factory(page: str) -> None:
+    """The archive of a factory, and the rules of the page."""
+    write_archive(Path("archive"), 16, years=1.0, seed=7, workers=1)
+    Path("rules.toml").write_text(pages.blocks(page, "toml")[0], encoding="utf-8")
+
+
+def old_runs(_page: str) -> None:
+    """A run, and a model to run it again with."""
+    small_run(Path.cwd())
+    Path("model.toml").write_text(MODEL, encoding="utf-8")
+
+
+def game(_page: str) -> None:
+    """A model with the effect that the page takes out."""
+    Path("game").mkdir()
+    given("extend", "game/model.toml", "cross_coupling", "--effects", "bias,scale,misalignment")
+
+
+def positions(page: str) -> None:
+    """The table of the page as a file."""
+    Path("positions.csv").write_text(pages.blocks(page, "csv")[0], encoding="utf-8")
+
+
+def glue(page: str) -> None:
+    """The model and the effect of the page, and dwells of a device whose glue follows the humidity late."""
+    rng = np.random.default_rng(20260101)
+    Path("line.toml").write_text(pages.blocks(page, "toml")[0], encoding="utf-8")
+    Path("swelling_glue.py").write_text(pages.blocks(page, "python")[0], encoding="utf-8")
+    n = 60
+    force = rng.standard_normal((n, 3))
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    humidity = 45.0 + 10.0 * np.sin(np.arange(n) / 6.0)
+    late = np.concatenate([[0.0], np.diff(humidity)])
+    out = force + 1e-5 * rng.standard_normal((n, 3)) + 1e-4 * (humidity - 2.0 * late - 45.0)[:, None]
+    table = pd.DataFrame(
+        {"unit": "A", "dwell": np.arange(n), "time_s": 600.0 * np.arange(n), "humidity_pct": humidity, "n": 100}
+    )
+    for k, axis in enumerate("xyz"):
+        table[f"out_{axis}"], table[f"force_{axis}"], table[f"sd_{axis}"] = out[:, k], force[:, k], 1e-4
+    table.to_parquet("dwells.parquet")
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A page, what its commands need, the share by which numbers may differ, and what of it is not run here.
+
+    files : parts of files that are there afterwards; empty where the file alone counts
+    """
+
+    page: str
+    prepare: Callable[[str], None] = nothing
+    close: float = 0.0
+    left_out: tuple[str, ...] = ()
+    files: tuple[tuple[str, str], ...] = ()
+
+
+GUIDES = [
+    Guide(
+        "docs/tutorial/find-a-missing-effect.md", close=0.05,
+        files=(("game/report.html", "<th>scope</th>"), ("game/history.png", "")),
+    ),
+    Guide("docs/tutorial/from-a-spreadsheet.md", positions, close=0.05, files=(("positions.html", "<svg"),)),
+    Guide("docs/how-to/add-your-own-effect.md", glue),
+    Guide("docs/how-to/audit.md", factory),
+    Guide("docs/how-to/audit-a-laboratory.md", line, files=(("audit.html", "<svg"),)),
+    Guide(
+        "docs/how-to/export.md", line,
+        files=(("A1.params", "CAL_ACC0_ID\t1310988\t6"), ("calibration.h", "per_count"), ("parameters/A3.param", "")),
+    ),
+    Guide("docs/how-to/trace-a-certificate.md", line),
+    # measured by tests/e2e/test_walk_of_recipes.py, asked by tests/unit/pipelines/doctor/test_examine.py
+    Guide("docs/how-to/operate-the-line.md", line, left_out=("run", "doctor")),
+    # the demonstration and its improvement are those of tests/e2e/test_improve.py
+    Guide("docs/how-to/improve-a-model.md", game, left_out=("demo", "improve"), close=0.05),
+]  # fmt: skip
+
+SLOW = [
+    Guide("docs/how-to/run-an-archive-again.md", old_runs),
+    Guide("docs/how-to/release-a-model.md", old_runs),
+]
+"""Guides whose commands start processes of their own."""
+
+ELSEWHERE = {
+    "import-your-data": "tests/e2e/test_guides.py",
+    "correct-a-recording": "tests/e2e/test_correct.py",
+    "README": "tests/e2e/test_guides.py",
+    "issue-a-certificate": "tests/e2e/test_guides.py",
+    "program-the-device": "tests/faults/test_programming.py",
+}
+"""Other pages with printed outputs, and the file with the test that compares them."""
+
+
+def wrong(command: str, printed: str, close: float) -> str:
+    """What is wrong with a command of a page: its status, or what it prints."""
+    words = shlex.split(command)[1:]
+    runs = sorted(path.name for path in Path("archive/runs").glob("*"))
+    places = {"RUN": runs[0], "RE-RUN": runs[-1]} if runs else {}
+    status, out, err = given(*(places.get(word, word) for word in words), columns=100)
+    if words[0] == "release" and status == 2 and re.search(r"says (no better|worse)", err):
+        return ""
+    expected = {1 if any(one in printed for one in pages.VERDICTS) else 0} if printed.strip() else {0, 1}
+    if status not in expected:
+        return f"{command}: status {status}\n{out}{err}"
+    shown = out or "\n".join(line for line in err.splitlines() if "files in" in line)
+    differs = pages.unlike(shown, printed, close) if printed.strip() else ""
+    return f"{command}: {differs}" if differs else ""
+
+
+@pytest.mark.parametrize(
+    "guide",
+    [*GUIDES, *(pytest.param(one, marks=pytest.mark.slow) for one in SLOW)],
+    ids=lambda one: Path(one.page).stem,
+)
+def test_the_commands_of_a_guide_print_what_it_says(
+    guide: Guide, home: Path, monkeypatch: pytest.MonkeyPatch, no_next_measurement: None
+) -> None:
+    monkeypatch.setenv("TUMBLELINE_ARCHIVE", "archive")
+    guide.prepare(guide.page)
+    examples = [one for one in pages.examples(guide.page) if one[0].split()[1] not in guide.left_out]
+    assert examples
+    assert [found for command, printed in examples if (found := wrong(command, printed, guide.close))] == []
+    for name, part in guide.files:
+        assert (home / name).is_file(), name
+        assert not part or part in (home / name).read_text(encoding="utf-8"), name
+
+
+def test_every_page_that_shows_an_output_is_compared_by_a_test() -> None:
+    shown = {page.stem for page in pages.PAGES if any(p.strip() for _, p in pages.examples(str(page)))}
+    assert shown == {Path(one.page).stem for one in GUIDES if "audit" not in one.page and "operate" not in one.page} | {
+        *ELSEWHERE
+    }
+    for stem, test in ELSEWHERE.items():
+        assert stem in (pages.ROOT / test).read_text(encoding="utf-8"), (stem, test)
+
+
+IMPORTS = pages.examples("docs/how-to/import-your-data.md")
+
+
+@pytest.mark.parametrize(("line", "printed"), IMPORTS, ids=range(len(IMPORTS)))
+def test_an_example_of_imports_prints_what_the_guide_says(
+    line: str, printed: str, shared_data: Path, home: Path
+) -> None:
+    pytest.importorskip("idelib" if ".ide " in line else "numpy")
+    words = shlex.split(line.replace("$DATA", str(shared_data)))[1:]
+    status, out, err = given(*words)
+    assert (status, err) == (1 if "NOT ADEQUATE" in printed else 0, "")
+    assert not pages.unlike(out.replace(str(shared_data), "$DATA"), printed, 0.0)
+
+
+@pytest.mark.slow
+def test_the_story_of_the_readme_prints_what_it_shows(home: Path) -> None:
+    story = [one for one in pages.examples("README.md") if "demo" in one[0]]
+    assert [found for command, printed in story if (found := wrong(command, printed, 0.5))] == []
+
+
+@pytest.mark.slow
+def test_the_main_job_prints_what_the_readme_shows(home: Path) -> None:
+    block = re.search(r"```\n( +fit +verify.*?)```", pages.text("README.md"), flags=re.DOTALL)
+    assert block is not None
+    status, out, err = given("run", columns=100)
+    assert status == 0, err
+    own, told = (re.sub(r"production-\w+", "RUN", one) for one in (out, block[1]))
+    assert not pages.unlike(own, f"…{told}…", 0.5)
+    verdict = re.search(r"^model +(.*)$", block[1], flags=re.MULTILINE)
+    assert verdict is not None
+    assert not wrong(
+        "tumbleline diagnose latest", f"{verdict[1]}…", 0.5
+    )  # the command that the run names says the same
+
+
+@pytest.mark.slow
+def test_a_certificate_is_told_as_its_guide_shows(line: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("typst")
+    from cryptography.hazmat.primitives.asymmetric import ec
+    from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, Encoding
+    from cryptography.hazmat.primitives.serialization.pkcs12 import serialize_key_and_certificates
+    from signing_keys import made_key
+
+    page = "docs/how-to/issue-a-certificate.md"
+    shown = [one for one in pages.examples(page) if one[1].strip()]
+    assert [command.split()[1] for command, _ in shown] == ["certificate", "verify"]
+    (line / "laboratory.toml").write_text(pages.blocks(page, "toml")[0], encoding="utf-8")
+    assert given("certify", "latest")[0] == 0
+    assert not wrong(*shown[0], 0.5)
+    (signed,) = (command for command, _ in pages.examples(page) if "--sign-with" in command)
+    key = made_key(ec.generate_private_key(ec.SECP256R1()))
+    locked = serialize_key_and_certificates(b"key", key.key, key.certificate, None, BestAvailableEncryption(b"secret"))
+    (line / "laboratory.p12").write_bytes(locked)
+    (line / "password").write_text("secret\n", encoding="utf-8")
+    (line / "laboratory.pem").write_bytes(key.certificate.public_bytes(Encoding.PEM))
+    assert not wrong(signed, "", 0.0)
+    (line / "received").mkdir()
+    for name in ("A1_1.pdf", "laboratory.pem"):
+        shutil.copy(name, "received")
+    monkeypatch.chdir("received")  # where no archive is
+    assert not wrong(*shown[1], 0.5)

@@ -1,0 +1,249 @@
+"""`extend`, `history`, `improve` and `demo`: versions of a model, what each brings, and who decides between alternatives."""
+
+import io
+import re
+import sys
+from pathlib import Path
+
+import pandas as pd
+import printed_pages as pages
+import pytest
+from each import each
+from in_process import document_of, given, refused, text_of
+from root_process import ROOT
+
+from deploy.release import unpack
+from pipelines.cli import terminal
+from pipelines.demo.measure import DemoLot, measure
+from pipelines.demo.scenes import scene
+from pipelines.jobs.model_files import read_model, versions
+
+from truth import Spec, make_run  # isort: skip
+
+PLAIN = "bias,scale,misalignment"
+PAGE = "docs/how-to/improve-a-model.md"
+
+pytestmark = pytest.mark.usefixtures("no_next_measurement")
+
+
+def typing(patch: pytest.MonkeyPatch, text: str) -> None:
+    """What a person types at the questions of the next commands."""
+    patch.setattr(sys, "stdin", io.StringIO(text))
+
+
+def written(spec: Spec, folder: Path) -> Path:
+    made = make_run(spec, 5)
+    made.dwells.to_parquet(folder / "dwells.parquet")
+    made.fresh.to_parquet(folder / "fresh.parquet")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def alike(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A lot on six faces with a square term: on faces alone every even term looks alike."""
+    spec = Spec(effects=("second_order",), sizes=(4.0,), plan="six", soaks="one", repeats=4, units=3)
+    return written(spec, tmp_path_factory.mktemp("alike"))
+
+
+@pytest.fixture(scope="module")
+def improved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The demonstration of the guide and its `improve`: the folder, and what was printed."""
+    folder = tmp_path_factory.mktemp("demo")
+    demo, improve = (command.split()[1:] for command, _ in pages.examples(PAGE)[:2])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for words in (demo, improve):
+            status, out, err = given(*words, columns=80)
+            assert status == 0, err
+    return folder / "game", out
+
+
+def test_compare_extend_and_history_see_the_error_fall(tmp_path: Path) -> None:
+    spec = Spec(effects=("third_order",), sizes=(3.0,), plan="fibonacci24", soaks="one", repeats=3, units=4)
+    folder, model = written(spec, tmp_path), tmp_path / "model.toml"
+    lot = (folder / "dwells.parquet", "--fresh", folder / "fresh.parquet")
+    made = text_of("extend", model, "third_order", "--effects", PLAIN, "--why", "the maps", "--by", "Q", status=0)
+    assert "created with version 1" in made
+    assert document_of("extend", model, "bias_asymmetry")["version"] == 3
+    after, before = (document_of("compare", *lot, *how) for how in (("--model", model), ("--effects", PLAIN)))
+    assert after["fresh_rms_ug"] < 0.5 * before["fresh_rms_ug"]
+    picture = tmp_path / "history.png"
+    words = ("history", model, "--dwells", *lot, "--picture", picture)
+    rows = document_of(*words)["versions"]
+    assert [row["confirmed"] for row in rows[:2]] == [None, True]
+    assert rows[2]["confirmed"] is not True
+    assert rows[1]["fall_ug"] > 3.0 * rows[1]["fall_u_ug"] > 0.0
+    assert (rows[1]["by"], rows[1]["why"]) == ("Q", "the maps")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert re.search("not decided|refuted", text_of(*words, status=0))
+
+
+REFUSED = {
+    "m.toml second_order": "in version 2 already",
+    "m.toml forth_order": "did you mean fourth_order",
+    "m.toml third_order --effects bias": "--effects is for a new file",
+    "m.toml --remove scale_temperatur --why x": "did you mean scale_temperature",
+    "m.toml --remove scale": "add --why TEXT",
+    "m.toml third_order --remove scale --why x": "EFFECT and --remove are both given",
+    "m.toml": "no effect is given",
+    "one.toml --remove bias --why x": "the only effect",
+    "none.toml --remove bias --why x": "needs a model file",
+}
+
+
+@each(REFUSED)
+def test_a_version_that_cannot_be_is_refused_and_leaves_the_file_alone(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("one.toml").write_text('[model]\nname = "m"\nversion = 1\neffects = ["bias"]\n', encoding="utf-8")
+    text_of("extend", "m.toml", "second_order")
+    before = {path: path.read_bytes() for path in Path().iterdir()}
+    assert REFUSED[words] in refused("extend", *words.split())
+    assert {path: path.read_bytes() for path in Path().iterdir()} == before
+
+
+def test_another_file_takes_the_next_version_and_a_removed_effect_stays_in_the_history(home: Path) -> None:
+    text_of("extend", "m.toml", "third_order", "--by", "Q")
+    text = Path("m.toml").read_text(encoding="utf-8")
+    text_of("extend", "m.toml", "second_order", "--out", "next.toml")
+    assert Path("m.toml").read_text(encoding="utf-8") == text
+    assert "second_order" in Path("next.toml").read_text(encoding="utf-8")
+    document = document_of("extend", "m.toml", "--remove", "third_order", "--why", "refuted", "--by", "R", status=0)
+    assert (document["version"], document["added"], document["removed"]) == (3, None, "third_order")
+    history = versions(read_model(Path("m.toml")))
+    assert [(v.added, v.removed) for v in history] == [((), ()), (("third_order",), ()), ((), ("third_order",))]
+    assert (history[-1].change.by, history[-1].change.why) == ("R", "refuted")
+    told = text_of("history", "m.toml", status=0)
+    assert "+ third_order" in told
+    assert "− third_order" in told
+    assert "they need --dwells" in refused("history", "m.toml", "--picture", "p.png")
+
+
+def test_the_guide_finds_adds_and_confirms_the_hidden_effect(improved: tuple[Path, str]) -> None:
+    folder, out = improved
+    assert "ADEQUATE" in out
+    model = read_model(folder / "model.toml")
+    assert model.model.effects == [*PLAIN.split(","), "cross_coupling"]
+    assert "a diagnosis of dwells.parquet names it" in model.change[-1].why
+    ladder = out.partition("Error by version of the model")[2]
+    assert not pages.unlike(f"Error by version of the model{ladder}", f"…{pages.blocks(PAGE, 'text')[0]}…", 0.05)
+    assert max(map(len, ladder.partition("cross_coupling: confirmed")[0].splitlines())) <= 80
+    numbers = [float(n) for n in re.findall(r"\d+\.\d+", ladder.partition("confirmed")[0])]
+    fitted, left_out, fresh, noise = (numbers[k : k + 2] for k in (0, 2, 4, 6))
+    assert fresh[1] < 0.7 * fresh[0]
+    assert noise[1] < fitted[1] * 1.2 < left_out[0]
+
+
+def test_a_question_that_is_refused_or_not_answered_writes_nothing(
+    alike: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "m.toml"
+    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", target)
+    typing(monkeypatch, "perhaps\nn\n")
+    status, out, err = given(*words, columns=80)
+    assert status == 1
+    assert f"to {target}? [Y/n]" in " ".join(err.split())
+    assert "'perhaps' is neither yes nor no: y or Enter adds it" in " ".join(err.split())
+    assert "second_order is not added" in out
+    for effect in ("second_order", "fourth_order"):
+        assert f"--effect {effect}\n" in out.split("Next:")[1]
+    typing(monkeypatch, "")
+    status, _, err = given(*words)
+    assert (status, "give --yes to run without an operator" in " ".join(err.split())) == (2, True)
+    assert not target.exists()
+    assert "--no-prompts" in terminal.UNATTENDED  # other questions keep their words
+
+
+def test_a_class_of_several_is_not_decided_by_yes_but_by_an_answer_or_a_name(
+    alike: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "m.toml"
+    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", target)
+    (choice, *_) = document_of(*words, "--yes", status=1)["choices"]
+    assert choice["not_separated_from"]
+    assert (choice["decided_by"], choice["added"], target.exists()) == ("undecided", False, False)
+    typing(monkeypatch, "\n")
+    _, out, err = given(*words)
+    assert f"These data do not separate {choice['effect']} from" in " ".join(err.split())
+    model = read_model(target)
+    assert choice["effect"] in model.model.effects
+    assert "these data do not separate it from" in " ".join(model.change[-1].why.split())
+    assert "tumbleline history" in out
+
+
+def test_an_adequate_model_is_left_alone_and_what_cannot_be_writes_nothing(alike: Path, tmp_path: Path) -> None:
+    data, model, target = alike / "dwells.parquet", tmp_path / "m.toml", tmp_path / "other.toml"
+    text_of("extend", model, "second_order", "--effects", PLAIN)
+    before = model.read_text(encoding="utf-8")
+    document = document_of("improve", data, "--model", model, status=0)
+    assert document["adequate"] is True
+    assert (document["added"], document["choices"], document["after"], document["next"]) == ([], [], None, [])
+    assert len(document["ladder"]) == 1
+    assert model.read_text(encoding="utf-8") == before
+    words = ("improve", data, "--effects", PLAIN, "--out", target)
+    status, _, err = given(*words, "--effect", "second_ordr")
+    assert (status, "did you mean second_order" in err) == (2, True)
+    target.write_text("a model of somebody else", encoding="utf-8")
+    assert "is not the model that is judged" in refused(*words, "--yes")
+    assert target.read_text(encoding="utf-8") == "a model of somebody else"
+
+
+@pytest.mark.slow
+def test_another_effect_of_a_class_is_added_by_name_and_other_units_of_a_fresh_run_leave_no_model(
+    alike: Path, tmp_path: Path
+) -> None:
+    other, target = pd.read_parquet(alike / "fresh.parquet"), tmp_path / "m.toml"
+    other.assign(unit="other-" + other["unit"]).to_parquet(tmp_path / "other.parquet")
+    words = ("improve", alike / "dwells.parquet", "--effects", PLAIN, "--out", target, "--effect")
+    _, _, err = given(*words, "second_order", "--fresh", tmp_path / "other.parquet")
+    assert "every unit is needed in both" in " ".join(err.split())
+    assert not target.exists()
+    given(*words, "fourth_order")
+    model = read_model(target)
+    assert model.model.effects[-1] == "fourth_order"
+    assert "second_order" in model.change[-1].why
+
+
+@pytest.mark.slow
+def test_a_run_of_an_archive_is_improved_and_its_next_line_names_the_archive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept, target = tmp_path / "kept", tmp_path / "m.toml"
+    unpack(ROOT / "tests" / "archives" / "v1.tar.xz", kept)
+    typing(monkeypatch, "\n" * 9)
+    words = ("--archive", kept, "--out", target, "--effects", f"{PLAIN},scale_temperature")
+    document = document_of("improve", "latest", *words)
+    assert document["added"]
+    assert document["next"]
+    assert all(f"--archive {kept}" in line for line in document["next"])
+    assert [change.run for change in read_model(target).change][1:] == ["latest"] * len(document["added"])
+
+
+@pytest.fixture(scope="module")
+def measured_game() -> DemoLot:
+    """What the demonstration measures with a cubic transfer hidden."""
+    return measure(scene("cubic_transfer", 7), 7)
+
+
+def test_the_demonstration_finds_what_it_hid_and_a_player_may_add_something_else(
+    measured_game: DemoLot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked = []
+    monkeypatch.setattr("pipelines.demo.measure.measure", lambda *which: asked.append(which[:2]) or measured_game)
+    words = ("demo", "--effect", "cubic_transfer", "--seed", "7", "--folder")
+    document = document_of(*words, tmp_path / "game", status=0)
+    assert asked == [(scene("cubic_transfer", 7), 7)]
+    assert document["hidden"]["effect"] == "third_order"
+    assert (document["found"], document["added"]) == (True, ["third_order"])
+    assert document["after"]["fresh_rms_ug"] < 0.8 * document["before"]["fresh_rms_ug"]
+    tables = {f"{name}.parquet" for name in ("dwells", "history", "fresh", "fresh-history")}
+    assert {path.name for path in (tmp_path / "game").iterdir()} == {*tables, "model.toml", "report.html"}
+    typing(monkeypatch, "\n\nfifth_order\n\n\n\n\n")
+    told = text_of(*words, tmp_path / "played", status=0)
+    assert "a spring that hardens" in told
+    assert "Found." in told
+    assert "fifth_order" in (tmp_path / "played" / "model.toml").read_text(encoding="utf-8")
+    wrong = ("demo", "--effect", "cubic_transfr", "--auto", "--folder", tmp_path / "none")
+    assert "did you mean cubic_transfer" in refused(*wrong)
+    assert not (tmp_path / "none").exists()
