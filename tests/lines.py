@@ -40,7 +40,8 @@ def worker(
     environment = {name: value for name, value in line.environment.items() if name != CLIENT_KEY}
     environment |= {"CREDENTIALS_DIRECTORY": str(folder), "PREFECT_WORKER_QUERY_SECONDS": QUERY_S}
     environment |= {} if state is None else {"TUMBLELINE_STATE": str(state)}
-    command = [sys.executable, "-m", "pipelines.orchestrator.worker", "start", "--station", station, "--host", host]
+    command = [sys.executable, "-m", "pipelines.orchestrator.worker", "start", "--station", station]
+    command += ["--host", host] if host else []
     with (
         (folder / "worker.log").open("ab") as out,
         subprocess.Popen(command, cwd=ROOT, env=environment, stdout=out, stderr=out) as process,

@@ -1,5 +1,6 @@
 """A station like one of hardware: the simulated one served on a port, in wall time, and a file of kind modbus for it."""
 
+import shutil
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import tomlkit
+from capture_double import recipe_file
 from small_station import lot_of, station_of
 
 from schemas.lot import Lot
@@ -22,6 +24,26 @@ QUICK = {
     "link": {"timeout_s": 1.0},
     "suspenders": {"poll_s": 0.2, "clear_s": 0.2, "limit_s": 5.0},
 }
+
+FAST = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
+"""Limits with which moves in wall time take moments."""
+
+SHORT = (
+    ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'),
+    ("temperatures_C = [0.0, 50.0]", "temperatures_C = [23.0]\nsoak_min_s = 1.0\nallow_short_soak = true"),
+    ("settle_s = 2.0", "settle_s = 0.2"),
+    ("static_record_s = 30.0", "static_record_s = 0.0"),
+    ('poses = "nine"', 'poses = "six"'),
+    ('limits = "consumer"', 'limits = "line-quick.limits.toml"'),
+    (', "bias_temperature", "scale_temperature"', ""),
+)
+"""What makes the small recipe short enough to be measured in wall time."""
+
+
+def short_recipe_file(folder: Path, dwell_s: float = 1.0) -> str:
+    """The small recipe as it is measured in wall time, with its limits beside it."""
+    shutil.copy(Path(__file__).resolve().parents[1] / "deploy" / "recipes" / "line-quick.limits.toml", folder)
+    return recipe_file(folder, *SHORT, ("dwell_s = 1.0", f"dwell_s = {dwell_s}"))
 
 
 def modbus_station(port: int, host: str = "127.0.0.1", **changes: dict[str, object]) -> StationConfig:

@@ -5,12 +5,14 @@ from typing import Any
 
 import pandas as pd
 
+from pipelines.capture.capture import capture
+from schemas.event import EventLog
 from schemas.lot import Lot, Unit
 from schemas.poses import Pose
 from schemas.recipe import Recipe
 from schemas.station import StationConfig, load_station
 from stations.codec import encode
-from stations.opening import make_plant
+from stations.opening import make_plant, open_station
 from stations.plant.plant import Plant
 
 QUIET = {
@@ -91,6 +93,22 @@ class MemorySink:
 
 def quiet_progress(done: int, total: int, note: str) -> None:
     """Nobody listens."""
+
+
+def captured(
+    recipe: Recipe,
+    lot: Lot | None = None,
+    config: StationConfig | None = None,
+    sink: MemorySink | None = None,
+    *,
+    events: EventLog | None = None,
+    **opening: Any,
+) -> MemorySink:
+    """A recipe captured on the simulated station, from where the sink ends."""
+    lot, sink = lot or lot_of(), sink or MemorySink()
+    with open_station(config or load_station(), lot, resume=sink.last_state(), **opening) as station:
+        capture(station, recipe, lot, sink, progress=quiet_progress, events=events)
+    return sink
 
 
 def write(plant: Plant, device_id: int, name: str, value: float | str) -> None:

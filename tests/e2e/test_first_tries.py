@@ -8,22 +8,22 @@ import subprocess
 import sys
 import time
 import urllib.request
-from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_double import finished_run
-from in_process import command
+from each import each
+from in_process import command, given, refused, text_of
+from root_process import ROOT
 from served_station import modbus_station, served, station_file
 from small_station import lot_of
 
+from pipelines.archive import Archive
 from pipelines.serving.listening import listening_socket
 from schemas.errors import WrongUse
 from stations.clock import WallClock
 from stations.opening import open_station
 
-ROOT = Path(__file__).resolve().parents[2]
 WHOLE = '''
 import numpy as np
 from inertial.effects.base import SensorEffect, stack
@@ -61,36 +61,20 @@ BROKEN = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def run(tmp_path: Path) -> Path:
-    """The archive of a small run."""
-    return finished_run(tmp_path).archive.root
-
-
-def effect_file(folder: Path, text: str) -> Path:
-    path = folder / "own.py"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def test_an_effect_file_without_an_error_is_judged(run: Path, tmp_path: Path) -> None:
-    words = ["compare", "latest", "--archive", run, "--effects", "bias,scale,misalignment,glue", "--effect-file"]
-    done = command([*map(str, words), str(effect_file(tmp_path, WHOLE))])
-    assert done.returncode in {0, 1}, done.stderr
-
-
-@pytest.mark.parametrize("what", BROKEN)
-def test_an_error_in_a_users_effect_names_file_class_and_line(what: str, run: Path, tmp_path: Path) -> None:
-    old, new, message = BROKEN[what]
+@each(["", *BROKEN], lambda what: what or "without an error")
+def test_an_error_in_a_users_effect_names_file_class_and_line(what: str, measured: Archive, tmp_path: Path) -> None:
+    old, new, message = BROKEN.get(what, ("", "", ""))
     assert old in WHOLE
-    path = effect_file(tmp_path, WHOLE.replace(old, new))
-    words = ["compare", "latest", "--archive", run, "--effects", "bias,scale,misalignment,glue", "--effect-file", path]
-    done = command([*map(str, words)])
-    assert done.returncode == 2, done.stderr
-    assert str(path) in done.stderr
-    assert message in done.stderr
-    if what in {"shape", "coefficients"}:
-        assert "1) is needed (…, dwells, coefficients" in done.stderr
+    path = tmp_path / "own.py"
+    path.write_text(WHOLE.replace(old, new) if old else WHOLE, encoding="utf-8")
+    words = ("compare", "latest", "--archive", measured.root, "--effects", "bias,scale,misalignment,glue")
+    if not what:
+        text_of(*words, "--effect-file", path)  # it is judged
+        return
+    told = refused(*words, "--effect-file", path)
+    assert str(path) in told
+    assert message in told
+    assert what not in {"shape", "coefficients"} or "1) is needed (…, dwells, coefficients" in told
 
 
 def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None:
@@ -100,57 +84,59 @@ def test_a_shock_without_a_scale_is_refused_with_the_key(tmp_path: Path) -> None
     table = np.column_stack([time_s, 0.007 * pulse, pulse])
     np.savetxt(tmp_path / "shock.csv", table, delimiter=",", header=head, comments="")
     (tmp_path / "part.toml").write_text("duration_ms = 11.0\n", encoding="utf-8")
-    for part in ([], ["--part", str(tmp_path / "part.toml")]):
-        words = ["import", str(tmp_path / "shock.csv"), "--procedure", "shock", "--unit", "S1", *part]
-        done = command([*words, "--map", "z=z [V],reference=reference [g]", "--archive", str(tmp_path / "archive")])
-        assert done.returncode == 2, done.stderr
-        assert "procedure shock has no scale, output per g is needed" in done.stderr
-        assert "--part" in done.stderr or "part.toml" in done.stderr
+    words = (
+        "import",
+        tmp_path / "shock.csv",
+        "--procedure",
+        "shock",
+        "--unit",
+        "S1",
+        "--archive",
+        tmp_path / "archive",
+    )
+    for part in ((), ("--part", tmp_path / "part.toml")):
+        told = refused(*words, "--map", "z=z [V],reference=reference [g]", *part)
+        assert "procedure shock has no scale, output per g is needed" in told
+        assert "--part" in told or "part.toml" in told
 
 
-def test_a_dash_is_standard_output(run: Path, tmp_path: Path) -> None:
-    archive = ["--archive", str(run)]
-    with chdir(tmp_path):
-        one = command(["export", "latest", "--units", "A1", "--failed", *archive])
-        assert (
-            command(["export", "latest", "--units", "A1", "--failed", "--output", "-", *archive]).stdout == one.stdout
-        )
-        assert json.loads(one.stdout)
-        text = command(["waveforms", "latest", "--record", "0", "--output", "-", *archive]).stdout
-        assert text.startswith("time [s],")
-        model = command(["extend", "model.toml", "third_order", "--out", "-"])
-        assert '"third_order"' in model.stdout
-        assert "version 2 has third_order" in model.stderr
-        for words in (
-            ["improve", "latest", "--out", "-", *archive],
-            ["archive", "key", "--output", "-"],
-            ["waveforms", "latest", "--format", "mat", "--output", "-", *archive],
-            ["extend", "model.toml", "third_order", "--out", "-", "--json"],
-            ["plan", "optimise", "--output", "-", "--json"],
-        ):
-            done = command(words)
-            assert done.returncode == 2, (words, done.stdout, done.stderr)
-            assert done.stdout == ""
-        assert not (tmp_path / "-").exists()
-        assert not (tmp_path / "model.toml").exists()
+def test_a_dash_is_standard_output(measured: Archive, home: Path) -> None:
+    archive = ("--archive", measured.root)
+    export = ("export", "latest", "--units", "A1", "--failed", *archive)
+    _, printed, _ = given(*export)
+    assert given(*export, "--output", "-")[1] == printed
+    assert json.loads(printed)
+    assert given("waveforms", "latest", "--record", "0", "--output", "-", *archive)[1].startswith("time [s],")
+    _, model, told = given("extend", "model.toml", "third_order", "--out", "-")
+    assert '"third_order"' in model
+    assert "version 2 has third_order" in told
+    for words in (
+        ("improve", "latest", "--out", "-", *archive),
+        ("archive", "key", "--output", "-"),
+        ("waveforms", "latest", "--format", "mat", "--output", "-", *archive),
+        ("extend", "model.toml", "third_order", "--out", "-", "--json"),
+        ("plan", "optimise", "--output", "-", "--json"),
+    ):
+        refused(*words)
+    assert list(home.iterdir()) == []
 
 
-def test_exported_parameters_have_the_nominal_scale_of_the_preset_or_say_what_is_missing(run: Path) -> None:
-    words = ["export", "latest", "--format", "ardupilot", "--units", "A1", "--failed", "--archive", str(run)]
-    by_preset = command(words)
-    assert by_preset.returncode == 0, by_preset.stderr
-    assert by_preset.stdout == command([*words, "--nominal", "256000"]).stdout
-    refused = command([*words, "--nominal", "-1"])
-    assert refused.returncode == 2
-    assert "nominal scale of unit A1: -1, a positive output per g is needed" in refused.stderr
+def test_exports_need_a_nominal_scale_and_a_file_for_each_unit(measured: Archive, home: Path) -> None:
+    words = ("export", "latest", "--archive", measured.root, "--format")
+    one = (*words, "ardupilot", "--units", "A1", "--failed")
+    _, by_preset, _ = given(*one)
+    assert by_preset.startswith("# accelerometer calibration of unit A1")
+    assert by_preset == given(*one, "--nominal", "256000")[1]
+    told = refused(*one, "--nominal", "-1")
+    assert "nominal scale of unit A1: -1, a positive output per g is needed" in told
+    assert "3 units, each needs a file of its own" in refused(*words, "ardupilot", "--failed")
+    assert "is not text" in refused(*words, "matlab", "--failed")
 
 
-def test_a_recipe_of_procedures_has_no_dwells_to_optimise() -> None:
+def test_a_recipe_of_procedures_has_no_dwells_to_optimise(home: Path) -> None:
     recipe = ROOT / "deploy" / "recipes" / "procedures" / "tilt.toml"
-    for words in (["plan", "optimise", str(recipe)], ["plan", str(recipe), "--page", "page.html"]):
-        done = command(words)
-        assert done.returncode == 2
-        assert "its procedures have no multi_position" in done.stderr
+    for words in (("optimise", recipe), (recipe, "--page", "page.html")):
+        assert "its procedures have no multi_position" in refused("plan", *words)
 
 
 def test_a_clock_of_a_station_that_is_served_faster_runs_faster_and_goes_on() -> None:
@@ -165,12 +151,10 @@ def test_a_clock_of_a_station_that_is_served_faster_runs_faster_and_goes_on() ->
 def test_a_station_that_is_served_faster_is_checked_by_a_client_that_knows_the_speed(tmp_path: Path) -> None:
     with served(speed=30.0) as port:
         knowing = modbus_station(port, link={"speed": 30.0})
-        done = command(["station", "check", "--station", str(station_file(tmp_path, knowing))])
-        assert done.returncode == 0, (done.stdout, done.stderr)
+        text_of("station", "check", "--station", station_file(tmp_path, knowing), status=0)
         unknowing = station_file(tmp_path, modbus_station(port), "unknowing.toml")
-        done = command(["station", "check", "--station", str(unknowing)])
-        assert done.returncode == 3
-        assert "needs the same speed in [link]" in " ".join(done.stderr.split())
+        status, _, err = given("station", "check", "--station", unknowing)
+        assert (status, "needs the same speed in [link]" in " ".join(err.split())) == (3, True)
         with open_station(knowing, lot_of()) as station:
             before, powered = station.clock.now(), station.reader.since_power()
             station.clock.sleep(30.0)

@@ -106,7 +106,7 @@ GUIDES = [
     Guide("docs/how-to/trace-a-certificate.md", line),
     # measured by tests/e2e/test_walk_of_recipes.py, asked by tests/unit/pipelines/doctor/test_examine.py
     Guide("docs/how-to/operate-the-line.md", line, left_out=("run", "doctor")),
-    # the demonstration and its improvement are those of tests/e2e/test_improve.py
+    # the demonstration and its improvement are those of tests/e2e/test_models.py
     Guide("docs/how-to/improve-a-model.md", game, left_out=("demo", "improve"), close=0.05),
 ]  # fmt: skip
 

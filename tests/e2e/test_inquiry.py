@@ -5,38 +5,37 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import inquiries
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
-from typer.testing import CliRunner
+from in_process import document_of, given, refused, text_of, typed_document
+from root_process import ROOT
 
 from pipelines.archive import Archive
-from pipelines.cli import app
-from pipelines.cli.documents.station import OperatorDocument
-from pipelines.inquiry.documents import InquiryDocument
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
 from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_inquiry
+from pipelines.jobs.job import job_of_run
 from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse
 
-ROOT = Path(__file__).resolve().parents[2]
 CUBIC = {"hardening": 150e-6}
+HUMID = "covariate:humidity_pct"
+MODEL = ["bias", "scale", "misalignment"]
+
+slow = pytest.mark.slow
 
 
 def played(
     folder: Path, participants: Participants | None = None, settings: InquirySettings | None = None, **job: object
 ) -> dict:
-    wanted = job or CUBIC
-    return run_inquiry(
-        inquiries.job_of(folder, **wanted),
-        Archive(folder / "archive"),
-        settings or InquirySettings(),
-        participants or Participants(),
-    )
+    folder.mkdir(exist_ok=True)
+    asked = inquiries.job_of(folder, **(job or CUBIC))
+    everybody = participants or Participants()
+    return run_inquiry(asked, Archive(folder / "archive"), settings or InquirySettings(), everybody)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +44,7 @@ def told_apart(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     return folder, played(folder)
 
 
-@pytest.mark.slow
+@slow
 def test_an_ambiguous_run_is_told_apart_by_a_follow_up_within_the_budget(told_apart: tuple[Path, dict]) -> None:
     document = told_apart[1]
     assert document["ended"] == "told_apart"
@@ -58,7 +57,7 @@ def test_an_ambiguous_run_is_told_apart_by_a_follow_up_within_the_budget(told_ap
     assert first["minutes"] == pytest.approx(first["planned_minutes"], rel=0.15)
 
 
-@pytest.mark.slow
+@slow
 def test_follow_ups_go_on_with_the_same_devices_on_the_same_clock(told_apart: tuple[Path, dict]) -> None:
     archive = Archive(told_apart[0] / "archive")
     first, second = (archive.run(name) for name in told_apart[1]["runs"][:2])
@@ -78,31 +77,22 @@ def _bias(dwells: object) -> np.ndarray:
     return np.array([np.mean(own[f"out_{a}"] / 256000.0 - own[f"force_{a}"]) for a in "xyz"])
 
 
-@pytest.mark.slow
-def test_a_follow_up_has_a_report_and_is_listed_and_shown(told_apart: tuple[Path, dict]) -> None:
+@slow
+def test_a_follow_up_has_a_report_is_listed_and_shown_and_is_no_model_of_its_own(told_apart: tuple[Path, dict]) -> None:
     archive = Archive(told_apart[0] / "archive")
     follower = archive.run(told_apart[1]["runs"][1])
     assert "third_order" in follower.report.read_text(encoding="utf-8")
     kept = json.loads((follower.path / "inquiry.json").read_text(encoding="utf-8"))
     assert kept["runs"][0] == told_apart[1]["run"]
     assert next(info for info in archive.runs() if info.id == follower.id).finished
-    reported = CliRunner().invoke(app, ["report", follower.id, "--archive", str(archive.root)])
-    assert reported.exit_code == 0, reported.output
+    text_of("report", follower.id, "--archive", archive.root, status=0)
+    document_of("show", follower.id, "--archive", archive.root)
     assert follower.id not in [entry.id for entry in selected(archive, ["all"])]
-    shown = CliRunner().invoke(app, ["show", follower.id, "--archive", str(archive.root), "--json"])
-    assert shown.exit_code in (0, 1), shown.output
-
-
-@pytest.mark.slow
-def test_a_follow_up_is_no_model_of_its_own(told_apart: tuple[Path, dict]) -> None:
-    from pipelines.jobs.job import job_of_run
-
-    archive = Archive(told_apart[0] / "archive")
     with pytest.raises(WrongUse, match="has too few poses for a model of its own"):
-        job_of_run(archive.run(told_apart[1]["runs"][1]))
+        job_of_run(follower)
 
 
-@pytest.mark.slow
+@slow
 def test_the_same_inquiry_again_measures_nothing(told_apart: tuple[Path, dict]) -> None:
     folder, before = told_apart
     done = []
@@ -112,12 +102,11 @@ def test_the_same_inquiry_again_measures_nothing(told_apart: tuple[Path, dict]) 
     assert again["classes"] == before["classes"]
 
 
-@pytest.mark.slow
+@slow
 def test_an_inquiry_that_was_killed_goes_on_and_no_finished_dwell_is_measured_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = played(tmp_path / "whole") if (tmp_path / "whole").mkdir() is None else {}
-    (tmp_path / "killed").mkdir()
+    whole = played(tmp_path / "whole")
     monkeypatch.setattr("pipelines.archive.archive.Records", inquiries.Dying)
     monkeypatch.setattr(inquiries.Dying, "left", 20)  # 18 records of the first run, two of the follow-up
     with pytest.raises(inquiries.PulledPlug):
@@ -136,7 +125,7 @@ def test_an_inquiry_that_was_killed_goes_on_and_no_finished_dwell_is_measured_tw
     assert document["classes"] == whole["classes"]
 
 
-@pytest.mark.slow
+@slow
 def test_without_consent_nothing_more_is_measured(tmp_path: Path) -> None:
     seen: list[FollowUp] = []
 
@@ -151,7 +140,7 @@ def test_without_consent_nothing_more_is_measured(tmp_path: Path) -> None:
     assert document["next_measurements"][0]["minutes"] > 0.0
 
 
-@pytest.mark.slow
+@slow
 def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
     document = played(tmp_path, settings=InquirySettings(budget=0.1))
     assert document["ended"] == "budget"
@@ -159,7 +148,7 @@ def test_a_budget_that_is_too_small_says_what_it_takes(tmp_path: Path) -> None:
     assert len(document["runs"]) == 1
 
 
-@pytest.mark.slow
+@slow
 def test_what_faces_cannot_see_is_measured_where_it_is_asked_for(tmp_path: Path) -> None:
     hidden = {"kind": "pendulous_mass", "plan": "orthogonal24", "compliance": 80e-6}
     document = played(tmp_path, settings=InquirySettings(unseen=True, budget=5.0), **hidden)
@@ -174,72 +163,109 @@ def test_what_faces_cannot_see_is_measured_where_it_is_asked_for(tmp_path: Path)
     assert "β in 90° steps makes fx·fy zero: Kip is invisible" in document["rounds"][0]["why"][0]
 
 
-@pytest.mark.slow
+def investigation(folder: Path) -> tuple[object, ...]:
+    """An investigation of a lot with a mechanism hidden in it."""
+    recipe, station = inquiries.recipe_file(folder), inquiries.station_file(folder, **CUBIC)
+    return ("investigate", recipe, "--station", station, "--archive", folder / "archive")
+
+
+@slow
 def test_at_no_terminal_the_proposal_is_printed_with_the_command_that_goes_on(tmp_path: Path) -> None:
-    recipe, station = inquiries.recipe_file(tmp_path), inquiries.station_file(tmp_path, **CUBIC)
-    given = ["investigate", str(recipe), "--station", str(station), "--archive", str(tmp_path / "archive"), "--direct"]
-    waiting = CliRunner().invoke(app, given)
-    assert waiting.exit_code == 1, waiting.output
-    assert "waits for approval" in " ".join(waiting.output.split())
-    assert "--yes" in waiting.output
-    done = CliRunner().invoke(app, [*given, "--yes", "--json"])
-    assert done.exit_code == 0, done.output
-    document = json.loads(done.stdout)
-    TypeAdapter(InquiryDocument).validate_json(done.stdout, strict=True, extra="forbid")
-    assert document["recommended"] == ["third_order"]
-    assert document["command"] is None
+    words = (*investigation(tmp_path), "--direct")
+    status, out, err = given(*words)
+    assert (status, "waits for approval" in " ".join((out + err).split()), "--yes" in out + err) == (1, True, True)
+    document = document_of(*words, "--yes", status=0)
+    assert (document["recommended"], document["command"]) == (["third_order"], None)
 
 
-@pytest.mark.slow
+@slow
 def test_a_flow_waits_for_approval_and_goes_on_when_it_is_given(tmp_path: Path) -> None:
-    recipe, station = inquiries.recipe_file(tmp_path), inquiries.station_file(tmp_path, **CUBIC)
-    archive = tmp_path / "archive"
-    given = ["investigate", str(recipe), "--station", str(station), "--archive", str(archive), "--ask", "--json"]
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PREFECT_")}
     command = [sys.executable, "-m", "pipelines.cli"]
-    process = subprocess.Popen(
-        [*command, *given], cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    operator = [*command, "operator", "--archive", str(archive), "--json"]
+    words = [*command, *map(str, investigation(tmp_path)), "--ask", "--json"]
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(words, cwd=ROOT, env=environment, **pipes)
+    operator = [*command, "operator", "--archive", str(tmp_path / "archive"), "--json"]
+
+    def asked(*more: str) -> subprocess.CompletedProcess[str]:
+        own = {"cwd": ROOT, "env": environment, "capture_output": True, "text": True}
+        return subprocess.run([*operator, *more], check=False, timeout=60, **own)
+
     try:
-        question = _asked(operator, process, environment)
-        assert "approve: measure " in question
-        assert "third_order" in question
-        rounds = 0
-        while process.poll() is None and rounds < 6:
-            subprocess.run([*operator, "--go"], cwd=ROOT, env=environment, capture_output=True, check=False, timeout=60)
-            rounds += 1
-            _wait(process, 10.0)
+        end, waiting = time.monotonic() + 150.0, []
+        while not waiting and time.monotonic() < end and process.poll() is None:
+            done = asked()
+            waiting = typed_document("operator", done.stdout)["waiting"] if done.returncode == 0 else []
+        assert "approve: measure " in waiting[0]["question"]
+        assert "third_order" in waiting[0]["question"]
+        for _ in range(6):
+            with suppress(subprocess.TimeoutExpired):
+                asked("--go")
+                process.wait(10.0)
+                break
         output, errors = process.communicate(timeout=120)
     finally:
         if process.poll() is None:
             process.kill()
             process.communicate()
     assert process.returncode == 0, errors
-    document = json.loads(output)
+    document = typed_document("investigate", output)
     assert document["recommended"] == ["third_order"]
     assert len(document["runs"]) > 1
 
 
-def _asked(operator: list[str], process: subprocess.Popen, environment: dict[str, str]) -> str:
-    """What the flow run asks, as soon as it does."""
-    end = time.monotonic() + 150.0
-    while time.monotonic() < end and process.poll() is None:
-        done = subprocess.run(
-            operator, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=60
-        )
-        if done.returncode == 0:
-            TypeAdapter(OperatorDocument).validate_json(done.stdout, strict=True, extra="forbid")
-        waiting = json.loads(done.stdout)["waiting"] if done.returncode == 0 else []
-        if waiting:
-            return waiting[0]["question"]
-    _, errors = process.communicate(timeout=10)
-    raise AssertionError(errors)
+@pytest.fixture(scope="module")
+def humid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A station whose reader records humidity, devices whose glue swells with it, and a first run with a plain model."""
+    folder = tmp_path_factory.mktemp("humid")
+    recipe, station = inquiries.recipe_file(folder), inquiries.station_file(folder, "moisture_swelling", swelling=2e-3)
+    more = "settle_s = 60.0\nverification = [[35.0, 15.0], [110.0, 200.0], [70.0, -130.0]]\n"
+    recipe.write_text(recipe.read_text(encoding="utf-8") + more, encoding="utf-8")
+    text = station.read_text(encoding="utf-8")
+    assert '"tumbleline_reader"' in text
+    station.write_text(text.replace('"tumbleline_reader"', '"tumbleline_reader_humidity"'), encoding="utf-8")
+    told(folder, "run", recipe, "--station", station, "--direct")
+    return folder
 
 
-def _wait(process: subprocess.Popen, seconds: float) -> None:
-    try:
-        process.wait(seconds)
-    except subprocess.TimeoutExpired:
-        return
+def told(folder: Path, *words: object) -> dict:
+    return document_of(*words, "--archive", folder / "archive")
+
+
+def left_ug(folder: Path, run: str) -> float:
+    """Root mean square of what the fit leaves, µg."""
+    return float(np.sqrt(np.mean(Archive(folder / "archive").run(run).table("residuals")["residual_ug"] ** 2)))
+
+
+@slow
+def test_the_loop_closes_on_a_recorded_covariate(humid: Path) -> None:
+    first = Archive(humid / "archive").run("latest")
+    readings, dwells = first.table("readings"), first.table("dwells")
+    assert np.ptp(dwells["humidity_pct"]) > 2.0
+    own = readings[readings["kind"] != "allan"].set_index(["unit", "record"])["humidity_pct"]
+    kept = dwells.set_index(["unit", "record"])["humidity_pct"]
+    np.testing.assert_array_equal(kept, own.loc[kept.index])
+    assert told(humid, "diagnose", "latest")["recommended"] == [HUMID]
+    model, again, larger = humid / "line.toml", humid / "again.toml", ",".join([*MODEL, HUMID])
+    assert document_of("extend", model, HUMID, "--effects", ",".join(MODEL))["effects"] == [*MODEL, HUMID]
+    recipe = (humid / "ambiguous.toml").read_text(encoding="utf-8")
+    plain = 'effects = ["bias", "scale", "misalignment"]'
+    again.write_text(recipe.replace(plain, 'model = "line.toml"'), encoding="utf-8")
+    second = told(humid, "run", again, "--station", humid / "station.toml", "--repeat", "1", "--direct")["run"]
+    assert left_ug(humid, second) < 0.2 * left_ug(humid, first.id)
+    assert HUMID not in told(humid, "diagnose", second)["recommended"]
+    compared = told(humid, "compare", first.id, "--effects", larger)
+    assert compared["rms_ug"] < 0.2 * told(humid, "compare", first.id)["rms_ug"]
+    renewed = told(humid, "rerun", first.id, "--model", model)
+    assert left_ug(humid, renewed["runs"][0]["new"]) < 0.2 * left_ug(humid, first.id)
+    assert told(humid, "whatif", model, first.id)["verdict"] == "better"
+
+
+def test_a_model_with_a_column_that_the_station_does_not_record_is_refused_before_anything_moves(
+    tmp_path: Path,
+) -> None:
+    recipe = inquiries.recipe_file(tmp_path)
+    text = recipe.read_text(encoding="utf-8")
+    recipe.write_text(text.replace('"misalignment"]', f'"misalignment", "{HUMID}"]'), encoding="utf-8")
+    assert "humidity_pct" in refused("run", recipe, "--direct", "--archive", tmp_path / "nothing")
+    assert not list((tmp_path / "nothing").glob("captures/*"))

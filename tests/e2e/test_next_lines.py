@@ -29,7 +29,7 @@ ELSEWHERE = {
     "investigate": HERE + "test_the_lines_after_an_investigation_name_the_judged_model",
     "improve_text": HERE + "test_the_lines_after_an_improvement_decide_between_alternatives",
     "demo": HERE + "test_the_lines_of_the_demonstration_run_by_hand",
-    "optimal": "tests/e2e/test_plan_optimise.py::test_the_line_after_a_search_measures_the_new_recipe",
+    "optimal": "tests/e2e/test_plan.py::test_the_line_after_a_search_measures_the_new_recipe",
 }
 """Where the lines of a module are run that prints them after minutes only, or after several commands."""
 

@@ -1,41 +1,22 @@
 """``allan`` and ``psd`` of files and runs, against allantools and against each other."""
 
-import json
 import time
 from pathlib import Path
-from typing import Any
 
 import allantools
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner, Result
+from each import each
+from in_process import document_of, refused, text_of
 
 from benchmarks.worlds.noise import fractional
 from inertial.noise.allan import overlapping
 from inertial.noise.terms import fit_terms
-from pipelines.cli import app
-from schemas.errors import TumblelineError
 
 RATE = 100.0
 N = 0.002  # g/√Hz, two-sided as in IEEE Std 952
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
-def document(*words: object) -> dict[str, Any]:
-    done = run(*words, "--json")
-    assert done.exit_code == 0, done.output
-    return json.loads(done.stdout)
-
-
-def refused(*words: object) -> str:
-    """The message with which a command refuses."""
-    problem = run(*words).exception
-    assert isinstance(problem, TumblelineError)
-    return str(problem)
+OF_G = ("--time", "t", "--unit", "g")
 
 
 @pytest.fixture(scope="module")
@@ -49,129 +30,108 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_deviations_are_those_of_allantools(record: Path) -> None:
-    allan = document("allan", record, "--time", "t", "--unit", "g")
-    table = pd.read_csv(record)
-    assert allan["samples"] == 40_000
-    assert allan["rate_hz"] == pytest.approx(RATE)
+def within(curve: dict) -> bool:
+    """Whether every deviation of a curve lies within its interval."""
+    rows = zip(curve["low"], curve["deviation"], curve["high"], strict=True)
+    return all(low < value < high for low, value, high in rows)
+
+
+def test_the_deviations_are_those_of_allantools_and_terms_have_a_value_or_a_limit(record: Path) -> None:
+    allan, table = document_of("allan", record, *OF_G), pd.read_csv(record)
+    assert (allan["samples"], allan["rate_hz"]) == (40_000, pytest.approx(RATE))
     for curve in allan["curves"]:
         values = table[curve["channel"]].to_numpy()
         taus, peer, *_ = allantools.oadev(values, rate=RATE, data_type="freq", taus=curve["tau_s"])
         np.testing.assert_allclose(curve["tau_s"], taus)
         np.testing.assert_allclose(curve["deviation"], peer, rtol=1e-9)
-        assert all(
-            low < value < high
-            for low, value, high in zip(*(curve[k] for k in ("low", "deviation", "high")), strict=True)
-        )
-
-
-def test_terms_have_a_value_or_a_limit(record: Path) -> None:
-    terms = {
-        (row["channel"], row["term"]): row for row in document("allan", record, "--time", "t", "--unit", "g")["terms"]
-    }
+        assert within(curve)
+    terms = {(row["channel"], row["term"]): row for row in allan["terms"]}
     assert len(terms) == 10
     assert terms["ax", "N"]["low"] < N < terms["ax", "N"]["high"]
     assert terms["ax", "N"]["unit"] == "g/√Hz"
     assert terms["ay", "K"]["low"] < 0.004 < terms["ay", "K"]["high"]
     assert terms["ax", "K"]["value"] is None
     assert terms["ax", "K"]["high"] < 0.002
-    done = run("allan", record, "--time", "t", "--unit", "g")
-    assert "not identified" in done.stdout
-    assert "≤" in done.stdout
+    printed = text_of("allan", record, *OF_G)
+    assert "not identified" in printed
+    assert "≤" in printed
 
 
 def test_the_density_gives_the_deviation_and_the_level_of_white_noise(record: Path) -> None:
-    spectrum = document("psd", record, "--rate", "100", "--columns", "ax", "--unit", "g")["spectra"][0]
+    (spectrum,) = document_of("psd", record, "--rate", "100", "--columns", "ax", "--unit", "g")["spectra"]
     assert spectrum["median_amplitude"] == pytest.approx(N * np.sqrt(2.0), rel=0.03)
     np.testing.assert_allclose(spectrum["deviation_from_density"], spectrum["deviation"], rtol=0.15)
     np.testing.assert_allclose(spectrum["deviation"], N / np.sqrt(spectrum["tau_s"]), rtol=0.15)
 
 
-@pytest.mark.parametrize(
-    ("statistic", "peer", "factor", "unit"),
-    [
-        ("modified", "mdev", 1.0, "g"),
-        ("hadamard", "ohdev", 1.0, "g"),
-        ("total", "totdev", 1.0, "g"),
-        ("time", "tdev", 9.80665, "m/s"),
-        ("tie", "tierms", 9.80665, "m/s"),
-        ("mtie", "mtie", 9.80665, "m/s"),
-    ],
-)
+STATISTICS = {
+    "modified": ("mdev", 1.0, "g"),
+    "hadamard": ("ohdev", 1.0, "g"),
+    "total": ("totdev", 1.0, "g"),
+    "time": ("tdev", 9.80665, "m/s"),
+    "tie": ("tierms", 9.80665, "m/s"),
+    "mtie": ("mtie", 9.80665, "m/s"),
+}
+WITHOUT_INTERVAL = {"tie", "mtie"}
+
+
+@each(STATISTICS)
 def test_other_statistics_are_those_of_allantools_with_intervals_where_they_have_one(
-    record: Path, tmp_path: Path, statistic: str, peer: str, factor: float, unit: str
+    statistic: str, record: Path, tmp_path: Path
 ) -> None:
-    words = ("allan", record, "--time", "t", "--unit", "g", "--statistic", statistic, "--columns", "ax")
-    found = document(*words, "--plot", tmp_path / "a.png", "--page", tmp_path / "a.html")
+    peer, factor, unit = STATISTICS[statistic]
+    words = ("allan", record, *OF_G, "--statistic", statistic, "--columns", "ax")
+    found = document_of(*words, "--plot", tmp_path / "a.png", "--page", tmp_path / "a.html")
     assert (found["statistic"], found["deviation_unit"]) == (statistic, unit)
-    curve = found["curves"][0]
+    (curve,) = found["curves"]
     values = pd.read_csv(record)["ax"].to_numpy()
     expected = getattr(allantools, peer)(values, rate=RATE, data_type="freq", taus=np.array(curve["tau_s"]))[1]
     np.testing.assert_allclose(curve["deviation"], factor * expected, rtol=1e-9)
-    if statistic in {"tie", "mtie"}:
-        assert set(curve["low"]) == {None}
-    else:
-        assert all(
-            low < value < high
-            for low, value, high in zip(*(curve[k] for k in ("low", "deviation", "high")), strict=True)
-        )
-    name = found["statistic_name"]
-    assert f"<h1>{name[0].upper()}{name[1:]}</h1>" in (tmp_path / "a.html").read_text(encoding="utf-8")
-    printed = run(*words).stdout
+    assert set(curve["low"]) == {None} if statistic in WITHOUT_INTERVAL else within(curve)
+    name, page = found["statistic_name"], (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert f"<h1>{name[0].upper()}{name[1:]}</h1>" in page
+    assert page.count("<svg") == 1
+    printed = text_of(*words)
     assert name.split()[0] in printed
-    assert ("no interval" in printed) == (statistic in {"tie", "mtie"})
+    assert ("no interval" in printed) == (statistic in WITHOUT_INTERVAL)
 
 
-def test_a_statistic_that_does_not_exist_is_refused_with_the_nearest(record: Path) -> None:
-    message = refused("allan", record, "--time", "t", "--statistic", "hadamart")
-    assert "--statistic: found 'hadamart', one of allan, modified, hadamard" in message
-    assert "did you mean hadamard" in message
-
-
-def test_plots_and_pages_are_written(record: Path, tmp_path: Path) -> None:
-    for command in ("allan", "psd"):
-        done = run(
-            command,
-            record,
-            "--time",
-            "t",
-            "--plot",
-            tmp_path / f"{command}.png",
-            "--page",
-            tmp_path / f"{command}.html",
-        )
-        assert done.exit_code == 0, done.output
-        assert (tmp_path / f"{command}.png").read_bytes().startswith(b"\x89PNG")
-        page = (tmp_path / f"{command}.html").read_text(encoding="utf-8")
-        assert page.count("<svg") == 1
-        assert "mathdefault" not in page
+def test_a_spectrum_is_drawn_and_a_picture_of_no_known_kind_is_refused(record: Path, tmp_path: Path) -> None:
+    text_of("psd", record, "--time", "t", "--plot", tmp_path / "a.png", "--page", tmp_path / "a.html", status=0)
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "a.html").read_text(encoding="utf-8").count("<svg") == 1
     assert "name a .png, .svg or .pdf file" in refused("allan", record, "--time", "t", "--plot", tmp_path / "a.bmp")
 
 
-def test_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_told(record: Path, tmp_path: Path) -> None:
+def test_a_wrong_name_a_gap_a_missing_rate_and_a_dead_channel_are_refused_or_told(record: Path, tmp_path: Path) -> None:
+    message = refused("allan", record, "--time", "t", "--statistic", "hadamart")
+    assert "--statistic: found 'hadamart', one of allan, modified, hadamard" in message
+    assert "did you mean hadamard" in message
     assert "one of --time COLUMN and --rate HZ is needed" in refused("allan", record)
     table = pd.read_csv(record)
     table.drop(index=700).to_csv(tmp_path / "gap.csv", index=False)
     assert "after row 700 the time steps by 0.02 s" in refused("allan", tmp_path / "gap.csv", "--time", "t")
     table.assign(ay=1.0).to_csv(tmp_path / "dead.csv", index=False)
-    assert document("allan", tmp_path / "dead.csv", "--time", "t")["notes"] == ["ay: the output never changes"]
-    assert "no channel ever changes" in refused("allan", tmp_path / "dead.csv", "--time", "t", "--columns", "ay")
+    dead = ("allan", tmp_path / "dead.csv", "--time", "t")
+    assert document_of(*dead)["notes"] == ["ay: the output never changes"]
+    assert "no channel ever changes" in refused(*dead, "--columns", "ay")
 
 
-@pytest.mark.parametrize("command", ["allan", "psd"])
+@each(["allan", "psd"])
 def test_a_time_taken_for_an_output_is_refused(command: str, record: Path) -> None:
-    message = refused(command, record, "--rate", 100)
+    words = (command, record, "--rate", 100)
+    message = refused(*words)
     assert "column 't' rises in every row (from 0 to 399.99)" in message
     assert "give --time t instead of --rate, or name the channels with --columns" in message
-    assert "column 't' rises" in refused(command, record, "--rate", 100, "--columns", "t,ax")
-    assert run(command, record, "--rate", 100, "--columns", "ax").exit_code == 0
+    assert "column 't' rises" in refused(*words, "--columns", "t,ax")
+    text_of(*words, "--columns", "ax", status=0)
 
 
 def test_flicker_made_by_fractional_summation_is_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     x = 1e-3 * fractional(rng, 1, 60_000)[0] + 1e-4 * rng.standard_normal(60_000)
     pd.DataFrame({"x": x}).to_csv(tmp_path / "flicker.csv", index=False)
-    terms = {row["term"]: row for row in document("allan", tmp_path / "flicker.csv", "--rate", "1")["terms"]}
+    terms = {row["term"]: row for row in document_of("allan", tmp_path / "flicker.csv", "--rate", "1")["terms"]}
     assert 0.7e-3 < terms["B"]["value"] < 1.4e-3
 
 

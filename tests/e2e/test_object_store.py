@@ -1,15 +1,15 @@
 """An archive in an object store: a real S3 server process on loopback, started here."""
 
-import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from capture_double import CaptureDouble, PulledPlug, small_job, small_run
+from each import each
+from in_process import document_of
 from ledger_events import event
 from s3_server import CREDENTIALS, s3_bucket
-from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
 from pipelines.archive.locks import alone
@@ -17,7 +17,6 @@ from pipelines.archive.store import ObjectPath
 from pipelines.certificates import Ledger
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.cli import app
 from schemas.errors import ArchiveUnusable, OperatorNeeded
 
 pytestmark = pytest.mark.slow
@@ -49,21 +48,17 @@ def address(query: str, tmp_path_factory: pytest.TempPathFactory) -> str:
     return address
 
 
-def ask(address: str, *arguments: str) -> dict:
-    result = CliRunner().invoke(app, [*arguments, "--archive", address, "--json"])
-    if result.exception and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return json.loads(result.stdout)
+def ask(address: str, *words: object) -> dict:
+    return document_of(*words, "--archive", address)
 
 
-def test_a_run_there_has_the_same_bytes_as_one_in_a_folder(address: str, local: Run) -> None:
+def test_a_run_there_has_the_same_bytes_as_one_in_a_folder_and_nothing_is_done_twice(
+    address: str, local: Run, tmp_path: Path
+) -> None:
     run = Archive(address).run(local.id)
     assert set(run.tables()) == set(local.tables())
     for name in local.tables():
         assert (run.path / f"{name}.parquet").read_bytes() == (local.path / f"{name}.parquet").read_bytes()
-
-
-def test_nothing_is_done_twice_there(address: str, tmp_path: Path) -> None:
     runner = Runner(small_job(tmp_path), Archive(address), measure=CaptureDouble(stop_after=0))
     assert [done.reused for done in runner.all()] == [True] * len(ORDER)
 
@@ -74,33 +69,19 @@ def test_the_commands_work_on_an_address(address: str, local: Run) -> None:
     assert {unit["outcome"] for unit in shown["units"]} == {"pass"}
     assert shown["report"].startswith("s3://factory/main/runs/small-")
     assert ask(address, "show", local.id, "grades")["rows"]
-    refit = ask(address, "fit", local.id, "--effects", "bias,scale,bias_temperature,misalignment,scale_temperature")
-    assert refit["run"] != local.id
-
-
-def test_calibrations_are_certified_and_found_there(address: str, local: Run) -> None:
     ask(address, "certify", local.id)
     assert ask(address, "show", "A2")["calibration"]["certificate"] == "A2/1"
     ask(address, "revoke", "A2", "--reason", "lost")
     assert [e.action for e in Ledger(Archive(address)).events("A2")] == ["certify", "revoke"]
     assert {one.serial for one in Ledger(Archive(address)).all()} == {"A1", "A2", "A3"}
-
-
-def test_a_rerun_a_verification_and_a_lineage_work_there(address: str, local: Run) -> None:
-    before = len(Archive(address).runs())
-    ask(
-        address,
-        "rerun",
-        local.id,
-        "--effects",
-        "bias,scale,misalignment,bias_temperature,scale_temperature,third_order",
-    )
-    assert len(Archive(address).runs()) == before + 1
+    before, linear = len(Archive(address).runs()), "bias,scale,bias_temperature,misalignment,scale_temperature"
+    assert ask(address, "fit", local.id, "--effects", linear)["run"] != local.id
+    ask(address, "rerun", local.id, "--effects", f"{linear},third_order")
+    assert len(Archive(address).runs()) == before + 2
     report = ask(address, "verify")
-    assert (report["whole"], report["findings"], report["runs"]) == (True, [], before + 1)
+    assert (report["whole"], report["findings"], report["runs"]) == (True, [], before + 2)
     assert report["rows"] > 0
-    lineage = ask(address, "lineage", local.id)
-    assert {step["name"] for step in lineage["steps"]} >= {"capture", "fit", "grade"}
+    assert {step["name"] for step in ask(address, "lineage", local.id)["steps"]} >= {"capture", "fit", "grade"}
 
 
 def test_a_changed_object_and_a_missing_one_are_found(query: str, tmp_path: Path) -> None:
@@ -159,26 +140,16 @@ def test_a_folder_of_the_store_that_is_no_archive_is_refused(query: str) -> None
         archive.prepare()
 
 
-@pytest.mark.parametrize("change", ["bucket", "port"])
-def test_a_store_that_cannot_be_reached_is_one_message(query: str, change: str) -> None:
-    if change == "bucket":
-        address = f"s3://nosuch/archive?{query}"
-    else:
-        address = "s3://factory/a?endpoint_override=127.0.0.1:9&scheme=http&region=us-east-1"
-    with pytest.raises(ArchiveUnusable) as problem:
-        Archive(address).prepare()
-    assert len(str(problem.value).splitlines()) == 1
-    assert str(problem.value).startswith("archive: s3://")
+@each(["nosuch/archive?{query}", "factory/a?endpoint_override=127.0.0.1:9&scheme=http&region=us-east-1"])
+def test_a_store_that_cannot_be_reached_is_one_message(place: str, query: str) -> None:
+    with pytest.raises(ArchiveUnusable, match=r"^archive: s3://[^\n]*$"):
+        Archive(f"s3://{place.format(query=query)}").prepare()
 
 
-def test_an_address_that_is_none_is_one_message() -> None:
+def test_an_address_that_is_none_is_one_message_and_places_have_the_names_of_paths() -> None:
     with pytest.raises(ArchiveUnusable, match="address 'nosuch://bucket/x' cannot be used") as problem:
         Archive("nosuch://someone:secret@bucket/x")
-    assert "secret" not in str(problem.value)
-
-
-def test_places_have_the_names_of_paths() -> None:
     place = ObjectPath(None, "bucket/a/b.json", "s3", "s3://k:secret@bucket/a")
     assert (place.name, place.stem, place.suffix) == ("b.json", "b", ".json")
     assert str(place.parent / "c") == "s3://bucket/a/c"
-    assert "secret" not in repr(place)
+    assert "secret" not in f"{problem.value} {place!r}"

@@ -1,6 +1,6 @@
 """The person at the station: asked at a terminal, or by the orchestrator, and answered from either."""
 
-import json
+import io
 import os
 import subprocess
 import sys
@@ -9,20 +9,18 @@ from pathlib import Path
 
 import pytest
 from capture_double import CaptureDouble, recipe_file, small_job
-from typer.testing import CliRunner
+from in_process import given, typed_document
+from root_process import ROOT
 
 from pipelines.archive import Archive
 from pipelines.chain.attendance import Answer, Attendance, Prompt
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.cli import app
 from pipelines.cli.terminal import scanned
 from pipelines.flows.local import local_server
 from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.fault import FaultOrder
 from schemas.station import with_faults
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 class Told:
@@ -111,47 +109,43 @@ NEAR = ("temperatures_C = [0.0, 50.0]", "temperatures_C = [20.0, 30.0]")
 """Soaks that are reached in moments."""
 
 
-def run_at_a_terminal(folder: Path, typed: str, *options: str):
-    recipe = recipe_file(folder, NEAR)
-    command = ["run", recipe, "--direct", "--prompts", "--archive", str(folder / "archive"), *options]
-    return CliRunner().invoke(app, command, input=typed)
+def run_at_a_terminal(folder: Path, typed: str, *options: str) -> tuple[int, str, str]:
+    words = ("run", recipe_file(folder, NEAR), "--direct", "--prompts", "--archive", folder / "archive")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stdin", io.StringIO(typed))
+        return given(*words, *options)
 
 
 def test_a_terminal_is_asked_and_a_scanner_types_the_serials(tmp_path: Path) -> None:
-    result = run_at_a_terminal(tmp_path, "S1\nS2\n\n\n\n\n\n\n\n\n", "--units", "scan", "--json")
-    assert result.exit_code in (0, 1), result.output
-    assert [unit["unit"] for unit in json.loads(result.stdout)["units"]] == ["S1", "S2"]
+    status, out, err = run_at_a_terminal(tmp_path, "S1\nS2\n\n\n\n\n\n\n\n\n", "--units", "scan", "--json")
+    assert status in (0, 1), err
+    units = typed_document("run", out)["units"]
+    assert [unit["unit"] for unit in units] == ["S1", "S2"]
     for words in ("slot  0:", "Load", "Unload", "slot  1  S2"):
-        assert words in result.stderr
-    unloaded = result.stderr[result.stderr.index("Unload") :]
-    for unit in json.loads(result.stdout)["units"]:
-        assert f"slot {unit['slot']:>2}  {unit['unit']}  {unit['outcome']}" in unloaded
+        assert words in err
+    for unit in units:
+        assert f"slot {unit['slot']:>2}  {unit['unit']}  {unit['outcome']}" in err[err.index("Unload") :]
 
 
 def test_an_operator_who_stops_gets_status_3_and_nothing_is_measured(tmp_path: Path) -> None:
-    result = run_at_a_terminal(tmp_path, "stop\n")
-    assert isinstance(result.exception, OperatorNeeded)
+    assert run_at_a_terminal(tmp_path, "stop\n")[0] == 3
     assert not list(tmp_path.glob("archive/captures/*/0*"))
 
 
 def test_a_lot_larger_than_the_fixture_is_measured_filling_by_filling(tmp_path: Path) -> None:
     text = (ROOT / "stations" / "simulated.toml").read_text(encoding="utf-8")
     assert text.count("[devices.slots]\n") == 1
-    (tmp_path / "two.toml").write_text(
-        text.replace("[devices.slots]\n", "[devices.slots]\ncount = 2\n"), encoding="utf-8"
-    )
-    serials = ["S0", "S1", "S2"]
-    options = ("--units", ",".join(serials), "--station", str(tmp_path / "two.toml"), "--json")
-    result = run_at_a_terminal(tmp_path, "\n" * 4, *options)
-    assert result.exit_code in (0, 1), result.output
-    fillings = json.loads(result.stdout)["fillings"]
-    assert [[unit["unit"] for unit in one["units"]] for one in fillings] == [serials[:2], serials[2:]]
-    assert result.stderr.count("Load") == result.stderr.count("Unload") == 2
+    station = tmp_path / "two.toml"
+    station.write_text(text.replace("[devices.slots]\n", "[devices.slots]\ncount = 2\n"), encoding="utf-8")
+    options = ("--units", "S0,S1,S2", "--station", str(station), "--json")
+    status, out, err = run_at_a_terminal(tmp_path, "\n" * 4, *options)
+    assert status in (0, 1), err
+    fillings = typed_document("run", out)["fillings"]
+    assert [[unit["unit"] for unit in one["units"]] for one in fillings] == [["S0", "S1"], ["S2"]]
+    assert err.count("Load") == err.count("Unload") == 2
 
 
 def test_a_scan_of_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    import io
-
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n"))
     with pytest.raises(Exception, match="no unit was scanned"):
         scanned(2)
@@ -194,4 +188,4 @@ def operator(environment: dict[str, str], *arguments: str) -> dict:
     command = [sys.executable, "-m", "pipelines.cli", "operator", *arguments, "--json"]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return typed_document("operator", done.stdout)

@@ -16,16 +16,16 @@ from pathlib import Path
 
 import pytest
 import websockets
+from each import each
+from in_process import refused
 from orchestrator import Orchestrator, served
 from root_process import ROOT, python
-from typer.testing import CliRunner
 
-from pipelines.cli import app
 from pipelines.doctor.orchestrator import orchestrator_checks
 from pipelines.orchestrator.credentials import REFUSED
 from pipelines.orchestrator.server_check import check_server
 from pipelines.serving.connections import MOST
-from schemas.errors import LinkLost, WrongUse
+from schemas.errors import LinkLost
 
 EVIL = "http://evil.example"
 DEPLOYMENTS = ["calibrate_lot/production-line", "calibrate_lot/on-demand", "audit_archive/weekly-audit"]
@@ -55,59 +55,51 @@ def test_scheduled_runs_of_the_line_appear(line: Orchestrator) -> None:
     assert scheduled[0]["expected_start_time"][11:19] == "06:00:00"
 
 
-def test_a_request_with_the_key_from_the_own_page_changes_state(line: Orchestrator) -> None:
+WITHOUT_KEY = [
+    {"key": key, **headers}
+    for key in ("", "tumbleline:wrong")
+    for headers in ({}, {"Origin": EVIL}, {"Host": "evil.example"})
+]
+FOREIGN = [
+    *({"Origin": origin} for origin in (EVIL, "null")),
+    *({"Host": host} for host in ("evil.example", "evil.example:4200", "127.0.0.1.evil.example", "")),
+]
+
+
+def test_only_a_request_with_the_key_from_the_own_page_changes_state(line: Orchestrator) -> None:
     assert variable(line, "plain") == 201
     assert variable(line, "own_page", Origin=f"http://127.0.0.1:{line.port}") == 201
+    assert [how for how in WITHOUT_KEY if variable(line, "without_key", **how) not in {400, 401, 403}] == []
+    assert [variable(line, "foreign", **how) for how in FOREIGN] == [403, 403, 400, 400, 400, 400]
+    preflight = {"Origin": EVIL, "Access_Control_Request_Method": "POST"}
+    assert line.ask("/api/variables/", method="OPTIONS", **preflight)[0] == 403
+    assert [line.ask("/", key="", **how)[0] for how in FOREIGN if "Host" in how] == [400] * 4
+    places = ("flow_runs", "deployments", "work_pools")
+    assert [line.ask(f"/api/{place}/filter", {}, key="")[0] for place in places] == [401] * 3  # nothing is told either
 
 
-@pytest.mark.parametrize("key", ["", "tumbleline:wrong"])
-@pytest.mark.parametrize("headers", [{}, {"Origin": EVIL}, {"Host": "evil.example"}], ids=["bare", "origin", "host"])
-def test_no_request_without_the_key_changes_state(line: Orchestrator, key: str, headers: dict[str, str]) -> None:
-    assert variable(line, "without_key", key=key, **headers) in {400, 401, 403}
+STRANGERS = [
+    {"origin": EVIL}, {"called": "evil.example"}, {"called": "evil.example", "origin": EVIL}, {"subprotocols": None},
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("path", ["/api/flow_runs/filter", "/api/deployments/filter", "/api/work_pools/filter"])
-def test_nothing_is_told_without_the_key(line: Orchestrator, path: str) -> None:
-    assert line.ask(path, {}, key="")[0] == 401
-
-
-def test_a_page_of_another_origin_changes_nothing_even_with_the_key(line: Orchestrator) -> None:
-    assert variable(line, "foreign_origin", Origin=EVIL) == 403
-    assert variable(line, "null_origin", Origin="null") == 403
-    preflight = line.ask("/api/variables/", method="OPTIONS", Origin=EVIL, Access_Control_Request_Method="POST")
-    assert preflight[0] == 403
-
-
-@pytest.mark.parametrize("host", ["evil.example", "evil.example:4200", "127.0.0.1.evil.example", ""])
-def test_a_request_by_another_name_of_the_host_changes_nothing_even_with_the_key(line: Orchestrator, host: str) -> None:
-    assert variable(line, "foreign_host", Host=host) == 400
-    assert line.ask("/", key="", Host=host)[0] == 400
-
-
-@pytest.mark.parametrize(
-    "how",
-    [{"origin": EVIL}, {"called": "evil.example"}, {"called": "evil.example", "origin": EVIL}, {"subprotocols": None}],
-    ids=["origin", "host", "both", "no-subprotocol"],
-)
-@pytest.mark.parametrize("path", ["events/in", "events/out", "logs/out"])
-def test_a_websocket_of_a_stranger_is_not_opened(line: Orchestrator, path: str, how: dict) -> None:
+@each([(path, how) for path in ("events/in", "events/out", "logs/out") for how in STRANGERS])
+def test_a_websocket_of_a_stranger_is_not_opened(case: tuple[str, dict], line: Orchestrator) -> None:
+    path, how = case
     with pytest.raises(websockets.InvalidStatus, match="403"):
-        asyncio.run(greet(line, path, line.key, **{"subprotocols": ["prefect"], **how}))
+        asyncio.run(greet(line, path, line.key, **how))
 
 
-@pytest.mark.parametrize("key", ["", "tumbleline:wrong"])
-def test_a_websocket_without_the_key_is_closed_at_once(line: Orchestrator, key: str) -> None:
-    with pytest.raises(websockets.ConnectionClosed, match="1008"):
-        asyncio.run(greet(line, "events/in", key, subprotocols=["prefect"]))
-
-
-def test_a_websocket_with_the_key_is_opened(line: Orchestrator) -> None:
-    assert asyncio.run(greet(line, "events/in", line.key, subprotocols=["prefect"]))["type"] == "auth_success"
+def test_a_websocket_is_opened_with_the_key_and_closed_at_once_without(line: Orchestrator) -> None:
+    for key in ("", "tumbleline:wrong"):
+        with pytest.raises(websockets.ConnectionClosed, match="1008"):
+            asyncio.run(greet(line, "events/in", key))
+    assert asyncio.run(greet(line, "events/in", line.key))["type"] == "auth_success"
 
 
 async def greet(line: Orchestrator, path: str, key: str, called: str = "127.0.0.1", **how: object) -> dict:
-    where = {"host": "127.0.0.1", "port": line.port, "open_timeout": 30}
-    async with websockets.connect(f"ws://{called}:{line.port}/api/{path}", **where, **how) as socket:
+    where = {"host": "127.0.0.1", "port": line.port, "open_timeout": 30, "subprotocols": ["prefect"]} | how
+    async with websockets.connect(f"ws://{called}:{line.port}/api/{path}", **where) as socket:
         await socket.send(json.dumps({"type": "auth", "token": key}))
         return json.loads(await socket.recv())
 
@@ -126,23 +118,17 @@ def test_the_files_of_the_server_are_its_own(line: Orchestrator) -> None:
     assert {name: oct(mode) for name, mode in modes.items() if mode & 0o077} == {}
 
 
-def test_the_queue_of_the_station_takes_one_run_at_a_time(line: Orchestrator) -> None:
+def test_deployments_have_their_queue_and_are_found_by_their_module(line: Orchestrator) -> None:
     status, queue = line.ask("/api/work_pools/line/queues/line-1")
-    assert (status, queue["concurrency_limit"]) == (200, 1)
+    assert (status, queue["concurrency_limit"]) == (200, 1)  # the station takes one run at a time
     _, deployments = line.ask("/api/deployments/filter", {})
-    assert {one["name"]: one["work_queue_name"] for one in deployments} == {
-        "production-line": "line-1",
-        "on-demand": "line-1",
-        "weekly-audit": "audits",
+    calibrate, audit = "pipelines.flows.calibrate.calibrate_lot", "pipelines.flows.audit.audit_archive"
+    assert {one["name"]: (one["work_queue_name"], one["entrypoint"]) for one in deployments} == {
+        "production-line": ("line-1", calibrate),
+        "on-demand": ("line-1", calibrate),
+        "weekly-audit": ("audits", audit),
     }
-
-
-def test_flows_are_found_by_their_module_so_that_their_folder_hides_no_module_of_python(line: Orchestrator) -> None:
-    _, deployments = line.ask("/api/deployments/filter", {})
-    assert {one["entrypoint"] for one in deployments} == {
-        "pipelines.flows.calibrate.calibrate_lot",
-        "pipelines.flows.audit.audit_archive",
-    }
+    # a folder of flows on the path would hide modules of Python
     assert {one["job_variables"]["working_dir"] for one in deployments} == {str(ROOT)}
 
 
@@ -205,20 +191,15 @@ def test_credentials_are_refused_as_a_parameter_of_a_flow_and_not_stored(line: O
     assert [path.name for path in line.home.iterdir() if path.is_file() and secret.encode() in path.read_bytes()] == []
 
 
-@pytest.mark.parametrize(("key", "told"), [("", "requires a key"), ("tumbleline:" + "x" * 32, "refuses the key")])
-def test_a_client_with_no_key_or_a_wrong_one_is_told(
-    line: Orchestrator, key: str, told: str, monkeypatch: pytest.MonkeyPatch
+def test_a_client_with_no_key_a_wrong_one_or_no_server_is_told(
+    line: Orchestrator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PREFECT_API_URL", line.environment["PREFECT_API_URL"])
-    monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
-    result = CliRunner().invoke(app, ["operator"])
-    assert isinstance(result.exception, WrongUse)
-    assert told in str(result.exception)
+    for key, told in (("", "requires a key"), ("tumbleline:" + "x" * 32, "refuses the key")):
+        monkeypatch.setenv("PREFECT_API_AUTH_STRING", key)
+        assert told in refused("operator")
     monkeypatch.setenv("PREFECT_API_AUTH_STRING", line.key)
     check_server()
-
-
-def test_an_orchestrator_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
     with pytest.raises(LinkLost, match="does not answer"):
         check_server()
@@ -255,17 +236,19 @@ def resident_mb(line: Orchestrator) -> float:
     return int(re.search(r"VmHWM:\s+(\d+) kB", text)[1]) / 1e3
 
 
-@pytest.mark.parametrize("path", ["/api/flow_runs/", "/api/flow_runs/filter", "/api/variables/"])
-@pytest.mark.parametrize("chunked", [False, True])
-@pytest.mark.parametrize("key", ["", "tumbleline:wrong"])
-def test_a_body_without_the_key_is_refused_unread(line: Orchestrator, path: str, key: str, chunked: bool) -> None:  # noqa: FBT001
+PLACES = ("/api/flow_runs/", "/api/flow_runs/filter", "/api/variables/")
+
+
+@each([(path, key, chunked) for path in PLACES for key in ("", "tumbleline:wrong") for chunked in (False, True)])
+def test_a_body_without_the_key_is_refused_unread(case: tuple[str, str, bool], line: Orchestrator) -> None:
+    path, key, chunked = case
     before = resident_mb(line)
     assert sent(line, path, 100_000_000, key, chunked=chunked) == 401
     assert resident_mb(line) < before + 20.0
 
 
-@pytest.mark.parametrize("chunked", [False, True])
-def test_a_body_of_more_than_a_megabyte_is_refused_with_the_key(line: Orchestrator, chunked: bool) -> None:  # noqa: FBT001
+@each([False, True])
+def test_a_body_of_more_than_a_megabyte_is_refused_with_the_key(chunked: bool, line: Orchestrator) -> None:  # noqa: FBT001
     assert sent(line, "/api/flow_runs/", 40_000_000, line.key, chunked=chunked) == 413
     assert sent(line, "/api/variables/", 2_000_000, line.key, chunked=chunked) == 413
     assert sent(line, "/api/logs/", 4_000_000, line.key, chunked=chunked) == 422  # read: its logs are none
@@ -291,21 +274,18 @@ def test_idle_connections_do_not_shut_the_line_out(line: Orchestrator) -> None:
         assert len(closed) >= len(idle) - 1.25 * MOST
 
 
-def test_a_server_without_a_key_does_not_start() -> None:
-    environment = {key: value for key, value in os.environ.items() if not key.endswith("AUTH_STRING")}
-    command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", "1"]
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 2
-    assert "orchestrator: no key was found" in done.stderr
-    assert "PREFECT_SERVER_API_AUTH_STRING" in done.stderr
-
-
-def test_a_port_in_use_is_told_in_one_sentence(line: Orchestrator) -> None:
-    command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(line.port)]
-    environment = line.environment | {"PREFECT_SERVER_API_AUTH_STRING": line.key}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 2
-    assert f"orchestrator: port {line.port} of 127.0.0.1 cannot be used (Address already in use)" in done.stderr
+def test_a_server_without_a_key_or_on_a_port_in_use_does_not_start(line: Orchestrator) -> None:
+    bare = {key: value for key, value in os.environ.items() if not key.endswith("AUTH_STRING")}
+    taken = f"orchestrator: port {line.port} of 127.0.0.1 cannot be used (Address already in use)"
+    for port, environment, words in (
+        (1, bare, ("orchestrator: no key was found", "PREFECT_SERVER_API_AUTH_STRING")),
+        (line.port, line.environment | {"PREFECT_SERVER_API_AUTH_STRING": line.key}, (taken,)),
+    ):
+        command = [sys.executable, "-m", "pipelines.orchestrator.server", "--port", str(port)]
+        pipes = {"env": environment, "capture_output": True, "text": True}
+        done = subprocess.run(command, cwd=ROOT, timeout=60, check=False, **pipes)
+        assert done.returncode == 2
+        assert [one for one in words if one not in done.stderr] == []
 
 
 def test_doctor_finds_the_server_good_and_a_wrong_key_at_fault(

@@ -184,7 +184,7 @@ def test_a_plan_of_the_page_on_identifiability_is_made(line: str, home: Path) ->
 @pytest.mark.slow
 def test_the_plan_of_the_page_that_tells_rivals_apart_finds_what_it_says(home: Path) -> None:
     (line,) = [line for line in PLANS if "--criterion T" in line]
-    document = document_of(*shlex.split(line)[1:])
+    document = json.loads(given(*shlex.split(line)[1:], "--json")[1])
     found = min(row["chi_square"] for row in document["rivals"])
     assert found >= 50.0
     assert max(row["textbook"] for row in document["rivals"]) < 1e-3

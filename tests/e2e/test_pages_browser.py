@@ -1,7 +1,6 @@
 """Pages in a real browser: nothing is clipped at 1280 px, dark mode is dark, and every unit is printed on a page of its own."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pypdfium2
 import pytest
-from browser import chromium
 from capture_double import SMALL, recipe_file, small_run
 from typer.testing import CliRunner
 
@@ -94,12 +92,6 @@ def one_soak(folder: Path) -> Path:
     path = folder / "dwells.csv"
     pd.concat(parts).assign(time_s=lambda table: 10.0 * table["dwell"]).to_csv(path, index=False)
     return path
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as opened:
-        yield opened
 
 
 @pytest.mark.parametrize("name", ["report", "plan", "audit", "diagnosis"])

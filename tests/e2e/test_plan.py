@@ -1,19 +1,42 @@
-"""`tumbleline plan` from the command line: what other programs read, and what it refuses."""
+"""`tumbleline plan` and `plan optimise`: what a plan sees and costs; a recipe that is usable, cheaper and as good as it says."""
 
 import json
 import re
+from collections import Counter
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
-from typer.testing import CliRunner
+from capture_double import CaptureDouble
+from each import each
+from in_process import document_of, given, refused, text_of
+from root_process import ROOT
+from typed_commands import printed_commands
 
-from inertial.errors import NotIdentified
+from inertial.frames import force_from_angles
+from inertial.noise.dwells import DwellNoise
 from pipelines.archive import Archive
-from pipelines.cli import app
+from pipelines.chain.runner import Runner
+from pipelines.cli.next_commands import fit_refusal
+from pipelines.cli.optimal import missing_limits
+from pipelines.jobs.job import Request
 from pipelines.jobs.model_change import change_from_options
+from pipelines.jobs.recipe_text import limits_from, recipe_text
+from pipelines.jobs.recipes import load_recipe, sample_names
 from pipelines.jobs.releases import release
-from schemas.errors import RecipeInvalid, WrongUse
+from pipelines.planning.lower_bound import lower_bound
+from pipelines.planning.plan import plan_context
+from pipelines.planning.requirement import Requirement, candidates
+from pipelines.planning.soak_orders import orders, soak_seconds
+from pipelines.planning.textbook import reference_errors, textbook
+from pipelines.planning.verification_poses import apart
+from pipelines.schedule.steps import steps
+from pipelines.schedule.timing import minutes
+from schemas.recipe import Recipe
+from schemas.station import load_station
 
 RECIPE = """
 name = "faces"
@@ -23,18 +46,16 @@ poses = "six"
 temperatures_C = [25.0]
 effects = ["bias", "scale", "misalignment"]
 """
-KEYS = {"effect", "seen", "left", "variance_inflation", "floor_ug", "alias", "breaker"}
+PLAIN = "bias,scale,misalignment"
+THERMAL = f"{PLAIN},bias_temperature,scale_temperature"
 
 
-def planned(*words: object) -> dict:
-    """The document of a plan."""
-    done = CliRunner().invoke(app, ["plan", *map(str, words), "--json"])
-    assert done.exit_code == 0, done.exception
-    return json.loads(done.stdout)
+def planned(*words: object) -> dict[str, Any]:
+    return document_of("plan", *words, status=0)
 
 
 @pytest.fixture(scope="module")
-def seen(tmp_path_factory) -> dict:
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the plan of six faces says of every effect."""
     path = tmp_path_factory.mktemp("seen") / "faces.toml"
     path.write_text(RECIPE, encoding="utf-8")
@@ -42,65 +63,48 @@ def seen(tmp_path_factory) -> dict:
 
 
 @pytest.fixture
-def faces(tmp_path):
+def faces(tmp_path: Path) -> Path:
     path = tmp_path / "faces.toml"
     path.write_text(RECIPE, encoding="utf-8")
     return path
 
 
-def test_plan_says_for_every_effect_whether_six_faces_see_it_and_what_hides_it(seen):
-    assert all(set(row) >= KEYS for row in seen.values())
-    square, cross = seen["second_order"], seen["cross_coupling"]
-    assert square["seen"]
+def test_plan_says_for_every_effect_whether_six_faces_see_it_what_hides_it_and_its_floor(seen: dict[str, Any]) -> None:
+    square, cross, shaken = seen["second_order"], seen["cross_coupling"], seen["vibration_rectification"]
+    assert (square["seen"], square["why"]) == (True, "")
     assert square["left"] == pytest.approx(0.82, abs=0.01)
     assert {"scale_asymmetry", "fourth_order"} <= set(square["alias"])
-    assert square["why"] == ""
-    assert not cross["seen"]
-    assert cross["floor_ug"] is None
-    assert "45" in cross["breaker"] or "90" in cross["breaker"]
+    assert (cross["seen"], cross["floor_ug"]) == (False, None)
+    assert re.search("45|90", cross["breaker"])
     assert "β in 90° steps" in cross["why"]
     assert "add poses at β = 45°" in cross["why"]
-
-
-def test_a_floor_comes_with_its_unit_and_with_what_an_effect_of_that_size_adds(seen):
-    square, shaken = seen["second_order"], seen["vibration_rectification"]
-    assert square["floor_unit"] == "µg/g²"
+    assert (square["floor_unit"], shaken["floor_unit"]) == ("µg/g²", "µg/g²")
     # K2·fx² is 1 in two of six faces and 0 in the others
     assert square["floor_size_ug"] == pytest.approx(square["floor_ug"] / 3**0.5, rel=1e-3)
-    assert shaken["floor_unit"] == "µg/g²"
     assert shaken["floor_size_ug"] < 1e-3 * shaken["floor_ug"]
 
 
-def test_plan_marks_what_would_have_to_be_larger_than_it_ever_is():
-    rows = planned("production")["effects"]
-    faint = {row["effect"] for row in rows if row["seen"] and row["floor_size_ug"] > row["typical_ug"][1]}
-    told = " ".join(CliRunner().invoke(app, ["plan", "production"]).stdout.split())
+def test_plan_marks_what_would_have_to_be_larger_than_it_ever_is_and_adds_up_its_minutes() -> None:
+    document = planned("production")
+    rows = [row for row in document["effects"] if row["seen"]]
+    faint = {row["effect"] for row in rows if row["floor_size_ug"] > row["typical_ug"][1]}
     assert "scale_aging" in faint
-    assert f"floor above the typical size: {', '.join(sorted(faint))}" in told
+    assert f"floor above the typical size: {', '.join(sorted(faint))}" in text_of("plan", "production")
+    parts = [document["minutes"][k] for k in ("soaks", "moves", "dwells", "static_record")]
+    assert document["minutes"]["total"] == pytest.approx(sum(parts), abs=0.05)
 
 
-def test_plan_of_the_built_in_recipe_adds_up_its_minutes():
-    minutes = planned()["minutes"]
-    parts = [minutes[k] for k in ("soaks", "moves", "dwells", "static_record")]
-    assert minutes["total"] == pytest.approx(sum(parts), abs=0.05)
+def test_plan_refuses_a_model_that_the_recipe_cannot_determine_with_what_is_missing(faces: Path) -> None:
+    for effect, parts in (
+        ("third_order", ["third_order"]),
+        ("cross_coupling", ["cross_coupling cannot be identified: β in 90° steps makes", "add poses at β = 45°"]),
+    ):
+        faces.write_text(RECIPE.replace('"misalignment"]', f'"misalignment", "{effect}"]'), encoding="utf-8")
+        message = refused("plan", faces)
+        assert [part for part in parts if part not in message] == []
 
 
-def test_plan_refuses_a_model_that_the_recipe_cannot_determine(faces):
-    faces.write_text(RECIPE.replace('"misalignment"]', '"misalignment", "third_order"]'), encoding="utf-8")
-    done = CliRunner().invoke(app, ["plan", str(faces)])
-    assert isinstance(done.exception, NotIdentified)
-    assert "third_order" in str(done.exception)
-
-
-def test_plan_refuses_an_invisible_model_with_what_is_missing(faces):
-    faces.write_text(RECIPE.replace('"misalignment"]', '"misalignment", "cross_coupling"]'), encoding="utf-8")
-    done = CliRunner().invoke(app, ["plan", str(faces)])
-    assert isinstance(done.exception, NotIdentified)
-    assert "cross_coupling cannot be identified: β in 90° steps makes" in str(done.exception)
-    assert "add poses at β = 45°" in str(done.exception)
-
-
-def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces):
+def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces: Path) -> None:
     document = planned(faces, "--noise", "25", "--wander", "0")
     rows = {(r["effect"], r["axis"]): r for r in document["coefficients"] if r["effect"] != "misalignment"}
     white = document["dwell_error_ug"]["white"]
@@ -111,93 +115,248 @@ def test_plan_tells_the_error_to_be_expected_of_every_coefficient(faces):
     assert rows["scale", "z"]["unit"] == "µg/g"
 
 
-def test_wander_of_the_device_counts_beside_its_white_noise(faces):
+def test_wander_of_the_device_counts_beside_its_white_noise(faces: Path) -> None:
     quiet, restless = (planned(faces, "--device", name) for name in ("qa700", "adxl355"))
     assert restless["dwell_error_ug"]["wander"] == pytest.approx(0.664 * 300.0, rel=0.01)
     assert restless["dwell_error_ug"]["together"] > 5.0 * quiet["dwell_error_ug"]["together"]
     floors = [{r["effect"]: r["floor_ug"] for r in d["effects"]}["second_order"] for d in (quiet, restless)]
     assert floors[1] > 5.0 * floors[0]
+    told = text_of("plan", "--noise", "2", "--wander", "40")
+    listed = told.partition("raised by slow noise")[2].partition("effect visible in part")[0]
+    assert re.search(r"step_change|warm_up|bias_temperature_quadratic|creep_after_move", listed)
+    assert "raised by slow noise" not in text_of("plan", "--noise", "2", "--wander", "0")
 
 
-def test_a_slow_station_needs_more_minutes(faces, tmp_path):
-    text = (Path(__file__).parents[2] / "deploy/stations/simulated.toml").read_text(encoding="utf-8")
-    slow = tmp_path / "slow.toml"
-    slow.write_text(text.replace("speed_deg_s = 30.0", "speed_deg_s = 3.0"), encoding="utf-8")
-    usual, slower = (planned(faces, *more)["minutes"] for more in ((), ("--station", slow)))
+def test_a_slow_station_needs_more_minutes(faces: Path, tmp_path: Path) -> None:
+    text = (ROOT / "deploy/stations/simulated.toml").read_text(encoding="utf-8")
+    (tmp_path / "slow.toml").write_text(text.replace("speed_deg_s = 30.0", "speed_deg_s = 3.0"), encoding="utf-8")
+    usual, slower = (planned(faces, *more)["minutes"] for more in ((), ("--station", tmp_path / "slow.toml")))
     assert slower["moves"] > 3.0 * usual["moves"]
     assert slower["soaks"] == usual["soaks"]
 
 
-def test_the_page_of_a_plan_opens_without_a_network(faces, tmp_path):
-    page = tmp_path / "plan.html"
-    done = CliRunner().invoke(app, ["plan", str(faces), "--page", str(page)])
-    assert done.exit_code == 0
-    text = page.read_text(encoding="utf-8")
+def test_the_page_of_a_plan_opens_without_a_network(faces: Path, tmp_path: Path) -> None:
+    text_of("plan", faces, "--page", tmp_path / "plan.html", status=0)
+    text = (tmp_path / "plan.html").read_text(encoding="utf-8")
     assert text.count("<svg") == 5
     assert not re.search(r"(src|href)=.http", text)
     assert "β in 90° steps" in text
+    _, _, err = given("plan", faces, "--page", tmp_path / "none" / "plan.html")
+    assert "cannot be written" in err
 
 
-def test_a_page_in_a_folder_that_is_not_there_is_one_message(faces, tmp_path):
-    done = CliRunner().invoke(app, ["plan", str(faces), "--page", str(tmp_path / "none" / "plan.html")])
-    assert isinstance(done.exception, WrongUse)
-    assert "cannot be written" in str(done.exception)
-
-
-def test_plan_of_a_recipe_with_the_lines_model_asks_the_archive_for_it(faces, tmp_path):
+def test_plan_of_a_recipe_with_the_lines_model_asks_the_archive_for_it(faces: Path, tmp_path: Path) -> None:
     faces.write_text(RECIPE.replace('effects = ["bias", "scale", "misalignment"]', 'model = "line"'), encoding="utf-8")
-    asked = ["plan", str(faces), "--archive", str(tmp_path / "archive")]
-    none = CliRunner().invoke(app, asked)
-    assert isinstance(none.exception, RecipeInvalid)
-    assert "for adxl355 on simulated no model is released" in str(none.exception)
-    own = Archive(tmp_path / "archive")
+    asked = (faces, "--archive", tmp_path / "archive")
+    assert "for adxl355 on simulated no model is released" in refused("plan", *asked)
+    own, model = Archive(tmp_path / "archive"), tmp_path / "m.toml"
     own.prepare()
-    model = tmp_path / "m.toml"
     model.write_text(
         '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment", "own_square"]\n\n'
         '[[formula]]\nid = "own_square"\ncolumns = ["f**2"]\nwhy = "a trial"\n'
     )
     release(own, change_from_options("", model), datetime(2026, 1, 1, tzinfo=UTC), reason="test", force=True)
-    assert planned(*asked[1:])["model"] == ["bias", "scale", "misalignment", "own_square"]
-    assert planned(faces, "--effects", "bias,scale,misalignment")["model"] == ["bias", "scale", "misalignment"]
+    assert planned(*asked)["model"] == [*PLAIN.split(","), "own_square"]
+    assert planned(faces, "--effects", PLAIN)["model"] == PLAIN.split(",")
 
 
-def test_effects_that_slow_noise_hides_are_listed_with_what_shows_them():
-    done = CliRunner().invoke(app, ["plan", "--noise", "2", "--wander", "40"])
-    assert done.exit_code == 0
-    listed = done.stdout.split("raised by slow noise", 1)[1].split("effect visible in part", 1)[0]
-    assert re.search(r"step_change|warm_up|bias_temperature_quadratic|creep_after_move", listed)
-    done = CliRunner().invoke(app, ["plan", "--noise", "2", "--wander", "0"])
-    assert "raised by slow noise" not in done.stdout
-
-
-def test_an_effect_that_only_the_verification_poses_show_is_refused_with_the_reason(tmp_path):
+def test_an_effect_that_only_the_verification_poses_show_is_refused_with_the_reason(tmp_path: Path) -> None:
     """The diagnosis of such a run names it, as it uses every dwell; the plan says why a fit cannot have it."""
-    from capture_double import CaptureDouble
-
-    from pipelines.archive import Archive
-    from pipelines.chain.runner import Runner
-    from pipelines.cli.next_commands import fit_refusal
-    from pipelines.jobs.job import Request
-
-    source = Path(__file__).resolve().parents[2] / "deploy" / "recipes"
+    source = ROOT / "deploy" / "recipes"
     text = (source / "line-twelve.toml").read_text(encoding="utf-8")
     (tmp_path / "line-temperature.limits.toml").write_bytes((source / "line-temperature.limits.toml").read_bytes())
-    recipe = tmp_path / "twelve.toml"
+    recipe, without = tmp_path / "twelve.toml", tmp_path / "without.toml"
     recipe.write_text(text, encoding="utf-8")
     runner = Runner(Request(str(recipe)).job(), Archive(tmp_path / "archive"), measure=CaptureDouble())
     runner.stage("capture")
-    model = [*runner.job.recipe.effects, "third_order"]
-    assert fit_refusal(runner.run, runner.job.recipe.effects) == ""
-    told = fit_refusal(runner.run, model)
-    done = CliRunner().invoke(app, ["plan", str(recipe), "--effects", ",".join(model)])
-    assert done.exit_code != 0
-    for message in (told, str(done.exception)):
+    own = runner.job.recipe.effects
+    model = [*own, "third_order"]
+    assert fit_refusal(runner.run, own) == ""
+    for message in (fit_refusal(runner.run, model), refused("plan", recipe, "--effects", ",".join(model))):
         assert "third_order cannot be identified" in message
         assert "only the verification poses show it, which a diagnosis uses and a fit leaves out" in message
         assert "move poses from 'verification' to 'poses'" in message
-    without = tmp_path / "without.toml"
     without.write_text("\n".join(line for line in text.splitlines() if "verification" not in line), encoding="utf-8")
-    refused = CliRunner().invoke(app, ["plan", str(without), "--effects", ",".join(model)])
-    assert "third_order cannot be identified" in str(refused.exception)
-    assert "verification" not in str(refused.exception)
+    message = refused("plan", without, "--effects", ",".join(model))
+    assert "third_order cannot be identified" in message
+    assert "verification" not in message
+
+
+def optimise(*options: str) -> tuple[object, ...]:
+    return ("plan", "optimise", "--device", "analogue", "--effects", THERMAL, *options)
+
+
+def optimised(target: Path, *options: str) -> dict[str, Any]:
+    """The document of a search, which has no type yet."""
+    status, out, err = given(*optimise(*options), "-o", target, "--json")
+    assert status == 0, err
+    return json.loads(out)
+
+
+@pytest.fixture(scope="module")
+def optimal(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """The cheapest recipe with errors up to four times the textbook plan's: little to search."""
+    target = tmp_path_factory.mktemp("optimal") / "found.toml"
+    return optimised(target, "--factor", "4"), target
+
+
+def forces(recipe: Recipe, poses: str) -> np.ndarray:
+    return force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in getattr(recipe, poses)]).T)
+
+
+def test_the_recipe_that_is_written_is_what_was_told_and_as_good_as_wanted_in_less_time(optimal) -> None:
+    document, target = optimal
+    recipe, told = load_recipe(str(target)), planned(target, "--device", "analogue")
+    assert (told["minutes"], told["dwells"]) == (document["minutes"], document["dwells"])
+    assert recipe.temperatures_C == document["temperatures_C"]
+    taken = minutes(steps(recipe), load_station(), recipe)
+    assert taken.total == pytest.approx(document["minutes"]["total"], abs=0.05)
+    assert all(row["uncertainty_ug"] <= row["wanted_ug"] for row in document["coefficients"])
+    assert len(document["coefficients"]) == 18
+    assert document["share"] < 0.6
+    left = {row["effect"]: row["left"] for row in document["plan"]["effects"]}
+    assert min(left[e] for e in ("aging_linear", "thermal_hysteresis", "cross_coupling", "third_order")) > 0.1
+    assert "cross_coupling" in document["seen_besides"]  # more physics than on faces
+
+
+def test_the_new_recipe_is_compared_with_the_own_one_and_the_textbook_plan(optimal) -> None:
+    document, target = optimal
+    own = planned("production", "--device", "analogue", "--effects", THERMAL)
+    assert document["from"] == "production"
+    assert document["own_minutes"] == own["minutes"]
+    assert document["textbook_minutes"]["total"] > document["own_minutes"]["total"]
+    expected = [row["uncertainty_ug"] for row in own["coefficients"]]
+    assert [row["own_ug"] for row in document["coefficients"]] == pytest.approx(expected, rel=0.05)
+    ratios = [row["own_ug"] / row["wanted_ug"] for row in document["coefficients"]]
+    assert document["own_worst"] == pytest.approx(max(ratios))
+    head = [line for line in target.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+    assert any(f"production: {own['minutes']['total']:.0f} min" in line for line in head)
+    assert not document["limits_missing"]
+
+
+def test_soaks_come_back_meet_both_ends_and_begin_and_end_with_one_reference_pose(optimal) -> None:
+    recipe = load_recipe(str(optimal[1]))
+    assert len(set(recipe.temperatures_C)) < len(recipe.temperatures_C)
+    assert {min(recipe.temperatures_C), max(recipe.temperatures_C)} == {-10.0, 60.0}
+    ends = {pose.name for k in range(len(recipe.soaks)) for pose in (recipe.poses_at(k)[0], recipe.poses_at(k)[-1])}
+    assert len(ends) == 1
+
+
+def test_verification_poses_are_apart_and_each_is_measured_as_often_as_in_the_recipe(optimal) -> None:
+    base, recipe = load_recipe(), load_recipe(str(optimal[1]))
+    check = forces(recipe, "verification")
+    assert len(check) == 6
+    assert np.degrees(np.arccos(np.max(check @ forces(recipe, "poses").T))) > 8.0
+    taken = [[pose.name for pose in recipe.verification_at(k)] for k in range(len(recipe.soaks))]
+    of_each = Counter(name for names in taken for name in names)
+    assert set(of_each.values()) == {len(base.verification) // 6 * len(base.temperatures_C)}
+    assert optimal[0]["verification_dwells"] == sum(of_each.values())
+    assert max(map(len, taken)) - min(map(len, taken)) <= 6
+    poses = apart(np.array([[0.0, 0.0], [180.0, 0.0]]), base.verification)
+    force = force_from_angles(*np.radians([(p.outer_deg, p.inner_deg) for p in poses]).T)
+    assert np.degrees(np.arccos((force @ force.T - 2.0 * np.eye(len(force))).max())) > 40.0
+
+
+def test_orders_of_soaks_meet_all_levels_turn_round_and_come_back() -> None:
+    station = load_station()
+    for order in orders((-10.0, 25.0, 60.0), station, 900.0):
+        turns = np.diff(order)
+        assert set(order) == {-10.0, 25.0, 60.0}
+        assert len(order) > 3
+        assert turns.min() < 0.0 < turns.max()
+    seconds = [soak_seconds(order, station, 900.0) for order in orders((0.0, 50.0), station, 900.0)]
+    assert seconds == sorted(seconds)
+    assert orders((25.0,), station, 900.0) == [(25.0,)]
+
+
+@each(sample_names())
+def test_a_recipe_written_as_text_reads_as_itself(name: str, tmp_path: Path) -> None:
+    recipe, path = load_recipe(name), tmp_path / "again.toml"
+    path.write_text(recipe_text(recipe, ["a remark"]), encoding="utf-8")
+    unnamed = {"model_name", "model_version"}
+    assert load_recipe(str(path)).model_dump(exclude=unnamed) == recipe.model_dump(exclude=unnamed)
+
+
+def test_limits_beside_the_first_recipe_are_found_and_missing_ones_are_a_warning(tmp_path: Path) -> None:
+    own = tmp_path / "recipes"
+    own.mkdir()
+    (own / "mine.limits.toml").write_text("", encoding="utf-8")
+    assert limits_from("mine.limits.toml", own, tmp_path / "new") == "../recipes/mine.limits.toml"
+    assert limits_from("consumer", own, tmp_path / "new") == "consumer"
+    warning = missing_limits(load_recipe().model_copy(update={"limits": "mine.limits.toml"}), tmp_path)
+    assert "mine.limits.toml" in warning
+    assert "tumbleline run" in warning
+    assert not missing_limits(load_recipe(), tmp_path)
+
+
+REFUSED = {
+    "--criterion worts": "did you mean worst",
+    "--poses twelv": "did you mean twelve",
+    "--temperatures cold,warm": "write -10,25,60",
+    "--wanted bais=50": "did you mean bias",
+    "--wanted bias=-3": "positive error",
+    "--see third_ordre": "third_order",
+    "--criterion T": "write --part third_order,odd_quadratic",
+    "--criterion T --part third_order": "two or more are needed",
+    "--criterion T --part third_order,odd_quadratics": "odd_quadratic",
+    "--criterion T --part third_order,level_error": "an effect of the station",
+    "--criterion T --part third_order,odd_quadratic --factor 2": "--factor does not go",
+    "--part third_order,odd_quadratic": "or write --criterion T",
+}
+
+
+@each(REFUSED)
+def test_what_cannot_be_asked_is_told_in_one_message(options: str, tmp_path: Path) -> None:
+    target = tmp_path / "found.toml"
+    assert REFUSED[options] in refused(*optimise(*options.split()), "-o", target)
+    assert not target.exists()
+
+
+def test_effects_that_may_be_mistaken_are_told_apart_by_the_cheapest_recipe(tmp_path: Path) -> None:
+    rivals, target = ("third_order", "odd_quadratic"), tmp_path / "found.toml"
+    options = ("--criterion", "t", "--part", ",".join(rivals), "--effects", PLAIN, "--size", "400")
+    document = optimised(target, *options, "--verification", "1")
+    assert [(r["true"], r["wrong"]) for r in document["rivals"]] == [rivals, rivals[::-1]]
+    assert all(r["chi_square"] >= 50.0 and r["textbook"] < 1e-3 for r in document["rivals"])
+    assert document["share"] < 0.6
+    recipe = load_recipe(str(target))
+    poses = [(p.outer_deg, p.inner_deg) for k in range(len(recipe.soaks)) for p in recipe.poses_at(k)]
+    size = np.abs(force_from_angles(*np.radians(poses).T))
+    assert np.mean((size > 0.1) & (size < 0.6), axis=0).min() > 0.3  # where the two curves are apart
+
+
+def test_no_recipe_is_quicker_than_the_bound_of_dwells_without_end() -> None:
+    base = load_recipe().model_copy(update={"effects": THERMAL.split(","), "static_record_s": 0.0})
+    shares: dict[float, float] = {}
+    for bias in (30.0, 150.0):
+        against = plan_context(textbook(base, (-10.0, 60.0)), load_station(), DwellNoise(1e-7, bias * 1e-6))
+        requirement = Requirement(
+            reference_errors(against, base), (), (-10.0, 60.0), candidates(against.station), optional_levels=(25.0,)
+        )
+        shares[bias] = lower_bound(base, against, requirement).share
+    # the errors wanted grow with the flicker: the same part of the time
+    assert shares[30.0] == pytest.approx(shares[150.0], abs=0.011)
+    assert 0.7 < shares[30.0] < 0.95
+    half = replace(requirement, errors=2.0 * requirement.errors)
+    assert lower_bound(base, against, half).share < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)  # a whole run of the recipe that was found
+def test_the_line_after_a_search_measures_the_new_recipe(tmp_path: Path) -> None:
+    target = tmp_path / "my new recipe.toml"
+    (words,) = printed_commands(given(*optimise("--factor", "4"), "-o", target)[1])
+    assert words == ["run", str(target)]
+    text_of(*words, "--direct", "--archive", tmp_path / "archive")
+
+
+@pytest.mark.slow
+def test_errors_that_no_recipe_reaches_are_refused_and_the_textbook_plan_is_matched_in_six_tenths(
+    tmp_path: Path,
+) -> None:
+    message = refused(*optimise("--wanted", "bias=0.01"), "-o", tmp_path / "none.toml")
+    assert "times those" in message
+    assert "uninterrupted measurement" in message
+    document = optimised(tmp_path / "found.toml", "--verification", "1")
+    assert document["share"] <= 0.60
+    assert document["worst"] <= 1.0

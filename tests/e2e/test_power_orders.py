@@ -2,18 +2,27 @@
 
 import math
 
+import inquiries
 import numpy as np
 import pytest
-from small_station import QUIET, MemorySink, lot_of, plant_of, quiet_progress, short_recipe, station_of, write
+from small_station import QUIET, MemorySink, captured, lot_of, plant_of, quiet_progress, short_recipe, station_of, write
 
+from inertial.planning.sequences import SequenceStep
+from inertial.power import switched
+from pipelines.archive import Archive
 from pipelines.capture.capture import capture
 from pipelines.capture.power_cycling import Power
 from pipelines.capture.supervision import Supervisor
+from pipelines.chain.chain import ORDER
+from pipelines.chain.runner import Runner
+from pipelines.inquiry.followup import follow_up
+from pipelines.inquiry.inquiry import FOLLOW_UP, FollowUp, begin
 from pipelines.schedule.steps import steps
 from pipelines.schedule.timing import minutes
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.event import MemoryLog
 from schemas.poses import SoakPart
+from schemas.progress import silent
 from schemas.recipe import Recipe
 from stations.opening import make_plant, open_station, serve_plant
 from stations.plant.hidden.age import StressRelaxation
@@ -34,11 +43,9 @@ def recipe_with_power_off(off: tuple[float, ...] = (0.0, OFF_S, 0.0)) -> Recipe:
 
 
 def run(sink=None, events=None, recipe=None, hidden=(), **simulation):
-    config, lot = station_of(**{"preset_overrides": COLD, **simulation}), lot_of(2)
-    sink, events = sink or MemorySink(), events or MemoryLog()
-    with open_station(config, lot, resume=sink.last_state(), hidden=hidden) as station:
-        capture(station, recipe or recipe_with_power_off(), lot, sink, progress=quiet_progress, events=events)
-    return sink, events
+    config, events = station_of(**{"preset_overrides": COLD, **simulation}), events or MemoryLog()
+    recipe = recipe or recipe_with_power_off()
+    return captured(recipe, lot_of(2), config, sink, events=events, hidden=hidden), events
 
 
 def biases(sink):
@@ -56,11 +63,8 @@ def test_the_time_with_power_begins_again_and_the_readings_say_for_how_long_ther
     assert readings["start_s"][1] - readings["start_s"][0] > OFF_S
     told = [(e.record, e.action) for e in events.recorded() if e.kind == "power"]
     assert told == [(1, "devices off"), (1, "devices on again")]
-
-
-def test_a_run_that_switches_nothing_says_nothing_of_it():
-    sink, _ = run(recipe=recipe_with_power_off((0.0, 0.0)))
-    assert "power_off_s" not in sink.all(1).columns
+    nothing, _ = run(recipe=recipe_with_power_off((0.0, 0.0)))
+    assert "power_off_s" not in nothing.all(1).columns  # a run that switches nothing says nothing of it
 
 
 def test_warm_up_begins_where_the_device_has_cooled_to():
@@ -165,19 +169,48 @@ def test_a_reader_that_cannot_switch_refuses_before_anything_moves(monkeypatch):
         assert station.clock.now() < 1.0
 
 
-def test_the_time_without_power_is_in_the_minutes_of_the_recipe():
+def test_the_time_without_power_is_in_the_minutes_of_the_recipe_and_each_pose_needs_one():
     station = station_of()
-    long, short = (
-        minutes(steps(r), station, r).total for r in (recipe_with_power_off(), recipe_with_power_off((0.0, 0.0, 0.0)))
-    )
+    recipes = recipe_with_power_off(), recipe_with_power_off((0.0, 0.0, 0.0))
+    long, short = (minutes(steps(recipe), station, recipe).total for recipe in recipes)
     assert long - short == pytest.approx(OFF_S / 60.0, abs=0.02)
-
-
-def test_each_pose_needs_its_time_without_power():
+    soak = {"temperature_C": 25.0, "poses": [1, 1], "verification": [], "off_s": [5.0]}
     with pytest.raises(ValueError, match="soak 1 has 1 times without power for 2 poses"):
-        Recipe.model_validate(
-            {
-                **short_recipe(poses=1).model_dump(),
-                "soaks": [{"temperature_C": 25.0, "poses": [1, 1], "verification": [], "off_s": [5.0]}],
-            }
-        )
+        Recipe.model_validate({**short_recipe(poses=1).model_dump(), "soaks": [soak]})
+
+
+UP, DOWN = (0.0, 0.0), (math.pi, 0.0)
+
+
+@pytest.mark.slow
+def test_warm_up_is_named_by_what_follows_a_power_on_whatever_the_bias_has_come_back_to(tmp_path):
+    archive = Archive(tmp_path / "archive")
+    job = inquiries.job_of(tmp_path, kind="warm_up", size=400e-6, tau=900.0)
+    runner = Runner(job, archive, silent)
+    for name in ORDER:
+        runner.stage(name)
+    inquiry = begin(archive, job, runner.run, (), None)
+    alternating = [SequenceStep(*(UP, DOWN)[k % 2], 25.0, wait=8.0) for k in range(24)]
+    wanted = [SequenceStep(*UP, 25.0), SequenceStep(*DOWN, 25.0), SequenceStep(*UP, 25.0, off=1200.0), *alternating]
+    move = FollowUp(follow_up(wanted, job, job, inquiry.lineage.ids, "why"), (), ("why",), 30.0)
+    follower = inquiry.runner(move, silent)
+    for name in FOLLOW_UP:
+        follower.stage(name)
+    inquiry.add_run(move, follower.run)
+    finding = inquiry.diagnose()
+
+    first = runner.run.table("dwells")["dwell"].nunique()
+    assert switched(finding.state) == [first + 2]
+    assert finding.state.power_off.max() == pytest.approx(1200.0, abs=2.0)
+    assert [t.effect.id for t in finding.diagnosis.base.terms][-1] == "turn_on_bias"
+    assert ["warm_up"] in [group["effects"] for group in finding.document["classes"]]
+    assert inquiry.rounds[0]["minutes"] > 20.0
+
+    dwells = follower.run.table("dwells")
+    up = dwells[(dwells["unit"] == "A1") & (np.abs(dwells["force_z"] - 1.0) < 1e-3)].sort_values("dwell")
+    after = up[up["since_power_s"] < 600.0]["out_z"].to_numpy() / 256000.0
+    # the device lacks 1 − (1 − e^(−u/τ))·e^(−off/τ) of its warmth, and makes good for a part of it while it is looked at
+    on = float(runner.run.table("dwells")["since_power_s"].max())
+    cold = 1.0 - (1.0 - math.exp(-on / 900.0)) * math.exp(-1200.0 / 900.0)
+    seen = np.exp(-up[up["since_power_s"] < 600.0]["since_power_s"].to_numpy() / 900.0)
+    assert after[0] - after[-1] == pytest.approx(400e-6 * cold * (seen[0] - seen[-1]), abs=25e-6)

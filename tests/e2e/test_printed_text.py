@@ -9,11 +9,10 @@ import pandas as pd
 import pytest
 from approved import difference, normalised
 from capture_double import finished_run
-from in_process import command
+from in_process import given
 from test_next_lines import MODEL
 
 from pipelines.archive import Archive
-from pipelines.archive.signatures import VARIABLE
 from pipelines.cli import COMMANDS
 
 WIDE = 80
@@ -63,7 +62,7 @@ BEFORE = {"revoke": OUTPUTS["certify"]}
 
 ELSEWHERE = {
     "demo": "measures for half a minute; its tables are those of compare and diagnose",
-    "improve": "tests/e2e/test_improve.py: its tables, of eighty columns",
+    "improve": "tests/e2e/test_models.py: its tables, of eighty columns",
     "investigate": "measures for minutes; its tables are those of diagnose",
     "whatif": "fits the archive twice; its table is that of diff",
     "workbench": "serves pages",
@@ -82,7 +81,7 @@ def test_every_command_has_an_output_here_or_a_reason() -> None:
 
 
 @pytest.fixture(scope="module")
-def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a line: recipe, archive with one run, a model, a record at rest."""
     place = tmp_path_factory.mktemp("line")
     rng = np.random.default_rng(3)
@@ -90,22 +89,23 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rest.insert(0, "t", np.arange(3000) / 100.0)
     rest.to_csv(place / "rest.csv", index=False)
     (place / "m.toml").write_text(MODEL, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(VARIABLE, "")
-        finished_run(place)
+    finished_run(place)
     return place
 
 
 @pytest.fixture
-def folder(line: Path, tmp_path: Path) -> Path:
+def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of it for each test: what one command writes is not there for the next."""
-    return Path(shutil.copytree(line, tmp_path / "line"))
+    copy = Path(shutil.copytree(made, tmp_path / "line"))
+    monkeypatch.chdir(copy)
+    monkeypatch.setenv("NO_COLOR", "1")
+    return copy
 
 
 def printed(words: list[str], columns: int = WIDE) -> str:
-    done = command(words, columns)
-    assert done.returncode in {0, 1}, (words, done.stderr)
-    return done.stdout
+    status, out, err = given(*words, columns=columns)
+    assert status in {0, 1}, (words, err)
+    return out
 
 
 def copied(line: str) -> bool:
@@ -115,12 +115,7 @@ def copied(line: str) -> bool:
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
-def test_a_command_prints_the_approved_text_in_eighty_columns(
-    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(folder)
-    monkeypatch.setenv("NO_COLOR", "1")
-    monkeypatch.setenv(VARIABLE, "")
+def test_a_command_prints_the_approved_text_in_eighty_columns(name: str, folder: Path) -> None:
     if name in BEFORE:
         printed(BEFORE[name])
     text = printed(OUTPUTS[name])
@@ -132,9 +127,7 @@ def test_a_command_prints_the_approved_text_in_eighty_columns(
         assert not difference(name, normalised(text, folder, names))
 
 
-def test_a_table_in_a_pipe_has_every_column_and_no_cell_is_cut(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
-    monkeypatch.setenv("NO_COLOR", "1")
+def test_a_table_in_a_pipe_has_every_column_and_no_cell_is_cut(folder: Path) -> None:
     text = printed(["show", "small", "coefficients"], 0)
     heads = next(line for line in text.splitlines() if "effect" in line)
     assert {"unit", "effect", "name", "axis", "value"} <= set(heads.split())

@@ -1,24 +1,17 @@
 """Reports in a real browser, from a file and without a network: figures on a screen, pictures in print and without scripts."""
 
 import io
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import chromium, until
+from browser import until
 from capture_double import small_run
 
 from pipelines.report import render
 
 SHOWN = """() => [...document.querySelectorAll(".figure")].filter((e) => e.checkVisibility()).map((e) => [
     e.querySelector(":scope > svg").checkVisibility(), Boolean(e.querySelector(".live .main-svg")?.checkVisibility())])"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-import small_station as small
+from each import each
 from inquiries import job_of
-from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
+from small_station import MemorySink, captured, lot_of, quiet_progress, short_recipe, station_of
 
 from inertial.planning.sequences import SequenceStep as Wanted
 from inertial.planning.sequences import timeline
@@ -25,20 +25,12 @@ from stations.opening import open_station
 
 
 def in_parts(*parts: SoakPart) -> Recipe:
-    plain = small.short_recipe(3)
-    content = plain.model_dump() | {
-        "verification": [],
-        "soaks": [p.model_dump() for p in parts],
-        "temperatures_C": [p.temperature_C for p in parts],
-    }
-    return Recipe.model_validate(content)
+    soaks = {"soaks": [p.model_dump() for p in parts], "temperatures_C": [p.temperature_C for p in parts]}
+    return Recipe.model_validate({**short_recipe(3).model_dump(), "verification": [], **soaks})
 
 
 def readings(recipe: Recipe) -> pd.DataFrame:
-    lot, sink = small.lot_of(1), small.MemorySink()
-    with open_station(small.station_of(), lot) as station:
-        capture(station, recipe, lot, sink, progress=small.quiet_progress)
-    return sink.all(1)
+    return captured(recipe, lot_of(1), station_of()).all(1)
 
 
 def test_each_pose_of_a_soak_may_have_its_own_wait():
@@ -115,35 +107,28 @@ def test_a_station_that_is_slower_than_its_file_says_teaches_by_its_first_soak_a
 
 
 def test_the_time_left_never_runs_up_within_a_soak():
-    recipe = short_recipe(poses=2, temperatures=(25.0, 60.0))
-    told, _ = told_and_true(recipe, station_of())
+    told, _ = told_and_true(short_recipe(poses=2, temperatures=(25.0, 60.0)), station_of())
     soaking = [left for _, left, note in told if "soak at 60" in note]
     assert len(soaking) > 50
     assert all(b <= a for a, b in itertools.pairwise(soaking))
 
 
-def test_a_resumed_run_counts_only_what_is_left():
-    recipe = short_recipe(poses=4)
-    plan = steps(recipe)
-    remaining = Remaining(plan, station_of(), recipe)
-    first, last = remaining.seconds(plan[0], 0.0), Remaining(plan, station_of(), recipe).seconds(plan[-1], 0.0)
+def test_a_resumed_run_counts_only_what_is_left_and_far_moves_count_for_more():
+    recipe, far = short_recipe(poses=4), short_recipe(poses=1)
+    first, last = (Remaining(steps(recipe), station_of(), recipe).seconds(steps(recipe)[k], 0.0) for k in (0, -1))
     assert first > 900.0
     assert last < 30.0
-
-
-def test_far_moves_count_for_more():
-    near, far = short_recipe(poses=1), short_recipe(poses=1)
-    far = far.model_copy(update={"poses": [Pose(name="far", outer_deg=180.0, inner_deg=0.0)]})
-    seconds = [Remaining(steps(r), station_of(), r).seconds(steps(r)[0], 0.0) for r in (near, far)]
+    away = far.model_copy(update={"poses": [Pose(name="far", outer_deg=180.0, inner_deg=0.0)]})
+    seconds = [Remaining(steps(r), station_of(), r).seconds(steps(r)[0], 0.0) for r in (far, away)]
     assert seconds[1] > seconds[0]
 
 
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(59.6, "60 s"), (119.0, "119 s"), (121.0, "2 min"), (3599.0, "1 h 00 min"), (7380.0, "2 h 03 min")],
-)
-def test_durations_are_told_in_words(seconds, text):
-    assert duration_text(seconds) == text
+DURATIONS = {59.6: "60 s", 119.0: "119 s", 121.0: "2 min", 3599.0: "1 h 00 min", 7380.0: "2 h 03 min"}
+
+
+@each(DURATIONS)
+def test_durations_are_told_in_words(seconds):
+    assert duration_text(seconds) == DURATIONS[seconds]
 
 
 def test_only_a_simulated_station_has_a_time_of_its_own():
@@ -172,31 +157,30 @@ def test_the_time_by_the_wall_clock_is_in_proportion_to_the_records_that_are_lef
 def really_taken(recipe, config):
     """Minutes of the plant's clock, in all and of the soaks."""
     with open_station(config, lot_of(8)) as station:
-        sink = MemorySink()
-        begun = station.clock.now()
-        soaks = []
-        inner = station.soak
+        begun, soaks, inner = station.clock.now(), [], station.soak
 
         def soak(*given):
-            took = inner(*given)
-            soaks.append(took)
-            return took
+            soaks.append(inner(*given))
+            return soaks[-1]
 
         watched = dataclasses.replace(station)
         object.__setattr__(watched, "soak", soak)
-        capture(watched, recipe, lot_of(8), sink, progress=quiet_progress)
+        capture(watched, recipe, lot_of(8), MemorySink(), progress=quiet_progress)
         return (station.clock.now() - begun) / 60.0, sum(soaks) / 60.0
 
 
-@pytest.mark.parametrize(("temperatures", "poses"), [((25.0, 60.0, -10.0), 6), ((10.0, 15.0, 20.0, 15.0, 10.0), 4)])
-def test_planned_minutes_are_those_the_station_takes(temperatures, poses):
-    recipe = short_recipe(poses, static_s=60.0).model_copy(update={"temperatures_C": list(temperatures)})
-    config = station_of()
+def planned_as_taken(recipe, config):
+    """Whether the planned minutes of soaks, and of the rest, are those that the station takes."""
     total, soaks = really_taken(recipe, config)
     planned = minutes(steps(recipe), config, recipe)
-    assert planned.total == pytest.approx(total, rel=0.1)
     assert planned.soaks == pytest.approx(soaks, rel=0.1)
     assert planned.total - planned.soaks == pytest.approx(total - soaks, rel=0.1)
+
+
+@each([((25.0, 60.0, -10.0), 6), ((10.0, 15.0, 20.0, 15.0, 10.0), 4)])
+def test_planned_minutes_are_those_the_station_takes(case):
+    temperatures, poses = case
+    planned_as_taken(short_recipe(poses, static_s=60.0, temperatures=temperatures), station_of())
 
 
 def test_parts_of_the_planned_time_are_told_apart():
@@ -205,26 +189,23 @@ def test_parts_of_the_planned_time_are_told_apart():
     assert planned.static_record == pytest.approx(2.0)
     assert planned.dwells == pytest.approx(3 * 2.0 / 60.0)
     assert planned.total == pytest.approx(planned.moves + planned.soaks + planned.dwells + planned.static_record)
-
-
-def test_a_station_that_is_soaked_already_only_moves_and_dwells():
-    recipe = short_recipe(1)
     first = steps(recipe)[0]
     standing = StationPose(outer=0.0, inner=0.0, air=25.0, device=25.0, soak=first.soak)
-    planned = minutes([first], station_of(), recipe, standing)
-    assert planned.soaks == 0.0
-    assert planned.dwells > 0.0
+    soaked = minutes([first], station_of(), recipe, standing)  # it only moves and dwells
+    assert soaked.soaks == 0.0
+    assert soaked.dwells > 0.0
 
 
 def test_far_moves_and_slow_axes_take_longer():
     recipe, config = short_recipe(1), station_of()
-    near, far = (
-        dataclasses.replace(steps(recipe)[0], pose=Pose(name="p", outer_deg=angle, inner_deg=0.0))
-        for angle in (10, 180)
-    )
     slow = config.model_copy(update={"limits": config.limits.model_copy(update={"speed_deg_s": 5.0})})
-    assert minutes([far], config, recipe).moves > minutes([near], config, recipe).moves
-    assert minutes([far], slow, recipe).moves > 3.0 * minutes([far], config, recipe).moves
+
+    def moves(angle, on):
+        pose = Pose(name="p", outer_deg=angle, inner_deg=0.0)
+        return minutes([dataclasses.replace(steps(recipe)[0], pose=pose)], on, recipe).moves
+
+    assert moves(180.0, config) > moves(10.0, config)
+    assert moves(180.0, slow) > 3.0 * moves(180.0, config)
 
 
 def test_hardware_takes_its_pace_from_the_stations_file():
@@ -246,18 +227,12 @@ def ordered_recipe():
 
 
 def test_waits_readings_on_the_way_and_pauses_without_power_take_the_minutes_that_are_planned():
-    recipe, config = ordered_recipe(), station_of()
-    total, soaks = really_taken(recipe, config)
-    planned = minutes(steps(recipe), config, recipe)
-    assert planned.soaks == pytest.approx(soaks, rel=0.1)
-    assert planned.total - planned.soaks == pytest.approx(total - soaks, rel=0.1)
+    planned_as_taken(ordered_recipe(), station_of())
 
 
 def test_devices_read_on_the_way_are_planned_at_the_temperatures_they_have_there():
     recipe, config = ordered_recipe(), station_of(slot_gradient_K=0.0, slot_lag_s=(200.0, 200.0))
-    with open_station(config, lot_of(1)) as station:
-        sink = MemorySink()
-        capture(station, recipe, lot_of(1), sink, progress=quiet_progress)
+    sink = captured(recipe, lot_of(1), config)
     plan = [step for step in steps(recipe) if step.kind == "dwell"]
     really = [float(sink.records[step.record][1]["unit_C"].iloc[0]) for step in plan]
     state = planned_state(recipe, config, history=True)

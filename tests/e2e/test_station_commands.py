@@ -1,19 +1,18 @@
 """See the station: status, check, log and watch, on the simulated one and on one like hardware."""
 
 import itertools
-import json
 import math
 import re
 from pathlib import Path
 
 import pytest
 from capture_double import recipe_file
+from each import each
+from in_process import document_of, text_of
 from rich.text import Text
 from served_station import modbus_station, served, station_file
 from small_station import lot_of, station_of
-from typer.testing import CliRunner
 
-from pipelines.cli import app
 from pipelines.cli.chart import Line, chart
 from stations.opening import open_station
 from stations.safety.folder import read_log as machine_log
@@ -26,32 +25,31 @@ def state(tmp_path, monkeypatch):
     return tmp_path / "state"
 
 
-def ask(*arguments: str, status: int = 0) -> dict:
-    result = CliRunner().invoke(app, [*arguments, "--json"])
-    assert result.exit_code == status, result.output
-    return json.loads(result.stdout)
+def status_of(*words: object, status: int = 0) -> dict:
+    return document_of("station", "status", *words, status=status)
 
 
-def changed(folder: Path, **sections: dict) -> str:
+def checked(*words: object, status: int = 0) -> dict:
+    return document_of("station", "check", *words, status=status)
+
+
+def changed(folder: Path, **sections: dict) -> Path:
     """The simulated station's file with other sections."""
     content = station_of().model_dump(mode="json")
     for name, changes in sections.items():
         content[name] |= changes
-    return str(station_file(folder, type(station_of()).model_validate(content), "changed.toml"))
+    return station_file(folder, type(station_of()).model_validate(content), "changed.toml")
 
 
 def test_status_tells_angles_temperatures_states_and_units():
-    now = ask("station", "status", "--units", "3")
+    now = status_of("--units", "3")
     assert now["ok"]
     assert now["angles_deg"] == pytest.approx({"outer": 0.0, "inner": 0.0}, abs=0.01)
     assert now["axes"] == {"outer": "in position", "inner": "in position"}
     assert now["chamber_C"] == pytest.approx(23.0, abs=0.2)
     assert (now["door"], now["emergency_stop"], now["sampling"]) == ("closed", "released", "stopped")
     assert [slot["serial"] for slot in now["slots"]] == ["SIM0000", "SIM0001", "SIM0002"]
-
-
-def test_status_for_people_is_words():
-    shown = CliRunner().invoke(app, ["station", "status", "--units", "1"]).stdout
+    shown = text_of("station", "status", "--units", "1")
     assert "closed" in shown
     assert "[" not in shown
 
@@ -59,105 +57,81 @@ def test_status_for_people_is_words():
 def test_status_of_a_station_that_is_driven_says_by_whom_and_disturbs_nothing(tmp_path):
     with served() as port:
         config = modbus_station(port)
-        path = str(station_file(tmp_path, config))
+        where = ("--station", station_file(tmp_path, config))
         with open_station(config, lot_of(), run="lot 7") as station:
             station.reader.start(100.0)
-            now = ask("station", "status", "--station", path)
-            assert now["lease"]["run"] == "lot 7"
-            assert now["sampling"] == "running"
-            shown = CliRunner().invoke(app, ["station", "status", "--station", path])
-            assert "driven by" in shown.stdout
-            assert "lot 7, process" in shown.stdout
-        assert ask("station", "status", "--station", path)["lease"] is None
-
-
-def test_status_of_a_station_that_does_not_answer_is_status_3_with_its_reason(tmp_path):
-    with served() as port:
-        path = str(station_file(tmp_path, modbus_station(port)))
-    now = ask("station", "status", "--station", path, status=3)
-    assert set(now["faults"]) == {"table", "chamber", "reader"}
+            now = status_of(*where)
+            assert (now["lease"]["run"], now["sampling"]) == ("lot 7", "running")
+            shown = text_of("station", "status", *where)
+            assert "driven by" in shown
+            assert "lot 7, process" in shown
+        assert status_of(*where)["lease"] is None
+    assert set(status_of(*where, status=3)["faults"]) == {"table", "chamber", "reader"}  # it does not answer any more
 
 
 def test_a_healthy_station_passes_its_self_test():
-    document = ask("station", "check", "--units", "3")
-    assert document["ok"]
-    assert document["failed"] == []
-    tested = {finding["check"] for finding in document["checks"]}
-    assert tested >= {
-        "door",
-        "emergency stop",
-        "vibration",
-        "supply",
-        "air",
-        "move to 10°",
-        "move to 0°",
-        "samples",
-        "noise",
-    }
-    assert sum(finding["check"] == "noise" for finding in document["checks"]) == 3
+    document = checked("--units", "3")
+    assert (document["ok"], document["failed"]) == (True, [])
+    tested = [finding["check"] for finding in document["checks"]]
+    assert set(tested) >= {
+        "door", "emergency stop", "vibration", "supply", "air", "move to 10°", "move to 0°", "samples", "noise",
+    }  # fmt: skip
+    assert tested.count("noise") == 3
     assert {row["device"] for row in document["registers"]} >= {"outer axis", "chamber", "slot 2"}
+    assert "checks" not in checked("--units", "2", "--registers")  # moves nothing
 
 
-def test_check_with_registers_only_moves_nothing():
-    document = ask("station", "check", "--units", "2", "--registers")
-    assert "checks" not in document
-    assert document["registers"]
+FAULTS = {
+    "reader: door is open, closed is needed": {"kind": "door"},
+    "reader: emergency stop is pressed, released is needed": {"kind": "emergency_stop"},
+    "reader: vibration at rest 0.0": {"kind": "vibration"},
+    "slot 1: the output on x is constant": {"kind": "dead", "serial": "SIM0001"},
+    "table: not at (10, 10) deg": {"kind": "table_stall", "device": "inner", "at_s": 0.5},
+}
 
 
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ({"kind": "door"}, "reader: door is open, closed is needed"),
-        ({"kind": "emergency_stop"}, "reader: emergency stop is pressed, released is needed"),
-        ({"kind": "vibration"}, "reader: vibration at rest 0.0"),
-        ({"kind": "dead", "serial": "SIM0001"}, "slot 1: the output on x is constant"),
-        ({"kind": "table_stall", "device": "inner", "at_s": 0.5}, "table: not at (10, 10) deg"),
-    ],
-)
-def test_what_fails_is_named_with_status_3(tmp_path, fault, words):
-    path = changed(tmp_path, simulation={"faults": [fault]})
-    document = ask("station", "check", "--station", path, "--units", "3", status=3)
+@each(FAULTS)
+def test_what_fails_is_named_with_status_3(words, tmp_path):
+    path = changed(tmp_path, simulation={"faults": [FAULTS[words]]})
+    document = checked("--station", path, "--units", "3", status=3)
     assert not document["ok"]
     assert any(words in message for message in document["failed"]), document["failed"]
 
 
+def failed(folder: Path, units: int = 1, **self_test: object) -> list[str]:
+    """What a self-test with other limits finds."""
+    path = changed(folder, self_test=self_test)
+    return checked("--station", path, "--units", str(units), status=3)["failed"]
+
+
 def test_a_slot_noisier_than_its_neighbours_is_named(tmp_path):
-    path = changed(tmp_path, self_test={"noise_max": 50.0})
-    failed = ask("station", "check", "--station", path, "--units", "2", status=3)["failed"]
-    assert [message.split(":")[0] for message in failed] == ["slot 0", "slot 1"]
+    assert [message.split(":")[0] for message in failed(tmp_path, 2, noise_max=50.0)] == ["slot 0", "slot 1"]
 
 
 def test_the_check_standard_is_held_against_the_limits_of_the_file(tmp_path):
     good = changed(tmp_path, self_test={"standard": "SIM0000", "scale": [250e3, 262e3], "offset": [-12e3, 12e3]})
-    document = ask("station", "check", "--station", good, "--units", "2")
+    document = checked("--station", good, "--units", "2")
     scale = next(finding for finding in document["checks"] if finding["check"] == "scale")
-    assert scale["value"] == pytest.approx(256e3, rel=0.02)
-    assert scale["unit"] == "LSB/g"
-    bad = changed(tmp_path, self_test={"standard": "SIM0000", "scale": [1.0, 2.0]})
-    failed = ask("station", "check", "--station", bad, "--units", "2", status=3)["failed"]
-    assert failed[0].startswith("standard SIM0000: scale 25")
+    assert (scale["value"], scale["unit"]) == (pytest.approx(256e3, rel=0.02), "LSB/g")
+    (message,) = failed(tmp_path, 2, standard="SIM0000", scale=[1.0, 2.0])[:1]
+    assert message.startswith("standard SIM0000: scale 25")
+    assert failed(tmp_path, standard="CS-1") == [
+        "slots: check standard CS-1 is in no slot; insert it, or correct [self_test]"
+    ]
 
 
 def test_without_limits_the_check_standard_makes_its_own_from_its_history(tmp_path, state):
-    path = changed(tmp_path, self_test={"standard": "SIM0000", "history_min": 5})
+    own = {"standard": "SIM0000", "history_min": 5}
+    path, kept = changed(tmp_path, self_test=own), state / "checks" / "simulated.jsonl"
     for _ in range(5):
-        ask("station", "check", "--station", path, "--units", "1")
-    history = read_history(state / "checks" / "simulated.jsonl")
-    assert len(history) == 5
+        checked("--station", path, "--units", "1")
+    history = read_history(kept)
     assert len({standard.offset for standard in history}) == 5  # each time new noise
-    moved = [Standard("SIM0000", s.offset + 5000.0, s.scale, s.unit_C) for s in history]
-    (state / "checks" / "simulated.jsonl").unlink()
-    for standard in moved:
-        keep(state / "checks" / "simulated.jsonl", standard)
-    failed = ask("station", "check", "--station", path, "--units", "1", status=3)["failed"]
-    assert failed[0].startswith("standard SIM0000: offset")
-    assert len(read_history(state / "checks" / "simulated.jsonl")) == 5  # what is out of control does not count
-
-
-def test_a_check_standard_that_is_not_seated_is_named(tmp_path):
-    path = changed(tmp_path, self_test={"standard": "CS-1"})
-    failed = ask("station", "check", "--station", path, "--units", "1", status=3)["failed"]
-    assert failed == ["slots: check standard CS-1 is in no slot; insert it, or correct [self_test]"]
+    kept.unlink()
+    for s in history:
+        keep(kept, Standard("SIM0000", s.offset + 5000.0, s.scale, s.unit_C))
+    assert failed(tmp_path, **own)[0].startswith("standard SIM0000: offset")
+    assert len(read_history(kept)) == 5  # what is out of control does not count
 
 
 def test_control_limits_are_those_of_an_individuals_chart():
@@ -170,36 +144,28 @@ def test_control_limits_are_those_of_an_individuals_chart():
 def test_check_drives_hardware_under_a_lease_and_leaves_it_safe(tmp_path):
     with served(lot_of(2)) as port:
         quick = {"limits": {"speed_deg_s": 90.0}, "self_test": {"sample_s": 1.0, "settle_s": 0.2}}
-        path = str(station_file(tmp_path, modbus_station(port, **quick)))
-        document = ask("station", "check", "--station", path)
-        assert document["ok"], document["failed"]
-        assert ask("station", "status", "--station", path)["set_point_C"] == 25.0
+        where = ("--station", station_file(tmp_path, modbus_station(port, **quick)))
+        assert checked(*where)["ok"]
+        assert status_of(*where)["set_point_C"] == 25.0
     assert [line["event"] for line in machine_log(tmp_path / "state")] == ["driven", "left_safe"]
 
 
-def run_small(folder: Path, *more: str) -> int:
-    recipe = recipe_file(folder, ("temperatures_C = [0.0, 50.0]", "temperatures_C = [20.0, 50.0]"))
-    arguments = ["run", recipe, "--direct", "--json", "--archive", str(folder / "archive"), *more]
-    return CliRunner().invoke(app, arguments).exit_code
-
-
 def test_log_tells_why_a_run_was_paused_and_watch_draws_it(tmp_path):
-    fault = "door:at_s=930:for_s=120"
-    assert run_small(tmp_path, "--fault", fault) in (0, 1)
-    archive = ("--archive", str(tmp_path / "archive"))
-    events = ask("station", "log", *archive)["events"]
+    recipe = recipe_file(tmp_path, ("temperatures_C = [0.0, 50.0]", "temperatures_C = [20.0, 50.0]"))
+    archive = ("--archive", tmp_path / "archive")
+    text_of("run", recipe, "--direct", "--fault", "door:at_s=930:for_s=120", *archive)
+    events = document_of("station", "log", *archive)["events"]
     assert [event["kind"] for event in events] == ["suspended", "resumed"]
     assert {event["record"] for event in events} == {events[0]["record"]}
     assert "door is open" in events[0]["reason"]
-    assert ask("show", "latest", "events", *archive)["rows"][-1]["time_s"] > 1000.0
-    soaks = ask("show", "latest", "soaks", *archive)["rows"]
+    assert document_of("show", "latest", "events", *archive)["rows"][-1]["time_s"] > 1000.0
+    soaks = document_of("show", "latest", "soaks", *archive)["rows"]
     assert [row["target_C"] for row in soaks] == [20.0, 20.0, 50.0, 25.0]
-    shown = CliRunner().invoke(app, ["station", "log", *archive])
-    assert "door" in shown.stdout
-    seen = ask("station", "watch", "latest", *archive)
+    assert "door" in text_of("station", "log", *archive)
+    seen = document_of("station", "watch", "latest", *archive)
     assert seen["over"]
     assert max(value for _, value in seen["chamber"]) > 45.0
-    drawn = CliRunner().invoke(app, ["station", "watch", "latest", "--once", *archive]).stdout
+    drawn = text_of("station", "watch", "latest", "--once", *archive)
     assert "warmest unit" in drawn
     assert re.search("[⠀-⣿]", drawn)
 

@@ -3,6 +3,7 @@
 from contextlib import contextmanager
 
 import pytest
+from each import each
 from other_devices import station_with
 from plant_wires import Authority, SerialPlantServer, TlsPlantServer, serial_line
 from small_station import lot_of, plant_of
@@ -18,27 +19,29 @@ PATIENCE_S = 10.0
 DRIVES = [n for n in profile_names() if load_profile(n).kind == "axis"]
 
 
-def hardware(config, **carried) -> StationConfig:
-    """The same station as if it were hardware, every device carried so."""
+def hardware(config: StationConfig, patience: dict[str, object] | None = None, **carried: object) -> StationConfig:
+    """The same station as if it were hardware, every device carried so; asked twice, with a second of patience."""
     tables = config.model_dump(exclude_unset=True)
     for place in config.devices.model_dump():
         device = tables["devices"][place]
         tables["devices"][place] = {k: device[k] for k in ("profile", "device_id")} | carried
-    tables |= {"kind": "modbus", "link": {"timeout_s": 1.0, "read_attempts": 2}, "uncertainty": None}
+    tables |= {"kind": "modbus", "link": {"timeout_s": 1.0, "read_attempts": 2} | (patience or {}), "uncertainty": None}
     return StationConfig.model_validate(tables)
 
 
 @contextmanager
-def on_a_serial_line(**link):
-    """A plant, its serial line, and a station on it that asks once and has much patience."""
-    config = station_with()
+def on_a_serial_line(slots=(), devices=None, **patience):
+    """A plant, its serial line, and a station on it."""
+    config = station_with(**(devices or {}))
     plant = plant_of(config, lot_of(1))
     with serial_line() as line, SerialPlantServer(plant, line.device):
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        patient = {"read_attempts": 1, "timeout_s": PATIENCE_S, **link}
-        real = real.model_copy(update={"link": real.link.model_copy(update=patient)})
-        with open_devices(real, ()) as station:
+        real = hardware(config, patience, link="rtu", serial=line.host, baud=115200, parity="none")
+        with open_devices(real, slots) as station:
             yield plant, line, station
+
+
+ONCE = {"read_attempts": 1, "timeout_s": PATIENCE_S}
+"""A station that asks once and has much patience."""
 
 
 def wire_of(station):
@@ -54,33 +57,25 @@ def refuses_to_wait(station):
     wire.timeout_s = PATIENCE_S
 
 
-@pytest.mark.parametrize("name", CHAMBERS)
+@each(CHAMBERS)
 def test_chambers_answer_on_a_serial_line(name):
-    config = station_with(chamber=name)
-    plant = plant_of(config, lot_of(1))
-    with serial_line() as line, SerialPlantServer(plant, line.device):
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        with open_devices(real, ()) as station:
-            station.chamber.set_temperature(30.0)
-            assert station.chamber.temperature() == pytest.approx(23.0, abs=0.2)
-    assert plant.fixture.chamber.set_point == 30.0
+    with on_a_serial_line(devices={"chamber": name}) as (plant, _, station):
+        station.chamber.set_temperature(30.0)
+        assert station.chamber.temperature() == pytest.approx(23.0, abs=0.2)
+        assert plant.fixture.chamber.set_point == 30.0
 
 
-@pytest.mark.parametrize("name", DRIVES)
+@each(DRIVES)
 def test_drives_move_on_a_serial_line(name):
-    config = station_with(axis=name)
-    plant = plant_of(config, lot_of(1))
-    with serial_line() as line, SerialPlantServer(plant, line.device):
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        with open_devices(real, (0,)) as station:
-            axis = station.table.axes["inner"]
-            axis.start(12.5)
-            plant.advance(30_000_000)
-            assert axis.arrived()
-            axis.confirm(12.5)
-            with pytest.raises(StationRefused, match="exception 2"):
-                axis._registers._link._link.read(2, 0xFFF0, 1, "nothing")
-            assert station.reader.slots[0].identity().serial == "U000"
+    with on_a_serial_line((0,), {"axis": name}) as (plant, _, station):
+        axis = station.table.axes["inner"]
+        axis.start(12.5)
+        plant.advance(30_000_000)
+        assert axis.arrived()
+        axis.confirm(12.5)
+        with pytest.raises(StationRefused, match="exception 2"):
+            axis._registers._link._link.read(2, 0xFFF0, 1, "nothing")
+        assert station.reader.slots[0].identity().serial == "U000"
 
 
 def corrupted(data: bytes) -> bytes:
@@ -88,25 +83,18 @@ def corrupted(data: bytes) -> bytes:
 
 
 def test_a_serial_answer_with_a_wrong_check_is_asked_for_again_and_never_believed():
-    config = station_with()
-    plant = plant_of(config, lot_of(1))
-    with serial_line() as line, SerialPlantServer(plant, line.device):
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        with open_devices(real, ()) as station:
+    with on_a_serial_line() as (_, line, station):
+        station.chamber.temperature()
+        line.to_host.append(corrupted)
+        assert station.chamber.temperature() == pytest.approx(23.0, abs=0.2)  # the second attempt
+        # between them the device's sign that it is heard again
+        line.to_host += [corrupted, lambda data: data, corrupted]
+        with pytest.raises(LinkLost, match=r"no valid answer to 'read chamber temperature .* \(CRC "):
             station.chamber.temperature()
-            line.to_host.append(corrupted)
-            assert station.chamber.temperature() == pytest.approx(23.0, abs=0.2)  # the second attempt
-            line.to_host += [
-                corrupted,
-                lambda data: data,
-                corrupted,
-            ]  # between them the device's sign that it is heard again
-            with pytest.raises(LinkLost, match=r"no valid answer to 'read chamber temperature .* \(CRC "):
-                station.chamber.temperature()
 
 
 def test_a_serial_answer_that_comes_late_is_heard_out_before_the_next_question(monkeypatch):
-    with on_a_serial_line() as (plant, line, station):
+    with on_a_serial_line(**ONCE) as (plant, line, station):
         line.to_host.append(line.hold)
         refuses_to_wait(station)
         wire = wire_of(station)
@@ -129,7 +117,7 @@ def unheard(data):
 @pytest.mark.parametrize("knows_echo", [True, False])
 def test_a_serial_answer_that_comes_after_two_time_outs_is_not_believed(knows_echo):
     """It arrives when the question has been put again, in front of the answer to that: a frame has no number to tell them."""
-    with on_a_serial_line() as (plant, line, station):
+    with on_a_serial_line(**ONCE) as (plant, line, station):
         line.to_host += [line.hold, *([] if knows_echo else [unheard]), line.behind_what_is_held]
         for _ in range(1 if knows_echo else 2):
             refuses_to_wait(station)
@@ -141,27 +129,25 @@ def test_a_serial_answer_that_comes_after_two_time_outs_is_not_believed(knows_ec
 
 
 def test_a_serial_answer_with_more_behind_it_is_not_believed():
-    with on_a_serial_line() as (_, line, station):
+    with on_a_serial_line(**ONCE) as (_, line, station):
         line.to_host.append(lambda data: data + data)
         with pytest.raises(LinkLost, match="bytes after"):
             station.chamber.set_point()
 
 
 def test_a_line_that_nobody_answers_on_costs_one_time_out_an_attempt(monkeypatch):
-    config, waited, read = station_with(), [], serial_wire.Serial.read
+    waited, read = [], serial_wire.Serial.read
 
     def noted(port, size=1):
         waited.append(port.timeout)
         return read(port, size)
 
     monkeypatch.setattr(serial_wire.Serial, "read", noted)
+    once = {"read_attempts": 1, "timeout_s": 0.2}
     with serial_line() as line:
-        real = hardware(config, link="rtu", serial=line.host, baud=115200, parity="none")
-        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 0.2})})
-        with (
-            open_devices(real, ()) as station,
-            pytest.raises(StationTimeout, match=f"{line.host} device 3: no answer"),
-        ):
+        real = hardware(station_with(), once, link="rtu", serial=line.host, baud=115200, parity="none")
+        silent = pytest.raises(StationTimeout, match=f"{line.host} device 3: no answer")
+        with open_devices(real, ()) as station, silent:
             station.chamber.temperature()
     assert len(waited) == 1
     assert 0.0 < waited[0] <= 0.2
@@ -176,67 +162,54 @@ def test_a_terminal_that_is_not_there_is_told_by_name():
 
 @pytest.fixture
 def secured(tmp_path):
-    """A plant behind TLS that asks clients for certificates, and what a client needs."""
+    """A plant behind TLS that asks clients for certificates, who signs them, and a station that trusts it."""
     config = station_with()
-    plant = plant_of(config, lot_of(1))
-    authority = Authority(tmp_path)
+    plant, authority = plant_of(config, lot_of(1)), Authority(tmp_path)
     certificate, key = authority.issue("station")
     with TlsPlantServer(plant, certificate, key, clients=authority.file) as server:
-        yield config, plant, authority, {"link": "tls", "host": server.host, "port": server.port}
+        trusting = {"link": "tls", "host": server.host, "port": server.port, "ca_file": str(authority.file)}
+        yield plant, authority, lambda **files: hardware(config, **trusting | files)
 
 
 def test_a_station_behind_tls_is_driven_when_both_sides_are_who_they_say(secured):
-    config, plant, authority, where = secured
-    mine, my_key = authority.issue("client")
-    files = {"ca_file": str(authority.file), "certificate_file": str(mine), "key_file": str(my_key)}
-    with open_devices(hardware(config, **where, **files), (0,)) as station:
+    plant, authority, station_of = secured
+    mine, key = authority.issue("client")
+    with open_devices(station_of(certificate_file=str(mine), key_file=str(key)), (0,)) as station:
         station.chamber.set_temperature(31.0)
         assert station.reader.slots[0].identity().serial == "U000"
     assert plant.fixture.chamber.set_point == 31.0
 
 
-def test_a_device_of_another_authority_is_not_believed(secured, tmp_path):
-    config, plant, _, where = secured
+def test_who_is_not_who_he_says_is_not_believed_by_either_side(secured, tmp_path):
+    plant, _, station_of = secured
     (tmp_path / "other").mkdir()
-    other = Authority(tmp_path / "other")
-    files = {"ca_file": str(other.file)}
-    with open_devices(hardware(config, **where, **files), ()) as station, pytest.raises(LinkLost, match="certificate"):
-        station.chamber.set_temperature(31.0)
+    other = str(Authority(tmp_path / "other").file)
+    for files, told in (
+        ({"ca_file": other}, "certificate"),  # a device of another authority
+        ({"server_name": "chamber.line-1"}, "certificate"),  # under another name
+        ({}, None),  # a client without a certificate
+    ):
+        with open_devices(station_of(**files), ()) as station, pytest.raises(LinkLost, match=told):
+            station.chamber.set_temperature(31.0)
     assert plant.fixture.chamber.set_point == 23.0
-
-
-def test_a_device_under_another_name_is_not_believed(secured):
-    config, _, authority, where = secured
-    files = {"ca_file": str(authority.file), "server_name": "chamber.line-1"}
-    with open_devices(hardware(config, **where, **files), ()) as station, pytest.raises(LinkLost, match="certificate"):
-        station.chamber.temperature()
-
-
-def test_a_client_without_a_certificate_is_turned_away(secured):
-    config, _, authority, where = secured
-    real = hardware(config, **where, ca_file=str(authority.file))
-    with open_devices(real, ()) as station, pytest.raises(LinkLost):
-        station.chamber.temperature()
-
-
-def test_a_key_that_is_not_there_is_told_by_name(secured, tmp_path):
-    config, _, authority, where = secured
-    files = {"ca_file": str(authority.file), "certificate_file": "none.pem", "key_file": "none.key"}
-    with pytest.raises(RecipeInvalid, match=r"none\.pem"), open_devices(hardware(config, **where, **files), ()):
+    with (
+        pytest.raises(RecipeInvalid, match=r"none\.pem"),
+        open_devices(station_of(certificate_file="none.pem", key_file="none.key"), ()),
+    ):
         pass
 
 
 def test_settings_that_a_line_cannot_have_are_told_or_taken():
     # pseudo-terminals know no parity on some kernels: whatever they do, it is an answer by name
+    once = {"read_attempts": 1, "timeout_s": 0.1}
     with serial_line() as line:
-        real = hardware(station_with(), link="rtu", serial=line.host, baud=19200, parity="even")
-        real = real.model_copy(update={"link": real.link.model_copy(update={"read_attempts": 1, "timeout_s": 0.1})})
+        real = hardware(station_with(), once, link="rtu", serial=line.host, baud=19200, parity="even")
         with open_devices(real, ()) as station, pytest.raises((LinkLost, StationTimeout), match=line.host):
             station.chamber.temperature()
 
 
-def test_a_device_that_has_no_tls_is_not_asked_for_it(secured):
-    _, _, authority, where = secured
-    real = hardware(station_with(chamber="espec_p300"), **where, ca_file=str(authority.file))
+def test_a_device_that_has_no_tls_is_not_asked_for_it(tmp_path):
+    where = {"link": "tls", "host": "127.0.0.1", "port": 1, "ca_file": str(Authority(tmp_path).file)}
+    real = hardware(station_with(chamber="espec_p300"), **where)
     with pytest.raises(RecipeInvalid, match="is carried by ascii"), open_devices(real, ()):
         pass

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 import pytest
-from browser import Served, Tab, chromium, served, tab, until
+from browser import Served, Tab, served, tab, until
 
 from benchmarks.generated_archive import write_archive
 from benchmarks.workbench import tables, write
@@ -48,12 +48,6 @@ def named(archive: Archive) -> None:
     for stage, names in (("reduce", ("dwells",)), ("fit", ("residuals", "coefficients")), ("grade", ("grades",))):
         run.save(stage, f"named-{stage}", {name: made[name] for name in names}, {"inputs": {}})
     run.seal()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as launched:
-        yield launched
 
 
 def run_of(bench: Served, start: str) -> str:

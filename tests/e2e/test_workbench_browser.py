@@ -1,6 +1,5 @@
 """The workbench in a real browser: pages that are drawn, a hidden effect found, names that stay names, a server that dies."""
 
-import json
 import os
 import signal
 import urllib.parse
@@ -11,60 +10,36 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from browser import Served, Tab, chromium, served, tab, until
+from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
+from in_process import document_of, text_of
 from numpy.typing import NDArray
-from typer.testing import CliRunner
 
 from inertial import poses
 from inertial.frames import force_from_angles
-from pipelines.cli import app
 from pipelines.jobs.recipes import load_recipe
 
 SCRIPT = "<img src=x onerror=window.ran=1>"
 LONG = "L" * 64
 PAGES = (
-    "/units",
-    "/run?run=latest",
-    "/unit?run=latest",
-    "/missing",
-    "/upload",
-    "/operator",
-    "/models",
-    "/plan",
-    "/station",
-    "/audit",
-)
+    "/units", "/run?run=latest", "/unit?run=latest", "/missing", "/upload", "/operator", "/models", "/plan", "/station", "/audit",
+)  # fmt: skip
 
 
-def lot_with_a_hardening_spring(folder: Path, name: str, seed: int) -> str:
+def lot_with_a_hardening_spring(path: Path, seed: int) -> None:
     """Dwells of three units whose mass is held by a spring with f = x + h·x³, solved for x; 4 µg of noise."""
     rng = np.random.default_rng(seed)
-    angles = np.radians(np.concatenate([poses.plan("fibonacci24")] * 2))
-    force = force_from_angles(angles[:, 0], angles[:, 1])
-    rows = []
-    for unit in range(3):
+    outer, inner = np.radians(np.concatenate([poses.plan("fibonacci24")] * 2)).T
+    force = force_from_angles(outer, inner)
+    parts = []
+    for unit, serial in enumerate((LONG, "SP-1", "SP-2")):
         output = displaced(force, 60e-6) + 1e-3 * (unit + 1) + 4e-6 * rng.normal(size=force.shape)
-        for dwell, (out, f, (o, i)) in enumerate(zip(output, force, np.degrees(angles), strict=True)):
-            rows.append(
-                [
-                    f"SP-{unit}" if unit else LONG,
-                    dwell,
-                    10.0 * dwell,
-                    *out,
-                    *f,
-                    o,
-                    i,
-                    45.0 + rng.normal(),
-                    100,
-                    *[4e-5] * 3,
-                ]
-            )
-    axes = [f"{part}_{axis}" for part in ("out", "force") for axis in "xyz"]
-    columns = ["unit", "dwell", "time_s", *axes, "outer_deg", "inner_deg", SCRIPT, "n", "sd_x", "sd_y", "sd_z"]
-    place = folder / name
-    pd.DataFrame(rows, columns=columns).drop(columns=["outer_deg", "inner_deg"]).to_csv(place, index=False)
-    return str(place)
+        columns = {f"{name}_{axis}": values[:, k] for name, values in (("out", output), ("force", force))
+                   for k, axis in enumerate("xyz")}  # fmt: skip
+        humidity = {SCRIPT: 45.0 + rng.normal(size=len(force))}
+        parts.append(pd.DataFrame({"unit": serial, "dwell": range(len(force)), **columns, **humidity, "n": 100}))
+    table = pd.concat(parts).assign(time_s=lambda dwells: 10.0 * dwells["dwell"])
+    table.assign(sd_x=4e-5, sd_y=4e-5, sd_z=4e-5).to_csv(path, index=False)
 
 
 def displaced(force: NDArray[np.float64], hardening: float) -> NDArray[np.float64]:
@@ -81,16 +56,10 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     small_run(top)
     folder = top / "bench"
     folder.mkdir()
-    lot_with_a_hardening_spring(folder, "dwells.csv", 1)
-    lot_with_a_hardening_spring(folder, "fresh.csv", 2)
+    lot_with_a_hardening_spring(folder / "dwells.csv", 1)
+    lot_with_a_hardening_spring(folder / "fresh.csv", 2)
     with served(top / "archive", folder) as one:
         yield one
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as launched:
-        yield launched
 
 
 @pytest.fixture(scope="module")
@@ -135,9 +104,7 @@ def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
         one.sees("[data-version='2']")
         one.ready()
         assert one.page.inner_text(".verdict").startswith("ADEQUATE")
-        errors = [
-            float(one.page.get_attribute(f"[data-version='{version}']", "data-fresh") or "nan") for version in (1, 2)
-        ]
+        errors = [float(one.page.get_attribute(f"[data-version='{k}']", "data-fresh") or "nan") for k in (1, 2)]
         assert 8.0 < errors[0] < 16.0  # the cubic of 60 µg, as a plain fit leaves it
         assert errors[1] < 5.5
         assert "confirmed" in one.page.inner_text("#errors")
@@ -167,8 +134,7 @@ def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
 ) -> None:
     place = bench.folder / "models" / "cubic.toml"
     place.parent.mkdir(exist_ok=True)
-    done = CliRunner().invoke(app, ["extend", str(place), "third_order", "--why", "a trial"])
-    assert done.exit_code == 0, done.output
+    text_of("extend", place, "third_order", "--why", "a trial", status=0)
     with tab(browser, bench.address) as one:
         one.open("/models?model=cubic")
         assert "+ third_order" in one.page.inner_text("[aria-label=Versions]")
@@ -227,8 +193,8 @@ def test_a_moved_pose_changes_the_floors_as_the_command_says_and_the_recipe_is_w
             name for name in as_it_stands if name in floors and abs(floors[name] / as_it_stands[name] - 1.0) > 1e-3
         ]
         assert len(changed) > 5
-        done = CliRunner().invoke(app, ["plan", recipe, "--json", "--pose", moved[0], "--archive", str(bench.archive)])
-        told = {row["effect"]: row["floor_size_ug"] for row in json.loads(done.stdout)["effects"] if row["seen"]}
+        document = document_of("plan", recipe, "--pose", moved[0], "--archive", bench.archive)
+        told = {row["effect"]: row["floor_size_ug"] for row in document["effects"] if row["seen"]}
         assert floors == pytest.approx(told, rel=1e-6)
         one.page.select_option("select[name=name]", "p2")
         one.page.fill("input[name=outer]", "75.5")
@@ -263,9 +229,8 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
         assert 0 < len(part.value.body()) < 3000  # the samples alone, not the page with its tables
         until(lambda: "dwell=A1" in one.page.evaluate("() => location.href"), "the dwell is in the address")
         one.sees("[data-name='samples'][data-drawn]")
-        assert (
-            len([url for url in asked if "/figure/samples.json" in url]) == 1
-        )  # with the part, and not again after it
+        # with the part, and not again after it
+        assert len([url for url in asked if "/figure/samples.json" in url]) == 1
         drawn = one.page.evaluate("() => document.querySelector('[data-name=samples]')._fullData[0].x.length")
         assert drawn >= 100  # a dwell of 1 s at 100 Hz
         for word in ("hare", "loud", "Send"):  # "Share chart…" would send the data to the maker of the library

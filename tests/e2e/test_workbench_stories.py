@@ -1,29 +1,21 @@
 """Long stories in a real browser: the demonstration's hidden effect, and an operator's lot with a fault, from two stations."""
 
 import os
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import ROOT, chromium, served, tab, until
+from browser import ROOT, Tab, served, tab, until
 from capture_double import recipe_file, small_run
-from served_station import modbus_station, station_file
+from served_station import FAST, modbus_station, short_recipe_file, station_file
 from served_station import served as served_station
 from small_station import lot_of
 
 from stations.safety.folder import read_log
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as launched:
-        yield launched
 
 
 @pytest.fixture
@@ -80,6 +72,18 @@ def test_every_page_can_be_read_in_both_themes_and_on_a_tablet(
         assert one.outside == [] == one.errors
 
 
+def begun(one: Tab, recipe: str | Path, *serials: str, fault: str = "") -> None:
+    """A lot that is started on the page of the operator, and asks for its units."""
+    one.page.select_option("select[name=recipe]", str(recipe))
+    if fault:
+        one.page.fill("input[name=fault]", fault)
+    for slot, serial in enumerate(serials):
+        one.page.fill(f"#slot-{slot}", serial)
+        one.page.press(f"#slot-{slot}", "Enter")
+    one.press("text=Start the lot")
+    one.sees(".question")
+
+
 def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, browser: Any) -> None:
     folder = tmp_path / "bench"
     folder.mkdir()
@@ -90,13 +94,7 @@ def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, b
         tab(browser, server.address) as two,
     ):
         one.open("/operator")
-        one.page.select_option("select[name=recipe]", recipe)
-        one.page.fill("input[name=fault]", "door:at_s=300")
-        for slot, serial in enumerate(("A1", "A2", "A" * 64)):
-            one.page.fill(f"#slot-{slot}", serial)
-            one.page.press(f"#slot-{slot}", "Enter")
-        one.press("text=Start the lot")
-        one.sees("[data-answer='go']")
+        begun(one, recipe, "A1", "A2", "A" * 64, fault="door:at_s=300")
         assert "seat the units" in one.page.inner_text(".question")
         two.open("/operator")
         two.sees("[data-answer='go']")
@@ -124,14 +122,10 @@ def test_a_lot_with_an_open_door_is_measured_from_two_browsers(tmp_path: Path, b
 def test_a_lot_without_a_fault_ends_with_its_results_before_unloading(tmp_path: Path, browser: Any) -> None:
     folder = tmp_path / "bench"
     folder.mkdir()
-    recipe_file(folder)
+    recipe = recipe_file(folder)
     with served(tmp_path / "archive", folder) as server, tab(browser, server.address) as one:
         one.open("/operator")
-        one.page.select_option("select[name=recipe]", str(folder / "small.toml"))
-        one.page.fill("#slot-0", "A1")
-        one.page.fill("#slot-1", "A2")
-        one.press("text=Start the lot")
-        one.sees(".question")
+        begun(one, recipe, "A1", "A2")
         one.press("[data-answer='go']")
         until(lambda: "remove the units" in one.page.inner_text("main"), "the results are there before unloading")
         assert one.page.locator(".tile.pass, .tile.fail, .tile.refused").count() == 2
@@ -143,40 +137,23 @@ def test_a_lot_without_a_fault_ends_with_its_results_before_unloading(tmp_path: 
         assert one.outside == [] == one.errors
 
 
-SHORT = (
-    ('units = ["A1", "A2", "A3"]', 'units = ["U000", "U001"]'),
-    ("temperatures_C = [0.0, 50.0]", "temperatures_C = [23.0]\nsoak_min_s = 1.0\nallow_short_soak = true"),
-    ("settle_s = 2.0", "settle_s = 0.2"),
-    ("static_record_s = 30.0", "static_record_s = 0.0"),
-    ('poses = "nine"', 'poses = "six"'),
-    ('limits = "consumer"', 'limits = "line-quick.limits.toml"'),
-    (', "bias_temperature", "scale_temperature"', ""),
-)
-
-
 def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_station(
     tmp_path: Path, browser: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
     folder = tmp_path / "bench"
     folder.mkdir()
-    shutil.copy(ROOT / "deploy" / "recipes" / "line-quick.limits.toml", folder)
-    recipe = recipe_file(folder, *SHORT)
+    recipe = short_recipe_file(folder)
     with served_station(lot_of(2)) as port:
-        config = modbus_station(port, limits={"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0})
+        config = modbus_station(port, limits=FAST)
         hardware = station_file(tmp_path, config)
         with served(tmp_path / "archive", folder, hardware, ROOT / "stations" / "simulated.toml") as server:
             with tab(browser, server.address) as one:
                 one.open("/operator")
                 assert one.page.locator(".tabs a").count() == 2
-                assert (
-                    one.page.locator("input[name=fault]").count() == 0
-                )  # faults for practice are for simulated stations
-                one.page.select_option("select[name=recipe]", recipe)
-                one.page.fill("#slot-0", "U000")
-                one.page.fill("#slot-1", "U001")
-                one.press("text=Start the lot")
-                one.sees(".question")
+                # faults for practice are for simulated stations
+                assert one.page.locator("input[name=fault]").count() == 0
+                begun(one, recipe, "U000", "U001")
                 one.press("[data-answer='go']")
                 until(lambda: len(list(tmp_path.glob("archive/captures/*/[0-9]*/record.json"))) >= 2, "two records")
                 one.press("text=Pause")
@@ -184,10 +161,7 @@ def test_a_station_like_hardware_is_paused_safely_and_goes_on_beside_a_second_st
                 assert read_log(tmp_path / "state")[-1]["event"] == "left_safe"
                 one.press(".tabs a >> nth=1")
                 until(lambda: "station=simulated" in one.href, "the second station")
-                one.page.select_option("select[name=recipe]", recipe)
-                one.page.fill("#slot-0", "B1")
-                one.press("text=Start the lot")
-                one.sees(".question")
+                begun(one, recipe, "B1")
                 one.shot(tmp_path, "two-stations")
             kept = {path: path.read_bytes() for path in tmp_path.glob("archive/captures/*/[0-9]*/record.json")}
             with tab(browser, server.address) as again:  # the browser was closed, and is opened again
