@@ -32,16 +32,13 @@ def leaves(command: object) -> Iterator[TyperCommand]:
 
 
 @each(COMMANDS)
-def test_a_command_is_in_the_help_with_a_sentence(name: str) -> None:
+def test_a_command_is_in_the_help_and_the_documents_and_explains_itself_and_every_option(name: str) -> None:
     text = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200"}).stdout
     summary = COMMANDS[name].summary
     assert re.search(rf"│ {name} +{re.escape(summary)} +│", text)
     assert summary.endswith(".")
     assert len(summary) <= 90
-
-
-@each(COMMANDS)
-def test_a_command_explains_itself_and_every_option(name: str) -> None:
+    assert name in NAMED
     module = import_module(f"pipelines.cli.{COMMANDS[name].module}")
     assert (module.__doc__ or "").startswith(f"``tumbleline {name}``: ")
     for leaf in leaves(get_command(app).get_command(None, name)._load()):
@@ -102,11 +99,6 @@ def meant(command: object, rest: list[str]) -> tuple[TyperCommand, list[str]]:
     return below[command.usual], rest
 
 
-@each(COMMANDS)
-def test_a_command_is_named_in_the_documents(name: str) -> None:
-    assert name in NAMED
-
-
 def test_a_part_of_the_help_has_several_commands_that_stand_together() -> None:
     parts = [command.part for command in COMMANDS.values()]
     assert min(Counter(parts).values()) > 1  # a part of one command is a heading mistyped
@@ -121,23 +113,20 @@ def test_one_file_is_a_command(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("line", "missing"),
-    [
-        ('PART = "Results"\n', "PART"),
-        ("ORDER = 310\n", "ORDER"),
-        ('SUMMARY = "Do it."\n', "SUMMARY"),
-        ("def command(\n) -> None: ...\n", "a function 'command'"),
-    ],
-)
-def test_a_command_that_is_half_there_is_refused(tmp_path: Path, line: str, missing: str) -> None:
-    (tmp_path / "half.py").write_text(WHOLE.replace(line, ""), encoding="utf-8")
+HALF = {
+    "PART": 'PART = "Results"\n',
+    "ORDER": "ORDER = 310\n",
+    "SUMMARY": 'SUMMARY = "Do it."\n',
+    "a function 'command'": "def command(\n) -> None: ...\n",
+}
+
+
+@each(HALF)
+def test_a_command_that_is_half_there_or_in_the_place_of_another_is_refused(missing: str, tmp_path: Path) -> None:
+    (tmp_path / "half.py").write_text(WHOLE.replace(HALF[missing], ""), encoding="utf-8")
     with pytest.raises(IncompleteCommand, match=rf"half\.py: a command without {missing}"):
         find_commands(tmp_path)
-
-
-def test_two_commands_in_one_place_of_the_help_are_refused(tmp_path: Path) -> None:
-    for name in ("one", "two"):
+    for name in ("half", "two"):
         (tmp_path / f"{name}.py").write_text(WHOLE, encoding="utf-8")
-    with pytest.raises(IncompleteCommand, match=r"two\.py: ORDER is 310, as in one\.py"):
+    with pytest.raises(IncompleteCommand, match=r"two\.py: ORDER is 310, as in half\.py"):
         find_commands(tmp_path)

@@ -11,7 +11,7 @@ from types import ModuleType
 import lots
 import numpy as np
 import pandas as pd
-import pytest
+from each import each
 from test_effects import RICH
 
 from inertial import effects
@@ -81,7 +81,7 @@ def _lacks_in_a_lot(error: Handling, lot: Lot) -> list[str]:
     return lacks
 
 
-@pytest.mark.parametrize("name", HANDLING)
+@each(HANDLING)
 def test_an_error_of_handling_is_whole_in_its_file(name: str) -> None:
     assert lacks_as_handling(import_module(name), exchanged_lot()) == []
 
@@ -126,54 +126,38 @@ Spoil = Callable[[Table, Rows], Table]
 
 def scaled(columns: list[str], factor: float, dwells: slice | list[int] = slice(None)) -> Spoil:
     """Multiplies columns of a unit in some dwells."""
-
-    def work(table: Table, rows: Rows) -> Table:
-        table.loc[rows[dwells], columns] *= factor
-        return table
-
-    return work
+    return lambda table, rows: _set(table, rows[dwells], columns, table.loc[rows[dwells], columns] * factor)
 
 
 def added(columns: list[str], value: float, dwells: slice | list[int] = slice(None)) -> Spoil:
     """Adds a value to columns of a unit in some dwells."""
-
-    def work(table: Table, rows: Rows) -> Table:
-        table.loc[rows[dwells], columns] += value
-        return table
-
-    return work
+    return lambda table, rows: _set(table, rows[dwells], columns, table.loc[rows[dwells], columns] + value)
 
 
 def frozen(columns: list[str], dwells: slice) -> Spoil:
     """Repeats the first of some dwells."""
-
-    def work(table: Table, rows: Rows) -> Table:
-        table.loc[rows[dwells], columns] = table.loc[rows[dwells][0], columns].to_numpy(dtype=float)
-        return table
-
-    return work
+    return lambda table, rows: _set(table, rows[dwells], columns, table.loc[rows[dwells][0], columns].to_numpy(float))
 
 
 def exchanged(one: list[int], other: list[int], unit: str = "U000") -> Spoil:
     """Exchanges outputs of dwells with others of a unit."""
 
     def work(table: Table, rows: Rows) -> Table:
-        there = table.index[table["unit"] == unit].to_numpy()[other]
-        outputs = table.loc[rows[one], OUT].to_numpy()
-        table.loc[rows[one], OUT] = table.loc[there, OUT].to_numpy()
-        table.loc[there, OUT] = outputs
-        return table
+        here, there = rows[one], table.index[table["unit"] == unit].to_numpy()[other]
+        outputs = table.loc[here, OUT].to_numpy()
+        return _set(_set(table, here, OUT, table.loc[there, OUT].to_numpy()), there, OUT, outputs)
 
     return work
 
 
 def without(dwells: slice) -> Spoil:
     """Drops dwells of a unit."""
+    return lambda table, rows: table.drop(index=rows[dwells])
 
-    def work(table: Table, rows: Rows) -> Table:
-        return table.drop(index=rows[dwells])
 
-    return work
+def _set(table: Table, rows: Rows, columns: list[str], values: object) -> Table:
+    table.loc[rows, columns] = values
+    return table
 
 
 def far_off(table: Table, rows: Rows) -> Table:
@@ -184,8 +168,7 @@ def far_off(table: Table, rows: Rows) -> Table:
 
 def coarse(table: Table, rows: Rows) -> Table:
     """Outputs in steps of 0.2 mg."""
-    table.loc[rows, OUT] = np.round(table.loc[rows, OUT].to_numpy() / 2e-4) * 2e-4
-    return table
+    return _set(table, rows, OUT, np.round(table.loc[rows, OUT].to_numpy() / 2e-4) * 2e-4)
 
 
 SPOILT: dict[str, Spoil] = {
@@ -213,11 +196,8 @@ def lacks_as_fault(module: ModuleType) -> list[str]:
     look, name = getattr(module, "LOOK", None), module.__name__.rpartition(".")[2]
     if not isinstance(look, Look):
         return ["a LOOK"]
-    lacks = (
-        []
-        if look.find.__module__ == module.__name__ and look.find.__doc__
-        else ["a test of its own that says what it finds"]
-    )
+    own = look.find.__module__ == module.__name__ and look.find.__doc__
+    lacks = [] if own else ["a test of its own that says what it finds"]
     lacks += [] if look.names and (module.__doc__ or "").strip() else ["names, or what it is"]
     others = [one for one in faults.looks() if one is not look]
     lacks += ["an order of its own"] if look.order in {one.order for one in others} else []
@@ -228,10 +208,9 @@ def lacks_as_fault(module: ModuleType) -> list[str]:
     table = lots.lot(np.random.default_rng(5))
     lacks += [f"silence in a clean lot: {fault}" for fault in look.find(measured(table).readings)]
     table = SPOILT[name](table, table.index[table["unit"] == "U000"].to_numpy())
-    found = list(look.find(measured(table).readings))
-    lacks += (
-        [] if "U000" in {measured(table).units[fault.unit] for fault in found} else ["its fault in the spoilt unit"]
-    )
+    spoilt = measured(table)
+    found = list(look.find(spoilt.readings))
+    lacks += [] if "U000" in {spoilt.units[fault.unit] for fault in found} else ["its fault in the spoilt unit"]
     lacks += [f"{fault.name} among its names" for fault in found if fault.name not in look.names]
     lacks += [f"evidence of {fault}" for fault in found if len(fault.evidence) < 10]
     texts = {node.value for node in ast.walk(ast.parse(Path(module.__file__ or "").read_text("utf-8")))
@@ -240,7 +219,7 @@ def lacks_as_fault(module: ModuleType) -> list[str]:
     return lacks + [f"{text} among its names" for text in sorted(texts - set(look.names))]
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@each(FAULTS)
 def test_a_data_fault_is_whole_in_its_file(name: str) -> None:
     assert lacks_as_fault(import_module(name)) == []
 

@@ -109,10 +109,6 @@ def product(tmp_path, monkeypatch):
     adapters.cache_clear()
 
 
-def refresh():
-    adapters.cache_clear()
-
-
 def chamber_reaches(profile: str, goal: float) -> float:
     """The air's temperature after an hour at a set point, with the chamber of this profile."""
     with open_station(station_with(chamber=profile), lot_of(1)) as station:
@@ -154,67 +150,47 @@ def test_no_other_module_names_a_family():
     assert places == []
 
 
-def test_a_device_of_a_known_family_is_one_profile(product):
-    profiles, *_ = product
-    (profiles / "acme_c1.toml").write_text(PROFILE.format(name="acme_c1", family="set_point", more=""), "utf-8")
-    refresh()
-    assert chamber_reaches("acme_c1", -12.3) == pytest.approx(-12.3, abs=0.2)
-    assert "### acme_c1" in page()
-    assert "### acme_c1" not in PAGE.read_text(
-        encoding="utf-8"
-    )  # the check of the reference would fail until it is written
+def added(product, family, more="", adapter="", simulation=""):
+    """A device of a family added to the product, with modules for a new family."""
+    profiles, devices, simulations = product
+    (profiles / "acme.toml").write_text(PROFILE.format(name="acme", family=family, more=more), "utf-8")
+    for folder, text in ((devices, adapter), (simulations, simulation)):
+        if text:
+            (folder / "acme.py").write_text(text, "utf-8")
+    adapters.cache_clear()
 
 
-def test_a_profile_is_parsed_once_until_its_file_changes(product):
-    profiles, *_ = product
-    path = profiles / "acme_c1.toml"
-    path.write_text(PROFILE.format(name="acme_c1", family="set_point", more=""), "utf-8")
-    first = load_profile("acme_c1")
-    assert load_profile("acme_c1") is first
-    path.write_text(PROFILE.format(name="acme_c1", family="set_point", more=ENABLE), "utf-8")
-    assert not first.has("enable")
-    assert load_profile("acme_c1").has("enable")
+def test_a_device_of_a_known_family_is_one_profile_which_is_parsed_once_until_its_file_changes(product):
+    added(product, "set_point")
+    assert chamber_reaches("acme", -12.3) == pytest.approx(-12.3, abs=0.2)
+    assert "### acme\n" in page()
+    assert "### acme\n" not in PAGE.read_text("utf-8")  # the check of the reference would fail until it is written
+    first = load_profile("acme")
+    assert load_profile("acme") is first
+    added(product, "set_point", ENABLE)
+    assert (first.has("enable"), load_profile("acme").has("enable")) == (False, True)
+    with pytest.raises(LookupError, match="acme: the plant has nothing for enable"):
+        make_plant(station_with(chamber="acme"), lot_of(1))
 
 
 def test_a_new_family_is_two_modules_beside_its_profile(product):
-    profiles, devices, simulations = product
-    (profiles / "acme_c2.toml").write_text(PROFILE.format(name="acme_c2", family="acme", more=ENABLE), "utf-8")
-    (devices / "acme.py").write_text(ADAPTER, "utf-8")
-    (simulations / "acme.py").write_text(SIMULATION, "utf-8")
-    refresh()
-    assert chamber_reaches("acme_c2", 40.0) == pytest.approx(40.0, abs=0.2)
+    added(product, "acme", ENABLE, ADAPTER, SIMULATION)
+    assert chamber_reaches("acme", 40.0) == pytest.approx(40.0, abs=0.2)
     assert "| `acme` | chamber |" in page()
 
 
 def test_a_profile_of_an_unknown_family_is_refused_by_name(product):
-    profiles, *_ = product
-    (profiles / "acme_c2.toml").write_text(PROFILE.format(name="acme_c2", family="watlow_f4z", more=""), "utf-8")
-    refresh()
+    added(product, "watlow_f4z")
     with pytest.raises(RecipeInvalid, match=r"adapter watlow_f4z of kind chamber drives no chamber.*watlow_f4"):
-        chamber_adapter(load_profile("acme_c2"))
+        chamber_adapter(load_profile("acme"))
 
 
-def test_a_family_without_its_simulation_is_named_with_the_file_that_is_missing(product):
-    profiles, devices, _ = product
-    (profiles / "acme_c2.toml").write_text(PROFILE.format(name="acme_c2", family="acme", more=ENABLE), "utf-8")
-    (devices / "acme.py").write_text(ADAPTER, "utf-8")
-    refresh()
+def test_a_family_without_its_simulation_or_its_adapter_is_named_with_the_file_that_is_missing(product):
+    added(product, "acme", ENABLE, ADAPTER)
     assert set(adapters()) != set(family_names())  # what the contract above compares
     with pytest.raises(LookupError, match=r"stations/plant/families/acme\.py"):
-        make_plant(station_with(chamber="acme_c2"), lot_of(1))
-
-
-def test_a_register_without_a_simulated_value_is_named(product):
-    profiles, *_ = product
-    (profiles / "acme_c1.toml").write_text(PROFILE.format(name="acme_c1", family="set_point", more=ENABLE), "utf-8")
-    refresh()
-    with pytest.raises(LookupError, match="acme_c1: the plant has nothing for enable"):
-        make_plant(station_with(chamber="acme_c1"), lot_of(1))
-
-
-def test_a_family_module_without_an_adapter_is_named(product):
-    _, devices, _ = product
-    (devices / "acme.py").write_text("from stations.devices.chamber import ThermalChamber\n", "utf-8")
-    refresh()
+        make_plant(station_with(chamber="acme"), lot_of(1))
+    sys.modules.pop(f"{families.__name__}.acme")
+    added(product, "acme", ENABLE, "from stations.devices.chamber import ThermalChamber\n# none of its own\n")
     with pytest.raises(LookupError, match=r"stations/devices/families/acme\.py: 0 adapters, 1 is needed"):
         adapters()

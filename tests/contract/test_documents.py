@@ -6,37 +6,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from in_process import given
 from pydantic import TypeAdapter, ValidationError
-from typer.testing import CliRunner
+from root_process import ROOT
 
 from deploy.release import unpack
-from docs.documents_page import PAGE, documents, head_of, page
+from docs.documents_page import documents, head_of
 from inertial.dynamics.second_order import transfer
 from inertial.dynamics.settling import step_response
 from pipelines import cli
 from pipelines.chain import certify as certifying
-from pipelines.cli import COMMANDS, app
+from pipelines.cli import COMMANDS
 
-KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
+KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 BY_HEAD = {head_of(kind): kind for kind in documents()}
 MODEL = (
     "bias,scale,misalignment,bias_temperature,scale_temperature,bias_temperature_quadratic,scale_temperature_quadratic"
 )
-IMPORTED = [
-    "--map",
-    "x=x,y=y,z=z",
-    "--units",
-    "output=g",
-    "--rate",
-    "100",
-    "--unit",
-    "S1",
-    "--face",
-    "+z",
-    "--blocks",
-    "5",
-]
-IMPORTED += ["--local-g", "9.81"]
+IMPORTED = ["--map", "x=x,y=y,z=z", "--units", "output=g", "--rate", "100", "--unit", "S1", "--face", "+z"]
+IMPORTED += ["--blocks", "5", "--local-g", "9.81"]
 CORRECTED = ["--rate", "100", "--force", "0,0,1", "--turn-on", "100"]
 CASES = {
     "plan --json": ["plan"],
@@ -86,9 +74,8 @@ CASES = {
     "archive compact --json": ["archive", "compact"],
     "archive backup --json": ["archive", "backup", "{folder}/copy"],
 }
-WITHOUT_ARCHIVE = {"plan", "station", "inspect", "keys", "extend"}
-OF_STATION_IN_ARCHIVE = (["log"], ["watch", "latest"])
-WITHOUT_OPTION = (["archive", "key"],)
+WITHOUT_ARCHIVE = {"plan", "inspect FILE", "keys [SUBJECT]", "extend", "archive key"}
+WITHOUT_ARCHIVE |= {f"station {one}" for one in ("status", "check", "profiles")}
 
 
 @pytest.fixture(scope="module")
@@ -96,12 +83,11 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A kept archive whose units are certified, and a model file."""
     folder = tmp_path_factory.mktemp("kept")
     unpack(KEPT, folder / "archive")
-    certify = ["certify", "latest", "--json", "--archive", str(folder / "archive")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(certifying, "refuse_unstated", lambda run: None)  # certified by the version that made the archive
-        certified = CliRunner().invoke(app, certify)
-        assert certified.exit_code == 0
-        (folder / "certify.json").write_text(certified.stdout, encoding="utf-8")
+        status, out, err = given("certify", "latest", "--json", "--archive", folder / "archive")
+        assert status == 0, err
+        validate(BY_HEAD["certify --json"], out)
     model = '[model]\nname = "m"\nversion = 1\neffects = ["bias", "scale", "misalignment"]\n'
     (folder / "model.toml").write_text(model, encoding="utf-8")
     rows = [f"{k / 10},{k % 3},{k % 2},16{k % 10}" for k in range(200)]
@@ -130,31 +116,34 @@ def validate(kind: type, text: str) -> None:
 def test_a_command_prints_the_document_of_its_type(head: str, kept: Path, tmp_path: Path) -> None:
     shutil.copytree(kept, tmp_path / "own")
     words = [word.format(folder=tmp_path / "own") for word in CASES[head]]
-    place = (
-        []
-        if (words[0] in WITHOUT_ARCHIVE and words[1:] not in OF_STATION_IN_ARCHIVE) or words[:2] in WITHOUT_OPTION
-        else ["--archive", str(tmp_path / "own" / "archive")]
-    )
-    result = CliRunner().invoke(app, [*words, "--json", *place])
-    assert result.exit_code in (0, 1), result.output
-    validate(BY_HEAD[head], result.stdout)
+    place = [] if head.removesuffix(" --json") in WITHOUT_ARCHIVE else ["--archive", tmp_path / "own" / "archive"]
+    status, out, err = given(*words, "--json", *place)
+    assert status in (0, 1), err
+    validate(BY_HEAD[head], out)
 
 
-def test_certify_prints_the_document_of_its_type(kept: Path) -> None:
-    validate(BY_HEAD["certify --json"], (kept / "certify.json").read_text(encoding="utf-8"))
+ELSEWHERE = {
+    "run --json (several fillings)": "e2e/test_operator.py",
+    "show RUN --json (no grades)": "e2e/test_inquiry.py",
+    "investigate --json": "e2e/test_inquiry.py",
+    "operator --json": "e2e/test_operator.py",
+    "certificate --json": "unit/pipelines/certificates/document/test_compose.py",
+    "verify FILE… --json": "unit/pipelines/certificates/document/test_file_check.py",
+    "certify --json": "contract/test_documents.py",
+    "program --json": "faults/test_programming.py",
+    "fit --json (an import)": "e2e/test_imported_recording.py",
+    "demo --auto --json": "e2e/test_models.py",
+    "demo --by-hand --json": "e2e/test_models.py",
+    "station serve --json": "e2e/test_station.py",
+    "archive restore --json": "e2e/test_backup.py",
+}
+"""Documents that other tests hold against their types."""
 
 
-def test_every_typed_document_is_printed_by_a_test() -> None:
-    # lots of other tests' runs; tests/e2e/test_inquiry.py and test_operator.py
-    untested = {"run --json (several fillings)", "show RUN --json (no grades)", "investigate --json", "operator --json"}
-    untested |= {"certificate --json"}  # tests/unit/pipelines/certificates/document/test_compose.py
-    untested |= {"verify FILE… --json"}  # tests/unit/pipelines/certificates/document/test_file_check.py
-    untested |= {"certify --json"}  # above, and tests/unit/pipelines/certificates/document/test_file_check.py
-    untested |= {"program --json"}  # tests/faults/test_programming.py
-    untested |= {"fit --json (an import)"}  # tests/e2e/test_imported_recording.py
-    untested |= {"demo --auto --json", "demo --by-hand --json"}  # tests/e2e/test_diagnosis_commands.py
-    untested |= {"station serve --json", "archive restore --json"}  # tests/e2e/test_station.py, test_backup.py
-    assert set(BY_HEAD) - set(CASES) == untested
+def test_every_typed_document_is_printed_by_a_test_and_names_a_command() -> None:
+    assert set(BY_HEAD) - set(CASES) == set(ELSEWHERE)
+    assert [path for path in ELSEWHERE.values() if not (ROOT / "tests" / path).is_file()] == []
+    assert {head.split()[0] for head in BY_HEAD} <= set(COMMANDS)
 
 
 def test_every_command_that_prints_json_has_a_document() -> None:
@@ -165,30 +154,12 @@ def test_every_command_that_prints_json_has_a_document() -> None:
     assert (printing & set(COMMANDS)) - of_a_format == {head.split()[0] for head in BY_HEAD} & printing
 
 
-def test_every_document_names_a_command() -> None:
-    assert {head.split()[0] for head in BY_HEAD} <= set(COMMANDS)
-
-
-def test_the_page_of_the_documents_is_up_to_date() -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    assert page(text) == text, "write it again with 'python -m docs.documents_page'"
-
-
-def test_a_document_with_another_key_or_type_is_refused() -> None:
-    document = {"archive": "a", "runs": []}
+def test_a_document_with_another_key_or_type_is_refused_and_a_key_that_is_not_required_may_be_missing() -> None:
+    document, checked = {"archive": "a", "runs": []}, {"run": "r", "same": True}
     validate(BY_HEAD["list --json"], json.dumps(document))
-    for wrong in (
-        {**document, "more": 1},
-        {"archive": "a"},
-        {**document, "archive": 1},
-        {**document, "runs": [{"id": "r"}]},
-    ):
+    for wrong in ({"more": 1}, {"archive": 1}, {"runs": [{"id": "r"}]}):
         with pytest.raises(ValidationError):
-            validate(BY_HEAD["list --json"], json.dumps(wrong))
-
-
-def test_a_key_that_is_not_required_may_be_missing_and_any_other_may_not() -> None:
-    document = {"run": "r", "same": True}
-    validate(BY_HEAD["rerun --check --json"], json.dumps({"selected": 1, "same": 1, "runs": [document]}))
+            validate(BY_HEAD["list --json"], json.dumps(document | wrong))
+    validate(BY_HEAD["rerun --check --json"], json.dumps({"selected": 1, "same": 1, "runs": [checked]}))
     with pytest.raises(ValidationError, match="same"):
-        validate(BY_HEAD["rerun --check --json"], json.dumps({"selected": 1, "runs": [document]}))
+        validate(BY_HEAD["rerun --check --json"], json.dumps({"selected": 1, "runs": [checked]}))

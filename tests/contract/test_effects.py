@@ -1,7 +1,9 @@
 """Every effect of the catalogue keeps the contract of effects; they are found by themselves, and none is exempt."""
 
 import inspect
+import pkgutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,12 +16,13 @@ from inertial import effects, poses
 from inertial.design import grid_of
 from inertial.effects import SensorEffect, StationEffect
 from inertial.effects.base import AnyEffect
-from inertial.errors import NotIdentified
+from inertial.errors import MissingInput, NotIdentified
 from inertial.fits.linear import fit_lot
 from inertial.frames import force_from_angles
 from inertial.state import State
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.export.polynomials import ACROSS, BIAS, SCALE
+from pipelines.export.polynomials import ACROSS, BIAS, SCALE, _one
+from pipelines.tables.dwells import lot_of, measured
 
 EVERY = sorted(effects.built_in())
 BASE = ("bias", "scale", "misalignment")
@@ -94,70 +97,57 @@ def least_left(columns: np.ndarray, base: np.ndarray) -> float:
     return float(np.linalg.svd(left, compute_uv=False)[-1])
 
 
-@each(EVERY)
-def test_columns_have_a_name_each_and_are_finite(name: str) -> None:
-    effect = effects.get(name)
-    columns = all_columns(effect, RICH, values_of(effect, RICH))
-    names = [effect.names(axis) for axis in range(3)] if isinstance(effect, SensorEffect) else [effect.names()] * 3
-    assert np.isfinite(columns).all()
-    assert [len(n) for n in names] == [columns.shape[-1]] * 3
-    assert columns.shape[:-1] == (3, *RICH.time.shape)
-
-
-@each(EVERY)
-def test_units_are_given_for_every_column_where_they_are_given(name: str) -> None:
-    effect = effects.get(name)
-    if effect.per:
-        assert isinstance(effect, SensorEffect)
-        assert {len(effect.per)} == {len(effect.names(axis)) for axis in range(3)}
-
-
-@each(EVERY)
-def test_start_columns_are_finite_and_fit_the_dwells(name: str) -> None:
-    effect = effects.get(name)
+def lacks(effect: AnyEffect) -> list[str]:
+    """What an effect lacks of words, attributes in its own file, names, units and finite columns."""
+    kind, text = type(effect), inspect.getdoc(effect) or ""
+    wanted = ("symbol", "equation", "source", "typical_ug", "breaker")
+    out = [f"{name} in the class {kind.__name__} of {kind.__module__}" for name in wanted if name not in vars(kind)]
+    out += [name for name in wanted if not str(getattr(effect, name)).strip()]
+    out += [] if "." in text else ["a docstring that is a sentence"]
+    low, high = effect.typical_ug
+    out += [] if 0.0 <= low <= high and high > 0.0 else [f"a range of sizes, {effect.typical_ug} is there"]
+    hides = {other for other in effect.hides_behind if not other.startswith("covariate:")}
+    out += [f"an effect {other!r} that it hides behind" for other in hides - set(EVERY)]
+    out += [] if f"### {effect.id}\n" in page() else ["an entry of the reference"]
     values = values_of(effect, RICH)
-    if isinstance(effect, SensorEffect):
-        start = effect.start_columns(RICH, 0, **values)
-        assert np.broadcast_shapes(start.shape[:-1], RICH.time.shape) == RICH.time.shape
-    else:
-        start = effect.start_change(RICH, **values)
-        assert np.broadcast_shapes(start.shape[:-1], RICH.force.shape) == RICH.force.shape
-    assert np.isfinite(start).all()
+    columns = all_columns(effect, RICH, values)
+    of_sensor = isinstance(effect, SensorEffect)
+    names = [effect.names(axis) for axis in range(3)] if of_sensor else [effect.names()] * 3
+    out += [] if [len(one) for one in names] == [columns.shape[-1]] * 3 else ["a name for every column"]
+    out += [] if not effect.per or len(effect.per) == len(names[0]) else ["a unit for every column"]
+    start = effect.start_columns(RICH, 0, **values) if of_sensor else effect.start_change(RICH, **values)
+    shape = RICH.time.shape if of_sensor else RICH.force.shape
+    out += [] if np.isfinite(columns).all() and np.isfinite(start).all() else ["finite columns"]
+    out += [] if columns.shape[:-1] == (3, *RICH.time.shape) else ["columns of all dwells"]
+    return out + ([] if np.broadcast_shapes(start.shape[:-1], shape) == shape else ["start columns of all dwells"])
+
+
+@each(EVERY)
+def test_an_effect_is_whole_in_its_file(name: str) -> None:
+    assert lacks(effects.get(name)) == []
 
 
 @each([name for name in EVERY if isinstance(effects.get(name), SensorEffect)])
 def test_says_rightly_whether_its_columns_are_the_same_on_all_axes(name: str) -> None:
     effect = effects.get(name)
-    assert isinstance(effect, SensorEffect)
     made = [
         [of(RICH, axis, **values) for axis in range(3)]
         for values in grid_of(effect, RICH)
         for of in (effect.columns, effect.start_columns)
     ]
-    assert effect.same_on_axes == all(np.array_equal(each, axes[0]) for axes in made for each in axes)
+    assert effect.same_on_axes == all(np.array_equal(one, axes[0]) for axes in made for one in axes)
+
+
+STILL = (
+    "felt", "force", "time", "temperature", "chamber", "since_power", "since_move", "supply", "vibration", "outer", "inner",
+)  # fmt: skip
 
 
 @each(EVERY)
 def test_says_nothing_where_nothing_changes(name: str) -> None:
     """The same pose, temperature, supply and instant again and again: whatever a column says then is a bias."""
-    n = RICH.time.shape[-1]
-    still = {
-        key: np.repeat(getattr(RICH, key)[:, 5:6], n, axis=1)
-        for key in (
-            "felt",
-            "force",
-            "time",
-            "temperature",
-            "chamber",
-            "since_power",
-            "since_move",
-            "supply",
-            "vibration",
-            "outer",
-            "inner",
-        )
-    }
-    effect = effects.get(name)
+    n, effect = RICH.time.shape[-1], effects.get(name)
+    still = {key: np.repeat(getattr(RICH, key)[:, 5:6], n, axis=1) for key in STILL}
     columns = all_columns(effect, replace(RICH, **still, memory={}), values_of(effect, RICH))
     assert np.ptp(columns, axis=-2).max(initial=0.0) < 1e-9
 
@@ -174,43 +164,11 @@ def test_every_nonlinear_parameter_changes_the_columns(name: str) -> None:
         assert not np.allclose(seen[0], seen[1], rtol=1e-6, atol=1e-12), parameter.name
 
 
-@each(EVERY)
-def test_a_document_says_what_it_is(name: str) -> None:
-    effect = effects.get(name)
-    assert (inspect.getdoc(effect) or "").strip().endswith(".") or "." in (inspect.getdoc(effect) or "")
-    assert effect.symbol
-    assert effect.equation
-    assert effect.source
-    assert effect.breaker
-    low, high = effect.typical_ug
-    assert 0.0 <= low <= high
-    assert high > 0.0
-    assert effect.source.strip()
-    assert effect.breaker.strip()
-    assert {other for other in effect.hides_behind if not other.startswith("covariate:")} <= set(EVERY)
-    assert f"### {name}\n" in page()
-
-
-@each(EVERY)
-def test_an_effect_declares_every_attribute_in_its_own_file(name: str) -> None:
-    kind = type(effects.get(name))
-    missing = {"symbol", "equation", "source", "typical_ug", "breaker"} - set(vars(kind))
-    assert not missing, f"{kind.__module__}: {kind.__name__} has no {missing}; declare it in the class"
-
-
 def test_every_module_of_the_package_holds_an_effect_or_is_a_base() -> None:
     """A file without a class with an id would be skipped silently."""
-    import pkgutil
-
     bases = {"base", "covariate", "formula", "own_file"}
     modules = {info.name for info in pkgutil.iter_modules(effects.__path__)} - bases
     assert modules == {type(effects.get(name)).__module__.rpartition(".")[2] for name in EVERY}
-
-
-def test_the_reference_is_up_to_date() -> None:
-    from docs.effects_page import PAGE
-
-    assert PAGE.read_text(encoding="utf-8") == page(), "write it again with 'python -m docs.effects_page'"
 
 
 def model_columns(names: list[str], state: State, axis: int) -> np.ndarray:
@@ -255,19 +213,15 @@ def six_faces() -> pd.DataFrame:
     rng = np.random.default_rng(3)
     angles = np.tile(poses.plan("six"), (3, 1))
     force = force_from_angles(*np.radians(angles).T)
-    rows = []
+    parts = []
     for unit in range(4):
         gain = np.eye(3) + 3e-3 * rng.standard_normal((3, 3))
         out = 5e-3 * rng.standard_normal(3) + force @ gain.T + 5e-6 * rng.standard_normal(force.shape)
-        for k, (f, o) in enumerate(zip(force, out, strict=True)):
-            rows.append(
-                {
-                    "unit": f"U{unit}", "dwell": k, "time_s": 30.0 * k, **dict(zip(("out_x", "out_y", "out_z"), o, strict=True)),
-                    **dict(zip(("force_x", "force_y", "force_z"), f, strict=True)), "n": 400,
-                    **dict.fromkeys(("sd_x", "sd_y", "sd_z"), 1e-4),
-                }
-            )  # fmt: skip
-    return pd.DataFrame(rows)
+        table = pd.DataFrame({"unit": f"U{unit}", "dwell": range(len(force)), "n": 400})
+        for k, axis in enumerate("xyz"):
+            table[f"out_{axis}"], table[f"force_{axis}"], table[f"sd_{axis}"] = out[:, k], force[:, k], 1e-4
+        parts.append(table)
+    return pd.concat(parts, ignore_index=True).assign(time_s=lambda table: 30.0 * table["dwell"])
 
 
 @pytest.fixture(scope="module")
@@ -277,9 +231,6 @@ def diagnosis_of_six_faces() -> dict:
 
 @each([n for n in EVERY if n not in BASE])
 def test_is_reported_unseen_on_six_faces_exactly_where_it_cannot_show(name: str, diagnosis_of_six_faces: dict) -> None:
-    from inertial.errors import MissingInput
-    from pipelines.tables.dwells import lot_of, measured
-
     state = lot_of(measured(six_faces())).state
     effect = effects.get(name)
     shows = False
@@ -294,7 +245,7 @@ def test_is_reported_unseen_on_six_faces_exactly_where_it_cannot_show(name: str,
 
 
 def test_what_six_faces_hide_is_what_was_published(diagnosis_of_six_faces: dict) -> None:
-    hidden = {
+    hidden = (
         "cross_coupling",
         "third_order",
         "odd_quadratic",
@@ -302,18 +253,14 @@ def test_what_six_faces_hide_is_what_was_published(diagnosis_of_six_faces: dict)
         "fifth_order",
         "gravity_value",
         "slot_rotation",
-    }
-    assert hidden <= set(diagnosis_of_six_faces["unseen"])
+    )
+    assert set(hidden) <= set(diagnosis_of_six_faces["unseen"])
     assert not {"second_order", "scale_asymmetry"} & set(diagnosis_of_six_faces["unseen"])
 
 
 @each(EVERY)
 def test_export_holds_it_or_says_that_it_does_not(name: str) -> None:
     """Effects beyond polynomials in temperature are told of in what is exported, never dropped silently."""
-    from types import SimpleNamespace
-
-    from pipelines.export.polynomials import _one
-
     p = len(effects.get(name).names(0)) if isinstance(effects.get(name), SensorEffect) else 0
     fitted = SimpleNamespace(
         units=["U1"], effects=[*BASE, name],

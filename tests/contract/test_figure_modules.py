@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from each import each
+from made_package import made_package
+from root_process import ROOT
 
 from deploy.release import unpack
-from docs.figures_page import PAGE, page
 from pipelines.archive import Archive
 from pipelines.archive.code import CODE
 from pipelines.archive.keys import sources
@@ -18,7 +19,7 @@ from pipelines.stages.grade import GradeEvidence, grade, refuse_limits_without_f
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits, limits_of, parse_limits
 
-KEPT = Path(__file__).resolve().parents[1] / "archives" / "v1.tar.xz"
+KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 ALL = {"name": "all", "figures": {name: {"max": 1e9, "unit": unit} for name, unit in UNITS.items()}}
 ONE = """
 from pipelines.stages.figures.base import FigureKind, rms
@@ -70,16 +71,14 @@ def test_the_table_has_the_figures_in_their_order(kept, table) -> None:
 
 @each(FIGURES)
 def test_a_figure_says_what_a_recipe_lacks(name: str) -> None:
-    missing = FIGURES[name].missing(SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True))
-    effects = [missing.split()[1]] if missing else []
-    full = SimpleNamespace(
-        static_record_s=3600.0, verification=["v1"], effects=effects, stability=object(), tumbles=True
-    )
+    bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True)
+    missing = FIGURES[name].missing(bare)
+    whole = {"static_record_s": 3600.0, "verification": ["v1"], "stability": object(), "tumbles": True}
+    full = SimpleNamespace(**whole, effects=[missing.split()[1]] if missing else [])
     assert FIGURES[name].missing(full) == ""
     limits = limits_of({"name": "one", "figures": {name: {"max": 1.0, "unit": UNITS[name]}}}, UNITS)
     refuse_limits_without_figures(limits, full)
     if missing:
-        bare = SimpleNamespace(static_record_s=0.0, verification=[], effects=[], tumbles=True)
         with pytest.raises(RecipeInvalid, match=name):
             refuse_limits_without_figures(limits, bare)
 
@@ -91,7 +90,7 @@ def test_a_figure_is_named_in_parts_that_agree(name: str) -> None:
     assert module.FIGURE is kind
     assert module.__doc__
     assert kind.label
-    units = {
+    ends = {
         "_ug": "µg",
         "_mg": "mg",
         "_mrad": "mrad",
@@ -100,11 +99,7 @@ def test_a_figure_is_named_in_parts_that_agree(name: str) -> None:
         "_pct_FS": "%",
         "_rtHz": "µg/√Hz",
     }
-    assert kind.unit == next((u for end, u in units.items() if name.endswith(end)), kind.unit)
-
-
-def test_the_page_of_the_figures_is_up_to_date() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page(), "write it again with 'python -m docs.figures_page'"
+    assert kind.unit == next((unit for end, unit in ends.items() if name.endswith(end)), kind.unit)
 
 
 def test_every_figure_is_part_of_the_key_of_grade() -> None:
@@ -113,12 +108,7 @@ def test_every_figure_is_part_of_the_key_of_grade() -> None:
 
 def figures_in(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> dict[str, FigureKind]:
     """The figures of a package made of these modules."""
-    package = folder / folder.name.replace("-", "_")
-    package.mkdir()
-    for name, text in {"__init__": "", **texts}.items():
-        (package / f"{name}.py").write_text(text, encoding="utf-8")
-    monkeypatch.syspath_prepend(folder)
-    return find_figures(package.name, [str(package)])
+    return find_figures(*made_package(folder, monkeypatch, **texts))
 
 
 def test_one_file_is_a_figure_that_limits_may_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,20 +120,18 @@ def test_one_file_is_a_figure_that_limits_may_name(tmp_path: Path, monkeypatch: 
         parse_limits(text, "limits own", UNITS)
 
 
-@pytest.mark.parametrize(
-    ("texts", "message"),
+@each(
     [
-        ({"one": "LABEL = 1\n"}, "no FIGURE, one is needed"),
-        ({"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="a_ug", order=2)}, "2 figures have the name"),
+        ("no FIGURE, one is needed", {"one": "LABEL = 1\n"}),
+        ("2 figures have the name", {"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="a_ug", order=2)}),
         (
-            {"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="b_ug", order=1)},
             "2 figures have the order",
+            {"one": ONE.format(name="a_ug", order=1), "two": ONE.format(name="b_ug", order=1)},
         ),
-    ],
+    ]
 )
-def test_a_figure_that_is_half_there_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, texts: dict[str, str], message: str
-) -> None:
+def test_a_figure_that_is_half_there_is_refused(case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    message, texts = case
     with pytest.raises(IncompleteFigure, match=message):
         figures_in(tmp_path, monkeypatch, **texts)
 

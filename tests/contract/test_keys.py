@@ -1,15 +1,12 @@
 """Every key of every file that a user writes has a meaning, and the reference page has every key."""
 
-import json
 import tomllib
 from importlib.resources import files
 
 import pytest
 from each import each
-from typer.testing import CliRunner
+from in_process import document_of, given, refused
 
-from docs.keys_page import PAGE, page
-from pipelines.cli import app
 from pipelines.cli.keys import SUBJECTS
 from pipelines.demo.scenes import SCENES
 from schemas.key_list import FILES, keys_of
@@ -37,10 +34,6 @@ def test_every_key_of_a_built_in_file_is_listed(name: str, sample: str) -> None:
     assert set(content) <= {key.name for key in keys_of(FILES[name]) if not key.table}
 
 
-def test_the_page_is_written_from_the_code() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page()
-
-
 def test_every_fault_is_listed_with_its_figures() -> None:
     rows = {row["fault"]: row for row in SUBJECTS["fault"][1]()}
     assert set(rows) == set(kinds())
@@ -55,15 +48,12 @@ def test_every_hidden_effect_of_the_demo_is_listed() -> None:
 
 @each(["", *SUBJECTS])
 def test_the_command_prints_a_list_within_80_columns(subject: str) -> None:
-    arguments = ["keys", *([subject] if subject else [])]
-    document = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
+    words = ("keys", *([subject] if subject else []))
+    document = document_of(*words)
     assert document["subject"] == subject
     assert document["rows"]
-    text = CliRunner().invoke(app, arguments, env={"COLUMNS": "80"}).stdout
-    assert max(map(len, text.splitlines())) <= 80
+    assert max(map(len, given(*words, columns=80)[1].splitlines())) <= 80
 
 
 def test_an_unknown_list_is_refused_with_the_known_ones() -> None:
-    result = CliRunner().invoke(app, ["keys", "recipes"])
-    assert result.exit_code != 0
-    assert "did you mean recipe" in str(result.exception)
+    assert "did you mean recipe" in refused("keys", "recipes")

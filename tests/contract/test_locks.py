@@ -31,11 +31,9 @@ LOCKS = {path.stem.removeprefix("requirements-"): text_of(path) for path in ROOT
 def extras_of_locks() -> dict[str, tuple[str, ...]]:
     """Extras that each lock is made with, as ``make locks`` would."""
     done = subprocess.run(["make", "--dry-run", "locks"], cwd=ROOT, capture_output=True, text=True, check=True)
-    calls = re.findall(
-        r"^\S+ pip compile.*--output-file requirements-(\w+)[.]lock", done.stdout.replace("\\\n", ""), re.MULTILINE
-    )
-    lines = re.findall(r"^\S+ pip compile.*$", done.stdout.replace("\\\n", ""), re.MULTILINE)
-    return {name: tuple(re.findall(r"--extra (\w+)", line)) for name, line in zip(calls, lines, strict=True)}
+    calls = r"^(\S+ pip compile.*--output-file requirements-(\w+)[.]lock.*)$"
+    found = re.findall(calls, done.stdout.replace("\\\n", ""), re.MULTILINE)
+    return {name: tuple(re.findall(r"--extra (\w+)", line)) for line, name in found}
 
 
 @cache
@@ -152,13 +150,8 @@ def test_a_lock_of_one_python_alone_is_found(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_extras_and_markers_of_a_lock_are_read() -> None:
-    text = (
-        "a.b[c, d]==1.0 \\\n    --hash=sha256:"
-        + "1" * 64
-        + "\ne==2 ; python_version > '3.12' \\\n    --hash=sha256:"
-        + "2" * 64
-    )
-    first, second = pins(text)
+    hashed = " \\\n    --hash=sha256:"
+    first, second = pins(f"a.b[c, d]==1.0{hashed}{'1' * 64}\ne==2 ; python_version > '3.12'{hashed}{'2' * 64}")
     assert first == ("a-b", "1.0", None, ("1" * 64,))
     assert (second.name, second.version, second.hashes) == ("e", "2", ("2" * 64,))
     assert not second.holds(on_linux("3.11.2"))

@@ -6,16 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from each import each
+from made_package import made_package
 from scipy import signal
 from stopped_capture import Stopped, Stopping
 
-from docs.procedures_page import PAGE, page
+from docs.procedures_page import page
 from inertial.dynamics import second_order
-from inertial.dynamics.transfer_effects import EFFECTS
+from inertial.dynamics.transfer_effects import EFFECTS, Conditions
+from inertial.dynamics.transfer_model import Points, fit_transfer
 from pipelines.archive import Archive
 from pipelines.capture.capture import capture
 from pipelines.chain.runner import Runner
-from pipelines.jobs.job import Job
+from pipelines.jobs.job import Job, Request
 from pipelines.jobs.recipes import load_recipe
 from pipelines.procedures import (
     FIGURES,
@@ -24,11 +26,13 @@ from pipelines.procedures import (
     figures_of_recipe,
     find_procedures,
     parts_of,
+    refuse_unusable,
     roles_of,
 )
 from pipelines.procedures.base import Evaluated, FromWaveforms, OnEquipment, SetsEquipment
 from pipelines.procedures.transfer_figures import bandwidth_of
 from pipelines.report.unit_panels.procedures import picture
+from pipelines.schedule.steps import steps
 from pipelines.stages.figures import UNITS
 from schemas.errors import RecipeInvalid
 from schemas.limits import limits_of
@@ -97,7 +101,7 @@ def run(tmp_path_factory: pytest.TempPathFactory):
 HALF = """
 from pipelines.procedures.base import *
 class One({bases}):
-    name, title, order, states, source = "{name}", "One", 1, "s", "s"
+    name, title, order, states, source = "one", "One", 1, "s", "s"
     roles, part = {roles}, Part
     figures = ({figures})
     def steps(self, part, recipe): return []
@@ -107,38 +111,26 @@ PROCEDURE = One()
 METHODS = "\n".join(f"    def {one}(self, *args): return None" for one in ("reduce", "of_unit", "chart", "measure"))
 
 
-@pytest.mark.parametrize(
-    ("bases", "roles", "figures", "refused"),
-    [
-        ("Procedure", "('exciter',)", "", "OnEquipment or SetsEquipment is needed"),
-        ("OnEquipment", "()", "", "the equipment of its steps is needed"),
-        ("Evaluated", "()", "", "one is needed for Evaluated"),
-        ("Procedure", "()", "FigureSpec('half_f', 's', 'm'),", "Evaluated is needed for them"),
-        ("InG", "()", "", "a NominalScale is needed"),
-    ],
-)
-def test_a_procedure_that_declares_what_it_cannot_do_is_refused(
-    bases: str, roles: str, figures: str, refused: str, tmp_path: Path, monkeypatch
+REFUSED = {
+    "OnEquipment or SetsEquipment is needed": {"roles": "('exciter',)"},
+    "the equipment of its steps is needed": {"bases": "OnEquipment"},
+    "one is needed for Evaluated": {"bases": "Evaluated"},
+    "Evaluated is needed for them": {"figures": "FigureSpec('half_f', 's', 'm'),"},
+    "a NominalScale is needed": {"bases": "InG"},
+}
+PLAIN = {"bases": "Procedure", "roles": "()", "figures": "", "methods": METHODS}
+
+
+@each([*REFUSED, "no PROCEDURE of this name"])
+def test_a_procedure_that_is_half_there_is_refused(
+    refused: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    name = f"half_{abs(hash((bases, roles, figures)))}"
-    (tmp_path / name).mkdir()
-    text = HALF.format(bases=bases, name="one", roles=roles, figures=figures, methods=METHODS)
-    (tmp_path / name / "one.py").write_text(text)
-    (tmp_path / name / "__init__.py").touch()
-    monkeypatch.syspath_prepend(tmp_path)
+    text = HALF.format(**PLAIN | REFUSED.get(refused, {}))
+    if refused not in REFUSED:
+        text = text.replace("PROCEDURE = One()", "")
+    name, path = made_package(tmp_path, monkeypatch, one=text, shared="FEWEST = 3\n")
     with pytest.raises(IncompleteProcedure, match=rf"{name}\.one: .*{refused}"):
-        find_procedures(name, [str(tmp_path / name)])
-
-
-def test_a_procedure_that_its_module_does_not_offer_is_refused(tmp_path: Path, monkeypatch) -> None:
-    (tmp_path / "forgotten").mkdir()
-    text = HALF.format(bases="Procedure", name="one", roles="()", figures="", methods=METHODS)
-    (tmp_path / "forgotten" / "one.py").write_text(text.replace("PROCEDURE = One()", ""))
-    (tmp_path / "forgotten" / "shared.py").write_text("FEWEST = 3\n")
-    (tmp_path / "forgotten" / "__init__.py").touch()
-    monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(IncompleteProcedure, match=r"forgotten\.one: no PROCEDURE of this name"):
-        find_procedures("forgotten", [str(tmp_path / "forgotten")])
+        find_procedures(name, path)
 
 
 @each([Evaluated, OnEquipment, SetsEquipment, FromWaveforms])
@@ -163,14 +155,9 @@ def test_a_procedure_can_do_what_its_steps_ask_for(name: str, tmp_path: Path) ->
 def test_a_procedure_is_documented(name: str) -> None:
     one = PROCEDURES[name]
     assert all((one.states, one.source, one.title, type(one).__doc__, one.part.__doc__))
-    assert f"## {name}" in PAGE.read_text(encoding="utf-8")
+    assert f"## {name}" in page()
+    assert [effect for effect in EFFECTS if f"`{effect}`" not in page()] == []
     assert f"`{name}`" in HOW_TO.read_text(encoding="utf-8")
-
-
-def test_the_reference_is_up_to_date() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page()
-    for name in EFFECTS:
-        assert f"`{name}`" in page()
 
 
 @pytest.mark.slow
@@ -190,8 +177,6 @@ def test_a_figure_of_a_procedure_may_have_a_limit_and_is_decided(name: str, run)
 
 @each([name for name, one in PROCEDURES.items() if one.roles])
 def test_a_station_without_the_equipment_is_refused(name: str, tmp_path: Path) -> None:
-    from pipelines.procedures import refuse_unusable
-
     bare = load_station().model_copy(update={"equipment": Equipment(built_in=False)})
     with pytest.raises(RecipeInvalid, match=f"no {PROCEDURES[name].roles[0]}, one is needed"):
         refuse_unusable(recipe_of(tmp_path, [name]), bare)
@@ -228,13 +213,7 @@ def test_figures_agree_with_what_the_simulated_units_really_are(run) -> None:
         for name, true in truth_of(plant, k).items():
             row = figures[(figures["unit"] == unit) & (figures["figure"] == name)].iloc[0]
             if row["identified"]:
-                assert abs(row["value"] - true) < 4.5 * row["uncertainty"], (
-                    unit,
-                    name,
-                    row["value"],
-                    true,
-                    row["uncertainty"],
-                )
+                assert abs(row["value"] - true) < 4.5 * row["uncertainty"], (unit, true, row.to_dict())
             elif np.isfinite(row["low"]):
                 assert row["low"] <= true <= row["high"], (unit, name)
     assert figures["identified"].mean() > 0.8
@@ -282,8 +261,6 @@ def step_truth(unit: DynamicTruth) -> dict[str, float]:
 
 
 def load_steps(folder: Path, name: str):
-    from pipelines.schedule.steps import steps
-
     return steps(recipe_of(folder, [name]))
 
 
@@ -306,8 +283,6 @@ def test_the_parts_are_checked_with_the_key_that_is_wrong(tmp_path: Path) -> Non
 
 
 def test_a_list_without_the_multi_position_test_becomes_a_job_with_a_least_value(tmp_path: Path) -> None:
-    from pipelines.jobs.job import Request
-
     recipe_of(tmp_path, ["sweep"])
     (tmp_path / "limits.toml").write_text('name = "l"\n[figures]\nsweep_bandwidth_hz = { min = 800.0, unit = "Hz" }\n')
     path = tmp_path / "recipe.toml"
@@ -317,9 +292,6 @@ def test_a_list_without_the_multi_position_test_becomes_a_job_with_a_least_value
 
 
 def test_the_band_edge_of_a_plain_second_order_model_is_the_closed_form() -> None:
-    from inertial.dynamics.transfer_effects import Conditions
-    from inertial.dynamics.transfer_model import Points, fit_transfer
-
     f = np.geomspace(10.0, 3000.0, 30)
     one = np.ones(30)
     points = Points(Conditions(f, one, one, one), -second_order.transfer(f, 1800.0, 0.65), 1e-3 * one, 1e-3 * one)

@@ -2,7 +2,6 @@
 
 import socket
 import struct
-from contextlib import contextmanager
 
 import pytest
 from each import each
@@ -15,17 +14,11 @@ from schemas.station_devices import Device, Equipment
 from stations.codec import NotEncodable, encode
 from stations.devices.registers import Registers
 from stations.links.modbus import ModbusLink
-from stations.opening import open_station
 from stations.plant.preset import load_preset, preset_names
 from stations.plant.server import PlantServer
 from stations.profile_files import load_profile, profile_names
 
 WITH_REGISTERS = [name for name in profile_names() if load_profile(name).registers]
-
-
-@pytest.fixture(scope="module", params=WITH_REGISTERS)
-def name(request):
-    return request.param
 
 
 def station_with(name):
@@ -41,107 +34,64 @@ def station_with(name):
     return config.model_copy(update={"devices": config.devices.model_copy(update=changed)})
 
 
-@pytest.fixture(scope="module")
-def served(name):
-    plant = plant_of(station_with(name), lot_of(2))
-    plant.advance(12_345_678)
-    with PlantServer(plant) as server:
-        link = ModbusLink(server.host, server.port, timeout_s=5.0, read_attempts=1)
-        yield plant, server, link
-        link.close()
-
-
-def devices_of(plant, name):
-    return [device_id for device_id, bank in plant.banks.items() if bank.profile.name == name]
-
-
-def test_profile_names_itself_and_its_source(name):
+@each(WITH_REGISTERS)
+def test_a_device_answers_as_its_profile_says_and_refuses_what_it_does_not_say(name):
     profile = load_profile(name)
     assert profile.name == name
     assert profile.source
+    plant = plant_of(station_with(name), lot_of(2))
+    plant.advance(12_345_678)
+    devices = [device_id for device_id, bank in plant.banks.items() if bank.profile.name == name]
+    assert devices, "no device of the built-in station answers by it"
+    with PlantServer(plant) as server:
+        link = ModbusLink(server.host, server.port, timeout_s=5.0, read_attempts=1)
+        try:
+            for device_id in devices:
+                reads_within_its_limits(Registers(name, link, device_id, profile), profile)
+            refuses_what_is_not_in_the_profile(plant.banks[devices[0]], link, devices[0], profile)
+        finally:
+            link.close()
 
 
-def test_some_device_of_the_built_in_station_answers_by_the_profile(name, served):
-    assert devices_of(served[0], name)
-
-
-def test_every_readable_register_answers_inside_its_limits(name, served):
-    plant, _, link = served
-    for device_id in devices_of(plant, name):
-        registers = Registers(name, link, device_id, load_profile(name))
-        for register in load_profile(name).registers:
-            if register.access == "write":
-                continue
+def reads_within_its_limits(registers, profile):
+    for register in profile.registers:
+        if register.access != "write":
             value = registers.read(register.name)
             decimals = int(registers.number(register.scaled_by)) if register.scaled_by else 0
             # what was read can be written: inside type, limits and enumeration
-            assert encode(register.with_decimals(decimals), registers.profile.order(register), value)
-            if register.enumeration:
-                assert registers.text(register.name) in register.enumeration
+            assert encode(register.with_decimals(decimals), profile.order(register), value), register.name
+            assert not register.enumeration or registers.text(register.name) in register.enumeration, register.name
 
 
-def test_read_only_registers_refuse_to_be_written(name, served):
-    plant, _, link = served
-    device_id = devices_of(plant, name)[0]
-    for register in load_profile(name).registers:
+def refuses_what_is_not_in_the_profile(bank, link, device_id, profile):
+    """Read-only registers, addresses beside the profile, half a register, values outside their limits."""
+    with pytest.raises(StationRefused, match="exception 2"):
+        link.read(device_id, max(r.end for r in profile.registers), 1, "nothing")
+    for register in profile.registers:
         if register.access == "read" and register.space in {"holding", "coil"}:
             with pytest.raises(StationRefused, match=r"exception [23]"):
                 link.write(device_id, register.address, [0] * register.words, register.name, register.space)
-
-
-def test_addresses_beside_the_profile_are_refused(name, served):
-    plant, _, link = served
-    last = max(r.end for r in load_profile(name).registers)
-    with pytest.raises(StationRefused, match="exception 2"):
-        link.read(devices_of(plant, name)[0], last, 1, "nothing")
-
-
-def test_values_outside_their_limits_are_refused_before_they_are_sent(name):
-    profile = load_profile(name)
-    for register in profile.registers:
+        if register.access != "read" and register.words > 1:
+            before = [bank.read(r.address, r.words) for r in profile.registers]
+            with pytest.raises(StationRefused, match="exception 3"):
+                link.write(device_id, register.address, [0x41C8], f"half of {register.name}")
+            assert before == [bank.read(r.address, r.words) for r in profile.registers]
         for bound, beyond in ((register.minimum, -1.0), (register.maximum, 1.0)):
             if bound is not None:
-                with pytest.raises(NotEncodable):
+                with pytest.raises(NotEncodable):  # before it is sent
                     encode(register, profile.order(register), bound + beyond)
-
-
-@contextmanager
-def raw_socket(server):
-    with socket.create_connection((server.host, server.port), timeout=5.0) as connection:
-        yield connection
 
 
 def test_words_on_the_wire_are_those_of_the_f4t_low_word_first():
     plant = plant_of()
-    with PlantServer(plant) as server, raw_socket(server) as connection:  # by hand: no library of either side
+    # by hand: no library of either side
+    with PlantServer(plant) as server, socket.create_connection((server.host, server.port), 5.0) as connection:
         connection.sendall(struct.pack(">HHHBBHH", 7, 0, 6, 3, 3, 2782, 2))
         answer = connection.recv(64)
     transaction, _, length, device_id, function, size, low, high = struct.unpack(">HHHBBBHH", answer)
     assert (transaction, length, device_id, function, size) == (7, 7, 3, 3, 4)
     set_point = struct.unpack(">f", struct.pack(">HH", high, low))[0]
     assert set_point == plant.fixture.chamber.set_point
-
-
-def test_half_a_register_is_not_written(name, served):
-    plant, _, link = served
-    device_id = devices_of(plant, name)[0]
-    for register in load_profile(name).registers:
-        if register.access != "read" and register.words > 1:
-            before = [plant.banks[device_id].read(r.address, r.words) for r in load_profile(name).registers]
-            with pytest.raises(StationRefused, match="exception 3"):
-                link.write(device_id, register.address, [0x41C8], f"half of {register.name}")
-            assert before == [plant.banks[device_id].read(r.address, r.words) for r in load_profile(name).registers]
-
-
-def test_chambers_of_every_profile_take_a_set_point_and_tell_it_back():
-    for name in profile_names():
-        if load_profile(name).kind != "chamber":
-            continue
-        lot = lot_of(1)
-        with open_station(station_with(name), lot) as station:
-            station.chamber.set_temperature(-12.3)
-            station.clock.sleep(3600.0)
-            assert station.chamber.temperature() == pytest.approx(-12.3, abs=0.1)
 
 
 PROFILE = """
@@ -156,18 +106,18 @@ registers = [{registers}]
 """
 
 
-@pytest.mark.parametrize(
-    ("registers", "needed"),
-    [
-        ('{name="a",address=0,type="float32"},{name="b",address=1,type="uint16"}', "overlap at address 1"),
-        ('{name="a",address=0,type="uint16"},{name="a",address=1,type="uint16"}', "twice"),
-        ('{name="a",address=65535,type="float32"}', "65535"),
-        ('{name="a",address=0,type="float32",enumeration={x=1}}', "enumeration"),
-        ('{name="a",adress=0,type="uint16"}', "address"),
-    ],
-)
-def test_refuses_profiles_that_contradict_themselves(registers, needed):
-    with pytest.raises(RecipeInvalid, match=needed):
+REFUSED = {
+    '{name="a",address=0,type="float32"},{name="b",address=1,type="uint16"}': "overlap at address 1",
+    '{name="a",address=0,type="uint16"},{name="a",address=1,type="uint16"}': "twice",
+    '{name="a",address=65535,type="float32"}': "65535",
+    '{name="a",address=0,type="float32",enumeration={x=1}}': "enumeration",
+    '{name="a",adress=0,type="uint16"}': "address",
+}
+
+
+@each(REFUSED)
+def test_refuses_profiles_that_contradict_themselves(registers):
+    with pytest.raises(RecipeInvalid, match=REFUSED[registers]):
         parse_profile(PROFILE.replace("{registers}", registers), "p.toml")
 
 

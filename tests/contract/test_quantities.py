@@ -30,6 +30,7 @@ NEVER_NAMED = {
     "inner_deg",
     "slot",
 }  # also columns of other tables than dwells
+NEVER_READ = {"outer_deg", "inner_deg", "slot"}
 HERE = {
     "inertial/quantities.py",
     "schemas/tables.py",  # the contract of readings, old ones too
@@ -54,11 +55,7 @@ def test_a_row_is_whole(row, tmp_path):
 
 
 def test_every_station_reads_what_the_rows_say_and_dwells_keep_it():
-    required = {name for name in tables.TABLES["readings"].columns if name in BY_COLUMN} - {
-        "outer_deg",
-        "inner_deg",
-        "slot",
-    }
+    required = {name for name in tables.TABLES["readings"].columns if name in BY_COLUMN} - NEVER_READ
     assert required == {row.column for row in RECORDED if row.reading}
     assert required <= set(KEPT)
     assert set(WHERE_THERE) == {row.column for row in RECORDED if row.joined == "max"}
@@ -69,10 +66,8 @@ def test_a_plan_has_every_quantity_and_every_driver(tmp_path):
     columns = [row.column for row in RECORDED if not row.attribute]
     state = planned_state(recipe, recorded=columns)
     for row in RECORDED:
-        if row.attribute and row.column not in {
-            "power_off_s",
-            "heading_deg",
-        }:  # no table has a heading: units put by hand do
+        # no table has a heading: units put by hand do
+        if row.attribute and row.column not in {"power_off_s", "heading_deg"}:
             assert getattr(state, row.attribute) is not None
     assert list(state.covariates) == columns
     drivers = {row.column for row in RECORDED if row.driver} | {row.name for row in DERIVED if row.driver}
@@ -112,9 +107,8 @@ def test_no_other_module_lists_the_columns():
     modules = set()
     for folder in ("inertial", "pipelines", "schemas", "stations"):
         for path in (ROOT / folder).rglob("*.py"):
-            lines = [
-                k for k, line in enumerate(path.read_text(encoding="utf-8").splitlines()) for _ in text.findall(line)
-            ]
+            written = enumerate(path.read_text(encoding="utf-8").splitlines())
+            lines = [number for number, line in written for _ in text.findall(line)]
             if any(b - a <= 1 for a, b in pairwise(lines)):
                 modules.add(path.relative_to(ROOT).as_posix())
     assert modules <= HERE

@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from each import each
+from made_package import made_package
+from root_process import ROOT
 from scipy.io import savemat, wavfile
 
-from pipelines.importers import files
-from pipelines.importers.readers import READERS, reader_of
+from pipelines.importers import files, readers
+from pipelines.importers.readers import READERS, IncompleteReader, find_readers, reader_of
 from schemas.errors import DataRejected, WrongUse
 
-ROOT = Path(__file__).resolve().parents[2]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
 GUIDE = (ROOT / "docs" / "how-to" / "import-your-data.md").read_text(encoding="utf-8")
 TIME = np.arange(50) / 100.0
@@ -98,34 +99,34 @@ def test_a_reader_says_what_it_is_and_is_in_the_guide(name: str) -> None:
     reader = READERS[name]
     assert name == reader.NAME
     assert reader.TITLE
-    assert not reader.EXTRA or reader.EXTRA in EXTRAS
     assert f"`{name}`" in GUIDE
-    assert not reader.EXTRA or f"tumbleline[{reader.EXTRA}]" in GUIDE
+    assert not reader.EXTRA or (reader.EXTRA in EXTRAS and f"tumbleline[{reader.EXTRA}]" in GUIDE)
+    assert [other for other in READERS.values() if other.ORDER == reader.ORDER] == [reader]
 
 
-def test_the_order_of_the_readers_is_their_own() -> None:
-    orders = [reader.ORDER for reader in READERS.values()]
-    assert len(set(orders)) == len(orders)
+def test_text_is_tried_last_and_every_optional_format_is_in_the_extra_that_has_them_all() -> None:
     assert list(READERS)[-1] == "text"
+    wanted = sorted({reader.EXTRA for reader in READERS.values() if reader.EXTRA})
+    assert EXTRAS["recordings"] == [f"tumbleline[{','.join(wanted)}]"]
 
 
-def test_every_optional_format_is_in_the_extra_that_has_them_all() -> None:
-    wanted = {reader.EXTRA for reader in READERS.values() if reader.EXTRA}
-    assert EXTRAS["recordings"] == [f"tumbleline[{','.join(sorted(wanted))}]"]
+def sample(name: str, path: Path, request: pytest.FixtureRequest) -> str:
+    """A file of a format at a path; the group of its channels."""
+    if name in FROM_ELSEWHERE:
+        pytest.importorskip("idelib")
+        file, group = FROM_ELSEWHERE[name]
+        path.write_bytes((request.getfixturevalue("shared_data") / file).read_bytes())
+        return group
+    SAMPLES[name](path)
+    return ""
 
 
 @each(READERS)
 def test_a_reader_reads_its_sample_and_no_other_claims_it(name: str, tmp_path: Path, request) -> None:
     path = tmp_path / "no-ending"
-    group = ""
+    group = "" if name in REFUSED else sample(name, path, request)
     if name in REFUSED:
         path.write_bytes(REFUSED[name])
-    elif name in FROM_ELSEWHERE:
-        pytest.importorskip("idelib")
-        file, group = FROM_ELSEWHERE[name]
-        path = request.getfixturevalue("shared_data") / file
-    else:
-        SAMPLES[name](path)
     data = path.read_bytes()
     assert reader_of(data) is READERS[name]
     others = [other for other, reader in READERS.items() if other not in {name, "text"} and reader.recognised(data)]
@@ -191,9 +192,8 @@ def test_a_matlab_file_with_a_bad_checksum_is_refused_with_a_remedy(tmp_path: Pa
     path.write_bytes(data)
     with pytest.raises(DataRejected) as caught:
         files.read(path)
-    assert "torn.mat" in str(caught.value)
-    assert "incorrect data check" in str(caught.value)
-    assert "copy it again" in str(caught.value)
+    for part in ("torn.mat", "incorrect data check", "copy it again"):
+        assert part in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -202,13 +202,7 @@ def test_a_file_that_ends_too_early_is_refused_in_one_line_or_read_as_far_as_it_
     name: str, tmp_path: Path, request
 ) -> None:
     path = tmp_path / "short"
-    group = ""
-    if name in FROM_ELSEWHERE:
-        pytest.importorskip("idelib")
-        file, group = FROM_ELSEWHERE[name]
-        path.write_bytes((request.getfixturevalue("shared_data") / file).read_bytes())
-    else:
-        SAMPLES[name](path)
+    group = sample(name, path, request)
     data = path.read_bytes()
     for share in (0.3, 0.6, 0.97):
         path.write_bytes(data[: int(share * len(data))])
@@ -220,3 +214,32 @@ def test_a_file_that_ends_too_early_is_refused_in_one_line_or_read_as_far_as_it_
         assert message.startswith("short")
         assert "\n" not in message
         assert 0 < rows <= 60_000
+
+
+READER = """
+NAME, TITLE, EXTRA, ORDER = "{name}", "Format", "", {order}
+def recognised(data): return True
+def read(name, data, group): return None
+"""
+
+
+def test_a_reader_is_one_file_and_refused_with_all_that_is_missing_where_it_is_half_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, two, same = (READER.format(name=name, order=order) for name, order in (("one", 20), ("two", 10), ("same", 20)))
+    assert list(find_readers(*made_package(tmp_path, monkeypatch, one=one, two=two))) == ["two", "one"]
+    half = "NAME, TITLE = 'half', 'Half'\ndef read(name, data, group): return None\n"
+    with pytest.raises(IncompleteReader, match=r"half: no EXTRA, ORDER, recognised; .*two: NAME 'same' or ORDER 20"):
+        find_readers(*made_package(tmp_path, monkeypatch, half=half, one=one, two=same))
+
+
+def test_no_other_file_names_a_reader() -> None:
+    folder = Path(readers.__file__).parent
+    names = [f"{readers.__name__}.{one.__name__.rpartition('.')[2]} import" for one in READERS.values()]
+    texts = {
+        path.relative_to(ROOT): path.read_text(encoding="utf-8")
+        for room in ("inertial", "schemas", "stations", "pipelines")
+        for path in (ROOT / room).rglob("*.py")
+        if not path.is_relative_to(folder)
+    }
+    assert [(path, name) for path, text in texts.items() for name in names if name in text] == []

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 from each import each
+from made_package import made_package
+from root_process import ROOT
 
 from deploy.release import unpack
 from pipelines.archive import Archive
@@ -14,7 +16,6 @@ from pipelines.report.panel import IncompletePanel, panels, rendered
 from pipelines.report.panels.unit_by_unit import UNIT_PANELS
 from pipelines.report.run_page import PANELS
 
-ROOT = Path(__file__).resolve().parents[2]
 KEPT = ROOT / "tests" / "archives" / "v1.tar.xz"
 GUIDE = (ROOT / "docs" / "how-to" / "read-a-report.md").read_text(encoding="utf-8")
 ONE = 'ORDER = {order}\nTITLE = "Own"\n\n\ndef render(report):\n    return f"<p>{{len(report.units)}} units</p>"\n'
@@ -72,18 +73,8 @@ def test_the_page_has_the_panels_in_their_order(report: ReportContext) -> None:
     assert headings == [one.TITLE for one in panels(PANELS) if one.TITLE and one.__name__ not in NOT_OF_OLD_RUNS]
 
 
-def made(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> str:
-    """The name of a package made of these modules."""
-    package = folder / folder.name.replace("-", "_")
-    package.mkdir()
-    for name, text in {"__init__": "", **texts}.items():
-        (package / f"{name}.py").write_text(text, encoding="utf-8")
-    monkeypatch.syspath_prepend(folder)
-    return package.name
-
-
 def test_one_file_is_a_panel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, report: ReportContext) -> None:
-    package = made(tmp_path, monkeypatch, own=ONE.format(order=5))
+    package, _ = made_package(tmp_path, monkeypatch, own=ONE.format(order=5))
     assert rendered(package, report) == [("Own", "<p>2 units</p>")]
     both = (*panels(package), *panels(PANELS))
     monkeypatch.setattr(panel, "panels", lambda name: both if name == PANELS else panels(name))
@@ -92,20 +83,19 @@ def test_one_file_is_a_panel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, re
 
 def test_a_panel_with_nothing_to_show_has_no_heading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     empty = ONE.format(order=5).replace('f"<p>{len(report.units)} units</p>"', "None")
-    assert rendered(made(tmp_path, monkeypatch, own=empty), None) == []
+    assert rendered(made_package(tmp_path, monkeypatch, own=empty)[0], None) == []
 
 
-@pytest.mark.parametrize(
-    ("texts", "message"),
-    [
-        ({"own": ONE.format(order=5).replace("ORDER", "PLACE")}, "own: a panel without ORDER"),
-        ({"own": ONE.format(order=5).replace("TITLE", "HEAD")}, "own: a panel without TITLE"),
-        ({"own": ONE.format(order=5).replace("render", "draw")}, "own: a panel without render"),
-        ({"own": ONE.format(order=5), "other": ONE.format(order=5)}, "2 panels have the ORDER 5"),
-    ],
-)
-def test_a_panel_that_is_half_there_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, texts: dict[str, str], message: str
-) -> None:
+WHOLE = ONE.format(order=5)
+HALF = {
+    "own: a panel without ORDER": {"own": WHOLE.replace("ORDER", "PLACE")},
+    "own: a panel without TITLE": {"own": WHOLE.replace("TITLE", "HEAD")},
+    "own: a panel without render": {"own": WHOLE.replace("render", "draw")},
+    "2 panels have the ORDER 5": {"own": WHOLE, "other": WHOLE},
+}
+
+
+@each(HALF)
+def test_a_panel_that_is_half_there_is_refused(message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(IncompletePanel, match=message):
-        panels(made(tmp_path, monkeypatch, **texts))
+        panels(made_package(tmp_path, monkeypatch, **HALF[message])[0])

@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from each import each
 from packaging.markers import Marker
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -85,33 +86,28 @@ def imported() -> dict[Path, dict[str, set[str]]]:
     }
 
 
-def test_no_module_imports_at_its_top_what_is_not_among_the_dependencies(imported) -> None:
-    there = modules_of(closure(PROJECT["dependencies"]))
-    wrong = {str(path): sorted(found["top"] - there) for path, found in imported.items() if found["top"] - there}
+def beyond(imported: dict[Path, dict[str, set[str]]], where: str, there: set[str]) -> dict[str, list[str]]:
+    """By file, the imports of a kind of what is not there."""
+    return {str(path): sorted(found[where] - there) for path, found in imported.items() if found[where] - there}
+
+
+def test_no_module_imports_what_is_neither_a_dependency_nor_inside_a_function_an_extra(imported) -> None:
+    needed = closure(PROJECT["dependencies"])
     # reached by the option --dask alone, which asks for the extra first
-    assert wrong == {"pipelines/flows/dask.py": ["prefect_dask"]}
-
-
-def test_what_is_imported_inside_a_function_is_a_dependency_or_an_extra(imported) -> None:
-    there = modules_of(closure(PROJECT["dependencies"]) | EXTRAS | closure(["prefect-dask"]))
-    wrong = {str(path): sorted(found["inside"] - there) for path, found in imported.items() if found["inside"] - there}
-    assert wrong == {}
-
-
-def test_no_module_names_a_library_of_drawing(imported) -> None:
-    everything = {module for found in imported.values() for modules in found.values() for module in modules}
-    assert not everything & {"matplotlib", "pyreadr"}
+    assert beyond(imported, "top", modules_of(needed)) == {"pipelines/flows/dask.py": ["prefect_dask"]}
+    assert beyond(imported, "inside", modules_of(needed | EXTRAS | closure(["prefect-dask"]))) == {}
 
 
 def test_what_the_locks_leave_out_is_asked_for_by_the_library_and_by_no_module(imported) -> None:
     everything = {module for found in imported.values() for modules in found.values() for module in modules}
+    assert not everything & {"matplotlib", "pyreadr"}
     for library, unused in UNUSED.items():
         asked = {canonicalize_name(Requirement(line).name) for line in metadata.requires(library) or ()}
         assert unused <= asked
         assert not unused & everything
 
 
-@pytest.mark.parametrize("version", ["3.11.7", "3.12.1", "3.13.0", "3.14.0"])
+@each(["3.11.7", "3.12.1", "3.13.0", "3.14.0"])
 def test_the_lock_of_a_run_has_no_more_packages_than_are_told(version: str) -> None:
     here = {"python_full_version": version, "python_version": version.rpartition(".")[0]}
     lock = (ROOT / "requirements-run.lock").read_text(encoding="utf-8")
@@ -141,17 +137,17 @@ def test_no_package_of_a_run_or_an_extra_has_a_licence_of_which_the_guide_does_n
     assert "AGPL" not in table()
 
 
-@pytest.mark.parametrize(
-    ("licence", "kind"),
-    [
-        ("MIT", ""),
-        ("MPL-2.0 AND (Apache-2.0 OR MIT)", "MPL"),
-        ("Apache-2.0 OR GPL-3.0-only", ""),
-        ("Public Domain, BSD License, GNU General Public License (GPL)", ""),
-        ("AGPL-3.0-only", "AGPL"),
-        ("GNU LESSER GENERAL PUBLIC LICENSE", "LGPL"),
-        ("LGPL-3.0-only", "LGPL"),
-    ],
-)
-def test_a_licence_that_asks_for_more_than_its_notice_is_found(licence: str, kind: str) -> None:
-    assert kind_of(licence) == kind
+LICENCES = {
+    "MIT": "",
+    "MPL-2.0 AND (Apache-2.0 OR MIT)": "MPL",
+    "Apache-2.0 OR GPL-3.0-only": "",
+    "Public Domain, BSD License, GNU General Public License (GPL)": "",
+    "AGPL-3.0-only": "AGPL",
+    "GNU LESSER GENERAL PUBLIC LICENSE": "LGPL",
+    "LGPL-3.0-only": "LGPL",
+}
+
+
+@each(LICENCES)
+def test_a_licence_that_asks_for_more_than_its_notice_is_found(licence: str) -> None:
+    assert kind_of(licence) == LICENCES[licence]

@@ -16,14 +16,8 @@ from test_packaging import ROOT, SHIPPED, tracked
 from deploy.release import build
 
 SHARE = "share/tumbleline/"
-SAMPLES = (
-    "deploy/recipes",
-    "deploy/stations",
-    "deploy/systemd",
-    "deploy/prefect.yaml",
-    "requirements-run.lock",
-    "requirements-all.lock",
-)
+OF_DEPLOYMENT = ("recipes", "stations", "systemd", "prefect.yaml")
+SAMPLES = (*(f"deploy/{name}" for name in OF_DEPLOYMENT), "requirements-run.lock", "requirements-all.lock")
 LOADS = """
 import json, sys
 from pathlib import Path
@@ -66,17 +60,15 @@ def unpacked(built: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory)
 
 def own_environment(**more: str) -> dict[str, str]:
     """This environment without what would lead a process to the source tree."""
-    kept = {
-        k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "TUMBLELINE_", "PREFECT_", "VIRTUAL_ENV"))
-    }
+    leading = ("PYTHON", "TUMBLELINE_", "PREFECT_", "VIRTUAL_ENV")
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(leading)}
     return {**kept, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **more}
 
 
 def test_the_wheel_holds_every_tracked_file_of_the_packages(unpacked: Path) -> None:
     needed = {str(path.relative_to(ROOT)) for path in tracked(*SHIPPED)}
-    held = {
-        str(path.relative_to(unpacked)) for top in SHIPPED for path in (unpacked / top).rglob("*") if path.is_file()
-    }
+    files = [path for top in SHIPPED for path in (unpacked / top).rglob("*") if path.is_file()]
+    held = {str(path.relative_to(unpacked)) for path in files}
     assert needed - held == set()
     assert {name for name in held if not name.endswith(".pyc")} - needed == set()
 
@@ -92,22 +84,15 @@ def test_the_wheel_holds_the_samples_of_the_deployment_and_the_lock(unpacked: Pa
 def test_the_source_distribution_holds_what_the_wheel_was_built_from(built: tuple[Path, Path]) -> None:
     with tarfile.open(built[1]) as source:
         held = {name.partition("/")[2] for name in source.getnames()}
-    needed = {
-        str(path.relative_to(ROOT)) for path in tracked(*SHIPPED, *SAMPLES, "pyproject.toml", "LICENSE", "README.md")
-    }
+    files = tracked(*SHIPPED, *SAMPLES, "pyproject.toml", "LICENSE", "README.md")
+    needed = {str(path.relative_to(ROOT)) for path in files}
     assert needed - held == set()
     assert not [name for name in held if name.startswith((".venv", "tests", "archive/"))]
 
 
 def test_every_file_that_is_used_by_name_is_read_from_the_wheel(unpacked: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", LOADS],
-        cwd=tmp_path,
-        env=own_environment(PYTHONPATH=str(unpacked)),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    pipes = {"env": own_environment(PYTHONPATH=str(unpacked)), "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, "-c", LOADS], cwd=tmp_path, check=False, **pipes)
     assert done.returncode == 0, done.stderr
     loaded = json.loads(done.stdout)
     assert loaded.pop("from") == [str(unpacked)]

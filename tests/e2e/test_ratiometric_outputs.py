@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from in_process import command
+from each import each
+from in_process import given, refused, text_of
 from root_process import ROOT
 from small_station import lot_of, plant_of, station_of
 
@@ -50,24 +51,21 @@ def readings(plant, at_s: list[int]) -> np.ndarray:
     return np.array(rows) / plant.preset.supply_V
 
 
-def test_the_supply_of_each_slot_drifts_and_its_output_with_it():
-    drifting = plant_of(station_of(supply_drift=1e-3), lot_of(device="analogue"))
-    read = readings(drifting, list(range(60, 30_000, 600)))
+def of_analogue(at_s: list[int], device: str = "analogue", **simulation: float) -> np.ndarray:
+    return readings(plant_of(station_of(**simulation), lot_of(device=device)), at_s)
+
+
+def test_the_supply_of_each_slot_drifts_and_its_output_with_it_unless_a_device_rejects_it():
+    read = of_analogue(list(range(60, 30_000, 600)), supply_drift=1e-3)
     assert np.all(read.std(axis=0) > 3e-4)
     assert np.abs(np.corrcoef(read.T)[0, 1]) < 0.9
-    steady = readings(plant_of(station_of(supply_drift=0.0), lot_of(device="analogue")), list(range(60, 6_000, 600)))
-    assert np.all(steady.std(axis=0) < 5e-5)
-
-
-def test_the_supply_of_devices_that_reject_it_is_as_it_was():
-    plain, drifting = (plant_of(station_of(supply_drift=drift), lot_of()) for drift in (0.0, 1e-3))
-    assert np.array_equal(readings(plain, [60, 6_000]), readings(drifting, [60, 6_000]))
+    assert np.all(of_analogue(list(range(60, 6_000, 600)), supply_drift=0.0).std(axis=0) < 5e-5)
+    plain, drifting = (of_analogue([60, 6_000], "ADXL355", supply_drift=drift) for drift in (0.0, 1e-3))
+    assert np.array_equal(plain, drifting)
 
 
 def test_the_meter_has_one_gain_error_for_all_slots():
-    exact, wrong = (
-        readings(plant_of(station_of(supply_reading_ppm=ppm), lot_of(device="analogue")), [60]) for ppm in (0.0, 1000.0)
-    )
+    exact, wrong = (of_analogue([60], supply_reading_ppm=ppm) for ppm in (0.0, 1000.0))
     ratio = (wrong / exact)[0]
     assert np.ptp(ratio) < 1e-6
     assert abs(ratio[0] - 1.0) > 1e-5
@@ -86,13 +84,10 @@ def test_dwells_are_referred_to_the_nominal_supply_the_level_at_0_g_included():
     assert half["out_x"] == pytest.approx(1.503 / 1.001)
 
 
-@pytest.mark.parametrize("supply", [0.0, float("nan")])
-def test_a_dwell_without_its_supply_is_refused(supply: float):
-    with pytest.raises(DataRejected, match=r"unit A, dwell 4: supply .* V, a measured supply is needed.*slot 2"):
-        at_nominal_supply(dwells(supply), FollowedSupply(3.0, 1.0))
-
-
-def test_a_ratiometric_device_without_its_nominal_supply_is_refused_by_name(tmp_path: Path):
+def test_a_supply_that_is_not_known_is_refused_by_name(tmp_path: Path):
+    for supply in (0.0, float("nan")):
+        with pytest.raises(DataRejected, match=r"unit A, dwell 4: supply .* V, a measured supply is needed.*slot 2"):
+            at_nominal_supply(dwells(supply), FollowedSupply(3.0, 1.0))
     changed(tmp_path, RECIPE.with_name("analogue.limits.toml"))
     recipe = changed(tmp_path, RECIPE, supply=("supply_V = 3.0\n", ""))
     with pytest.raises(RecipeInvalid, match=r"'stability\.supply_V': missing, station simulated measures the supply"):
@@ -102,22 +97,23 @@ def test_a_ratiometric_device_without_its_nominal_supply_is_refused_by_name(tmp_
 def test_the_supply_counts_with_the_level_at_0_g():
     job = Request(recipe=str(RECIPE), station=STATION).job()
     terms = planned_terms(job.recipe, job.station, job.limits)
-    reaches = reachable(without_noise(job.recipe, job.station), terms, job.recipe.effects)
-    own = {(one.quantity, one.axis): one.parts.get("supply", 0.0) for one in reaches}
-    assert own["bias", "x"] == pytest.approx(20.0 * 5.0, rel=1e-3)  # 20 ppm of 1.5 V / 0.3 V/g
-    assert own["scale", "x"] == pytest.approx(20.0, rel=1e-3)
     half = replace(terms, stability=terms.stability.model_copy(update={"ratiometric": 0.5}))
-    assert reachable(without_noise(job.recipe, job.station), half, job.recipe.effects)[0].parts[
-        "supply"
-    ] == pytest.approx(50.0, rel=1e-3)
+
+    def supply(terms) -> dict[tuple[str, str], float]:
+        reaches = reachable(without_noise(job.recipe, job.station), terms, job.recipe.effects)
+        return {(one.quantity, one.axis): one.parts.get("supply", 0.0) for one in reaches}
+
+    assert supply(terms)["bias", "x"] == pytest.approx(20.0 * 5.0, rel=1e-3)  # 20 ppm of 1.5 V / 0.3 V/g
+    assert supply(terms)["scale", "x"] == pytest.approx(20.0, rel=1e-3)
+    assert supply(half)["bias", "x"] == pytest.approx(50.0, rel=1e-3)
 
 
 MEASURED = 'supply = { u_ppm = 20.0, ratio_measured = true, scope = "station", source = "supply_reading_ppm of the simulation" }'
 
 
-@pytest.mark.parametrize("orchestrated", [False, True])
+@each([("--direct",), ()], repr)
 def test_limits_that_no_unit_can_meet_are_told_before_an_order_is_sent(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, orchestrated: bool
+    how: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """The supply is not measured, and the seat of 1 mrad leaves a misalignment of 1 mrad undecided: one message, no order."""
     asked: list[str] = []
@@ -126,19 +122,16 @@ def test_limits_that_no_unit_can_meet_are_told_before_an_order_is_sent(
     unmeasured = 'supply = { u_ppm = 1000.0, scope = "slot", source = "spread" }'
     station = changed(tmp_path, STATION, supply=(MEASURED, unmeasured))
     changed(tmp_path, RECIPE.with_name("analogue.limits.toml"), seat=("max = 40.0", "max = 1.0"))
-    recipe = changed(tmp_path, RECIPE)
-    words = ["run", str(recipe), "--station", str(station), "--archive", str(tmp_path / "archive")]
-    said = command([*words, *([] if orchestrated else ["--direct"])])
-    assert said.returncode == 2
-    assert len(said.stderr.strip().splitlines()) == 1
+    words = ("run", changed(tmp_path, RECIPE), "--station", station, "--archive", tmp_path / "archive")
+    status, _, told = given(*words, *how)
+    assert (status, len(told.strip().splitlines())) == (2, 1)
     for text in (
         "bias_error_ug: limit 1000 µg, U (k = 2) 10600 µg (supply 100 %)",
         "misalignment_mrad: limit 1 mrad, U (k = 2) 2 mrad (seat of the fixture 100 %)",
-        "nothing was moved",
-        "analogue.limits.toml",
+        "nothing was moved", "analogue.limits.toml",
         "measure that of each slot, supply = { u_ppm = …, ratio_measured = true }",
-    ):
-        assert text in said.stderr
+    ):  # fmt: skip
+        assert text in told
     assert not asked
     assert not (tmp_path / "archive" / "captures").exists()
 
@@ -202,18 +195,14 @@ def test_a_recording_at_another_supply_is_corrected_to_the_same_force(lots: list
     raw = own[columns].assign(supply_V=2.97)  # the dwells are at 3 V: at 2.97 V each output is a hundredth lower
     raw[["out_x", "out_y", "out_z"]] *= 0.99
     raw.to_csv(tmp_path / "raw.csv", index=False)
-    words = ["--calibration", f"{lot.run.id}:C0", "--archive", str(lot.run.path.parents[1]), "--failed"]
-    out = tmp_path / "corrected.csv"
-    done = command(["correct", str(tmp_path / "raw.csv"), *words, "--output", str(out)])
-    assert done.returncode == 0, done.stderr
-    force = pd.read_csv(out)[[f"force_{axis}_g" for axis in AXES]].to_numpy()
+    archive = ("--archive", lot.run.path.parents[1], "--failed")
+    correct = ("--calibration", f"{lot.run.id}:C0", *archive)
+    text_of("correct", tmp_path / "raw.csv", *correct, "--output", tmp_path / "corrected.csv", status=0)
+    force = pd.read_csv(tmp_path / "corrected.csv")[[f"force_{axis}_g" for axis in AXES]].to_numpy()
     assert np.abs(force - own[[f"force_{axis}" for axis in AXES]].to_numpy()).max() < 1e-3
     raw.drop(columns="supply_V").to_csv(tmp_path / "bare.csv", index=False)
-    refused = command(["correct", str(tmp_path / "bare.csv"), *words])
-    assert refused.returncode == 2
-    assert "add a column supply_V" in refused.stderr
-    exported = command(["export", lot.run.id, *words[2:], "--format", "json"])
-    assert "the coefficients hold at 3 V of supply" in exported.stderr
+    assert "add a column supply_V" in refused("correct", tmp_path / "bare.csv", *correct)
+    assert "the coefficients hold at 3 V of supply" in given("export", lot.run.id, *archive, "--format", "json")[2]
 
 
 def test_the_noise_of_a_sample_is_the_density_times_the_root_of_the_filters_bandwidth():

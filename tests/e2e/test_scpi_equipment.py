@@ -1,17 +1,28 @@
 """Equipment by SCPI on its line: the level loop of the exciter, refusals, safe states; adapters that know no plant."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
+from each import each
 from root_process import ROOT
 from small_station import lot_of
 
 from inertial.dynamics.sine_fit import fit_tone
+from pipelines.archive import Archive
+from pipelines.capture.capture import capture
+from pipelines.jobs.recipes import load_recipe
+from pipelines.procedures import PROCEDURES, parts_of
+from pipelines.procedures.recorded import nominal_device, procedure_record
+from pipelines.schedule.steps import steps
 from schemas.errors import OperatorNeeded, StationRefused
 from schemas.fault import FaultOrder
+from schemas.lot import Lot, Unit
+from schemas.progress import silent
 from schemas.station import load_station, with_faults
 from schemas.station_devices import Device, Equipment
 from stations import open_station
@@ -19,19 +30,28 @@ from stations.clock import Clock
 from stations.devices.families.scpi_supply import ScpiSupply
 from stations.devices.recording import RecordingSpoilt
 from stations.devices.values import Values
+from stations.station import Station
 
 FAMILIES = ROOT / "stations" / "devices" / "families"
 
 
-def station_of(faults: list[FaultOrder] | None = None):
-    """The built-in station with the generator before its exciter."""
-    own = Equipment(exciter=Device(profile="scpi_exciter", device_id=241, link="ascii"))
-    return with_faults(load_station().model_copy(update={"equipment": own}), faults or [])
+EXCITER = {"exciter": Device(profile="scpi_exciter", device_id=241, link="ascii")}
+SHOCK_MACHINE = {"shock_machine": Device(profile="modbus_shock", device_id=60, link="tcp")}
 
 
-@pytest.mark.parametrize(("frequency", "level"), [(20.0, 0.3), (160.0, 2.0), (900.0, 5.0)])
-def test_the_level_of_an_open_loop_generator_is_reached(frequency: float, level: float) -> None:
-    with open_station(station_of(), lot_of(1), roles=["exciter"]) as station:
+@contextmanager
+def opened(equipment: dict[str, Device], *faults: str, units: int = 1) -> Iterator[Station]:
+    """The built-in station with this equipment, and faults of it."""
+    config = load_station().model_copy(update={"equipment": Equipment(**equipment)})
+    orders = [FaultOrder(kind=kind) for kind in faults]
+    with open_station(with_faults(config, orders), lot_of(units), roles=[*equipment]) as station:
+        yield station
+
+
+@each([(20.0, 0.3), (160.0, 2.0), (900.0, 5.0)])
+def test_the_level_of_an_open_loop_generator_is_reached(case: tuple[float, float]) -> None:
+    frequency, level = case
+    with opened(EXCITER) as station:
         recording = station.equipment["exciter"].sine(frequency, level, 2, 0.2, [0])
         tone = fit_tone(recording.reference, recording.reference_rate_hz, frequency)
         assert abs(tone.value[2]) == pytest.approx(level, rel=0.12)
@@ -39,13 +59,9 @@ def test_the_level_of_an_open_loop_generator_is_reached(frequency: float, level:
 
 
 def test_a_level_beyond_the_exciter_and_a_missed_trigger_give_no_recording() -> None:
-    with (
-        open_station(station_of(), lot_of(1), roles=["exciter"]) as station,
-        pytest.raises((OperatorNeeded, RecordingSpoilt)),
-    ):
+    with opened(EXCITER) as station, pytest.raises((OperatorNeeded, RecordingSpoilt)):
         station.equipment["exciter"].sine(5.0, 5.0, 2, 0.2, [0])
-    missed = station_of([FaultOrder(kind="missed_trigger")])
-    with open_station(missed, lot_of(1), roles=["exciter"]) as station, pytest.raises(RecordingSpoilt, match="trigger"):
+    with opened(EXCITER, "missed_trigger") as station, pytest.raises(RecordingSpoilt, match="trigger"):
         station.equipment["exciter"].sine(80.0, 1.0, 2, 0.1, [0])
 
 
@@ -84,33 +100,23 @@ class Queue:
             self.set = float(str(value))
 
 
-def test_errors_of_earlier_users_of_a_supply_are_not_those_of_our_orders() -> None:
-    queue = Queue([-113, -222, -410])
-    supply = ScpiSupply(cast("Values", queue), cast("Clock", SimpleNamespace(sleep=lambda seconds: None)))
+def supply_with(codes: list[int]) -> tuple[Queue, ScpiSupply]:
+    queue = Queue(codes)
+    return queue, ScpiSupply(cast("Values", queue), cast("Clock", SimpleNamespace(sleep=lambda seconds: None)))
+
+
+def test_errors_of_earlier_users_of_a_supply_are_not_those_of_our_orders_unless_they_never_end() -> None:
+    queue, supply = supply_with([-113, -222, -410])
     assert supply.set_voltage(3.0) == pytest.approx(3.0 / 3.3)
     queue.codes.append(-222)
     with pytest.raises(StationRefused, match=r"error -222 at 2\.8 V"):
         supply.set_voltage(2.8)
-
-
-def test_a_supply_whose_errors_never_end_is_refused() -> None:
-    supply = ScpiSupply(
-        cast("Values", Queue([-350] * 1000)), cast("Clock", SimpleNamespace(sleep=lambda seconds: None))
-    )
+    _, endless = supply_with([-350] * 1000)
     with pytest.raises(StationRefused, match="queue is not empty, an end is needed"):
-        supply.set_voltage(3.0)
+        endless.set_voltage(3.0)
 
 
 def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:
-    from pipelines.archive import Archive
-    from pipelines.capture.capture import capture
-    from pipelines.jobs.recipes import load_recipe
-    from pipelines.procedures import PROCEDURES, parts_of
-    from pipelines.procedures.recorded import nominal_device, procedure_record
-    from pipelines.schedule.steps import steps
-    from schemas.lot import Lot, Unit
-    from schemas.progress import silent
-
     path = tmp_path / "recipe.toml"
     path.write_text(
         'name = "generator"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n[[procedures]]\n'
@@ -122,7 +128,8 @@ def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:
         Lot(units=[Unit(serial="G1", slot=0)], device="SF1500", seed=3),
         Archive(tmp_path / "a").capture("one"),
     )
-    with open_station(station_of(), lot, roles=["exciter"]) as station:
+    config = load_station().model_copy(update={"equipment": Equipment(**EXCITER)})
+    with open_station(config, lot, roles=["exciter"]) as station:
         capture(station, recipe, lot, records, progress=silent, events=records.events)
     readings = records.gathered("readings")
     part, plan = parts_of(recipe)[0], steps(recipe)
@@ -135,32 +142,26 @@ def test_a_sweep_runs_on_the_generator(tmp_path: Path) -> None:
     assert points["value"].iloc[3] == pytest.approx(0.007, rel=0.02)
 
 
-def shock_station(faults: list[FaultOrder] | None = None):
-    """The built-in station with a shock machine that holds registers."""
-    own = Equipment(shock_machine=Device(profile="modbus_shock", device_id=60, link="tcp"))
-    return with_faults(load_station().model_copy(update={"equipment": own}), faults or [])
-
-
 def test_a_shock_machine_by_modbus_is_armed_released_and_read() -> None:
-    with open_station(shock_station(), lot_of(2), roles=["shock_machine"]) as station:
+    with opened(SHOCK_MACHINE, units=2) as station:
         recording = station.equipment["shock_machine"].shock(30.0, 0.011, 2, -1, [0, 1])
         assert float(recording.reference[:, 2].min()) == pytest.approx(-30.0, rel=0.15)
         assert set(recording.outputs) == {0, 1}
         assert "shock machine stopped" in station.make_safe().done
 
 
-@pytest.mark.parametrize(
-    ("kind", "error", "text"),
-    [
-        ("guard_door", OperatorNeeded, "guard door is open"),
-        ("missed_trigger", RecordingSpoilt, "trigger was missed"),
-        ("level_not_reached", RecordingSpoilt, "was ordered"),
-    ],
-)
-def test_trouble_at_a_shock_machine_by_modbus_gives_no_recording(kind: str, error: type, text: str) -> None:
-    station = shock_station([FaultOrder(kind=kind)])
-    with open_station(station, lot_of(1), roles=["shock_machine"]) as opened, pytest.raises(error, match=text):
-        opened.equipment["shock_machine"].shock(30.0, 0.011, 2, 1, [0])
+TROUBLE = {
+    "guard_door": (OperatorNeeded, "guard door is open"),
+    "missed_trigger": (RecordingSpoilt, "trigger was missed"),
+    "level_not_reached": (RecordingSpoilt, "was ordered"),
+}
+
+
+@each(TROUBLE)
+def test_trouble_at_a_shock_machine_by_modbus_gives_no_recording(kind: str) -> None:
+    error, text = TROUBLE[kind]
+    with opened(SHOCK_MACHINE, kind) as station, pytest.raises(error, match=text):
+        station.equipment["shock_machine"].shock(30.0, 0.011, 2, 1, [0])
 
 
 def test_production_adapters_of_equipment_know_no_plant() -> None:

@@ -9,6 +9,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from each import each
 from in_process import command
 from typed_commands import printed_commands
 
@@ -90,39 +91,45 @@ def test_the_quickest_recipe_passes_and_its_next_lines_can_be_pasted(tmp_path: P
     assert "4 of 4 passed" in out
     assert pasted(out, tmp_path) == 2
     for form in ("ardupilot", "betaflight"):  # by the nominal scale of the preset
-        text, err = went("export", "latest", "--format", form, "--units", "LN-01", "--archive", tmp_path)
+        text, _ = went("export", "latest", "--format", form, "--units", "LN-01", "--archive", tmp_path)
         assert "256000 LSB" in text
         assert "certificate LN-01/1" in text
-        del err
 
 
-@pytest.mark.parametrize(
-    "recipe", [*(pytest.param(one, marks=pytest.mark.slow, id=named(one)) for one in RECIPES), *PROCEDURES], ids=named
-)
-@pytest.mark.parametrize("station", STATIONS, ids=named)
-def test_a_recipe_can_be_planned_on_a_station_or_is_refused_by_name(recipe: Path, station: Path) -> None:
+@each([(recipe, station) for recipe in PROCEDURES for station in STATIONS], lambda case: " on ".join(map(named, case)))
+def test_a_procedure_can_be_planned_on_a_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
+    planned_or_refused(*case)
+
+
+@pytest.mark.slow
+@each([(recipe, station) for recipe in RECIPES for station in STATIONS], lambda case: " on ".join(map(named, case)))
+def test_a_recipe_can_be_planned_on_a_station_or_is_refused_by_name(case: tuple[Path, Path]) -> None:
+    planned_or_refused(*case)
+
+
+def planned_or_refused(recipe: Path, station: Path) -> None:
     """What a station cannot do is said before it moves: by the plan, with a reason."""
     _, err = went("plan", recipe, "--station", station, allowed=(0, PART_FAILED, UNUSABLE))
     for line in err.splitlines():
         assert line.startswith(("warning: 'tumbleline run' refuses this recipe: ", "tumbleline: ")), line
 
 
+SIMULATED = [path for path in STATIONS if load_station(path).kind == "simulated"]
+ANALOGUE = DEPLOY / "recipes" / "analogue.toml"
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("recipe", RECIPES, ids=named)
-def test_a_recipe_runs_on_the_built_in_station(recipe: Path, tmp_path: Path) -> None:
-    went("plan", recipe)
-    out, _ = went("run", recipe, "--direct", "--archive", tmp_path, allowed=(0, PART_FAILED))
+@pytest.mark.parametrize(
+    ("recipe", "station"),
+    [*((recipe, None) for recipe in RECIPES), *((recipe, at) for recipe in (QUICKEST, ANALOGUE) for at in SIMULATED)],
+    ids=lambda path: path.stem if path else "built-in",
+)
+def test_a_recipe_runs_on_the_built_in_station_and_the_quickest_on_every_simulated_one(
+    recipe: Path, station: Path | None, tmp_path: Path
+) -> None:
+    where = ("--station", station) if station else ()
+    out, _ = went("run", recipe, *where, "--direct", "--archive", tmp_path, allowed=(0, PART_FAILED))
     assert re.search(r"\d of \d passed, \d failed, 0 refused", out)
     assert pasted(out, tmp_path) >= 1
     went("export", "latest", "--failed", "--archive", tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(900)
-@pytest.mark.parametrize("recipe", [QUICKEST, DEPLOY / "recipes" / "analogue.toml"], ids=named)
-@pytest.mark.parametrize("station", [path for path in STATIONS if load_station(path).kind == "simulated"], ids=named)
-def test_a_recipe_runs_on_every_simulated_station(recipe: Path, station: Path, tmp_path: Path) -> None:
-    out, _ = went("run", recipe, "--station", station, "--direct", "--archive", tmp_path, allowed=(0, PART_FAILED))
-    assert re.search(r"\d of \d passed, \d failed, 0 refused", out)
-    assert pasted(out, tmp_path) >= 1

@@ -13,41 +13,13 @@ import pytest
 from browser import Served, Tab, served, tab, until
 from capture_double import recipe_file, small_run
 from in_process import document_of, text_of
-from numpy.typing import NDArray
 
-from inertial import poses
-from inertial.frames import force_from_angles
 from pipelines.jobs.recipes import load_recipe
 
 SCRIPT = "<img src=x onerror=window.ran=1>"
-LONG = "L" * 64
 PAGES = (
     "/units", "/run?run=latest", "/unit?run=latest", "/missing", "/upload", "/operator", "/models", "/plan", "/station", "/audit",
 )  # fmt: skip
-
-
-def lot_with_a_hardening_spring(path: Path, seed: int) -> None:
-    """Dwells of three units whose mass is held by a spring with f = x + h·x³, solved for x; 4 µg of noise."""
-    rng = np.random.default_rng(seed)
-    outer, inner = np.radians(np.concatenate([poses.plan("fibonacci24")] * 2)).T
-    force = force_from_angles(outer, inner)
-    parts = []
-    for unit, serial in enumerate((LONG, "SP-1", "SP-2")):
-        output = displaced(force, 60e-6) + 1e-3 * (unit + 1) + 4e-6 * rng.normal(size=force.shape)
-        columns = {f"{name}_{axis}": values[:, k] for name, values in (("out", output), ("force", force))
-                   for k, axis in enumerate("xyz")}  # fmt: skip
-        humidity = {SCRIPT: 45.0 + rng.normal(size=len(force))}
-        parts.append(pd.DataFrame({"unit": serial, "dwell": range(len(force)), **columns, **humidity, "n": 100}))
-    table = pd.concat(parts).assign(time_s=lambda dwells: 10.0 * dwells["dwell"])
-    table.assign(sd_x=4e-5, sd_y=4e-5, sd_z=4e-5).to_csv(path, index=False)
-
-
-def displaced(force: NDArray[np.float64], hardening: float) -> NDArray[np.float64]:
-    """Displacement x with force = x + h·x³, by Newton."""
-    x = force.copy()
-    for _ in range(20):
-        x -= (x + hardening * x**3 - force) / (1.0 + 3.0 * hardening * x**2)
-    return x
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +28,6 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     small_run(top)
     folder = top / "bench"
     folder.mkdir()
-    lot_with_a_hardening_spring(folder / "dwells.csv", 1)
-    lot_with_a_hardening_spring(folder / "fresh.csv", 2)
     with served(top / "archive", folder) as one:
         yield one
 
@@ -87,46 +57,6 @@ def test_the_browser_of_these_tests_reaches_nothing_outside_and_notes_what_is_as
             with pytest.raises(Exception, match="ERR_PROXY_CONNECTION_FAILED"):
                 one.page.goto(place)
         assert one.outside == ["http://192.0.2.1/", "http://example.org/"]
-
-
-@pytest.mark.slow
-def test_a_hidden_effect_is_found_added_confirmed_and_taken_out_again(
-    bench: Served, browser: Any, pictures: Path
-) -> None:
-    source = urllib.parse.quote(str(bench.folder / "dwells.csv"))
-    with tab(browser, bench.address) as one:
-        one.open(f"/missing?source={source}")
-        assert "; missing: third_order" in one.page.inner_text(".verdict")
-        one.press("text=as the fresh measurement")
-        one.sees("[data-version='1']")
-        one.shot(pictures, "story-before")
-        one.press("[data-add='third_order']")
-        one.sees("[data-version='2']")
-        one.ready()
-        assert one.page.inner_text(".verdict").startswith("ADEQUATE")
-        errors = [float(one.page.get_attribute(f"[data-version='{k}']", "data-fresh") or "nan") for k in (1, 2)]
-        assert 8.0 < errors[0] < 16.0  # the cubic of 60 µg, as a plain fit leaves it
-        assert errors[1] < 5.5
-        assert "confirmed" in one.page.inner_text("#errors")
-        one.shot(pictures, "story-after")
-        assert one.findings() == []
-        one.page.fill("input[name=name]", "line-1")
-        one.page.fill("input[name=why]", "the fresh run confirms it")
-        one.press("text=Save >> nth=-1")
-        one.sees(".done:not([hidden])")
-        saved = (bench.folder / "models" / "line-1.toml").read_text()
-        assert "third_order" in saved
-        assert "the fresh run confirms it" in saved
-        one.press("[data-undo]")
-        until(lambda: "; missing: third_order" in one.page.inner_text(".verdict"), "the effect is out of the model")
-        one.page.go_back()
-        until(
-            lambda: one.page.inner_text(".verdict").startswith("ADEQUATE"),
-            "the way back leads to the model with the effect",
-        )
-        assert one.page.evaluate("() => window.ran") is None  # a column is called like a script
-        assert one.outside == []
-        assert one.errors == []
 
 
 def test_a_model_is_evaluated_on_the_archive_and_released_only_if_it_is_better(
@@ -244,9 +174,8 @@ def test_a_click_on_a_residual_shows_the_samples_of_its_dwell(bench: Served, bro
 
 
 def test_a_browser_without_the_token_may_look_and_not_compute(bench: Served, browser: Any) -> None:
-    source = urllib.parse.quote(str(bench.folder / "fresh.csv"))
     with tab(browser, bench.address, token=False) as one:
-        one.page.goto(f"{bench.address}/missing?source={source}")
+        one.page.goto(f"{bench.address}/missing?source=latest")
         until(lambda: "has read access only" in one.page.inner_text("main"), "the page says why nothing begins")
 
 

@@ -49,6 +49,18 @@ def test_the_demonstration_from_its_measurement_to_the_error_falling(
         fresh = [float(one.page.get_attribute(f"[data-version='{k}']", "data-fresh") or "nan") for k in (1, 2)]
         assert fresh[1] < 0.6 * fresh[0]
         assert "confirmed" in one.page.inner_text("#errors")
+        assert one.findings() == []
+        one.page.fill("input[name=name]", "line-1")
+        one.page.fill("input[name=why]", "the fresh run confirms it")
+        one.press("text=Save >> nth=-1")
+        one.sees(".done:not([hidden])")
+        saved = (folder / "models" / "line-1.toml").read_text()
+        assert "third_order" in saved
+        assert "the fresh run confirms it" in saved
+        one.press("[data-undo]")
+        until(lambda: "; missing: third_order" in one.page.inner_text(".verdict"), "the effect is out of the model")
+        one.page.go_back()
+        until(lambda: one.page.inner_text(".verdict").startswith("ADEQUATE"), "the way back leads to the model with it")
         assert one.outside == [] == one.errors
 
 
