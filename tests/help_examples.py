@@ -15,29 +15,11 @@ import pandas as pd
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding
 from in_process import command
+from laboratory import LABORATORY
 from signing_keys import made_key, pem
 
 from pipelines.cli import COMMANDS
 
-LABORATORY = """
-[laboratory]
-name = "Example Sensor Works"
-address = "Am Kornfeld 7, 38116 Braunschweig"
-country = "DE"
-email = "calibration@example.com"
-
-[customer]
-name = "Example Drones Ltd"
-address = "12 Mill Lane, Cambridge"
-email = "quality@example.org"
-
-[signatory]
-name = "J. Example"
-role = "Head of calibration"
-
-[item]
-manufacturer = "Analog Devices"
-"""
 ROOT = Path(__file__).resolve().parents[1]
 UNITS = "SN1,SN2,SN3"
 RECIPES = ROOT / "deploy" / "recipes"

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from each import each
 from in_process import document_of, given, refused, text_of
+from laboratory import LABORATORY
 from scipy.spatial.transform import Rotation
 
 from benchmarks.made_recordings import Recording, make, samples_of
@@ -23,12 +24,6 @@ DWELLS = f"{COLUMNS},sd_x=sd_x,sd_y=sd_y,sd_z=sd_z,n=n,duration=duration_s"
 PLAIN = "bias,scale,misalignment"
 BENCH = 'name = "bench"\nrule = "simple_acceptance"\n[figures]\nresidual_rms_ug = { max = 300.0, unit = "µg" }\n'
 DRIFTING = Recording(60, "white 280, B 30", warm_up=3000.0, sensor=11)
-LABORATORY = """\
-laboratory = { name = "L", address = "A", email = "a@b.c", country = "DE" }
-customer = { name = "L", address = "A", email = "a@b.c" }
-signatory = { name = "S", role = "R" }
-item = { manufacturer = "M" }
-"""
 REFERENCES = """\
 name = "lab-2"
 

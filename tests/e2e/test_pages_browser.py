@@ -1,5 +1,6 @@
-"""Pages in a real browser: nothing is clipped at 1280 px, dark mode is dark, and every unit is printed on a page of its own."""
+"""Pages in a real browser, from a file and without a network: nothing is clipped, dark is dark, figures are drawn and printed."""
 
+import io
 import re
 from pathlib import Path
 from typing import Any
@@ -8,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pypdfium2
 import pytest
-from capture_double import SMALL, recipe_file, small_run
-from typer.testing import CliRunner
+from browser import until
+from capture_double import recipe_file, small_run
+from in_process import text_of
 
 from inertial import poses
 from inertial.frames import force_from_angles
 from pipelines.archive import Run
-from pipelines.cli import app
 from pipelines.report import make_report
 from pipelines.report.context import ReportContext
 from pipelines.report.panels import unit_by_unit
@@ -64,17 +65,15 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 def pages(run: Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The pages of the product, each written by its command."""
     folder = tmp_path_factory.mktemp("pages")
-    recipe = recipe_file(folder)
-    archive = str(run.archive.root)
-    commands: dict[str, list[str]] = {
-        "plan": ["plan", recipe, "--page", str(folder / "plan.html")],
-        "audit": ["audit", "--archive", archive, "--page", str(folder / "audit.html")],
-        "diagnosis": ["diagnose", str(one_soak(folder)), "--report", str(folder / "diagnosis.html")],
+    commands = {
+        "plan": ("plan", recipe_file(folder), "--page"),
+        "audit": ("audit", "--archive", run.archive.root, "--page"),
+        "diagnosis": ("diagnose", one_soak(folder), "--report"),
     }
-    for words in commands.values():
-        result = CliRunner().invoke(app, words)
-        assert result.exit_code in {0, 1}, result.output
-    return {"report": Path(str(run.report)), **{name: folder / f"{name}.html" for name in commands}}
+    made = {name: folder / f"{name}.html" for name in commands}
+    for name, words in commands.items():
+        text_of(*words, made[name])
+    return {"report": Path(str(run.report)), **made}
 
 
 def one_soak(folder: Path) -> Path:
@@ -160,11 +159,10 @@ def test_a_page_fits_a4(browser: Any, pages: dict[str, Path], name: str, tmp_pat
     assert pdf(browser, pages[name], tmp_path)[0].strip()
 
 
-def test_a_run_of_one_soak_has_no_caption_without_a_picture(browser: Any, pages: dict[str, Path]) -> None:
+def test_a_run_of_one_soak_has_no_caption_without_a_picture(pages: dict[str, Path]) -> None:
     text = pages["diagnosis"].read_text(encoding="utf-8")
     assert "ADEQUATE" in text
     assert "reached heating" not in text
-    assert "temperatures_C" in SMALL
 
 
 def pdf(browser: Any, path: Path, folder: Path) -> list[str]:
@@ -176,3 +174,74 @@ def pdf(browser: Any, path: Path, folder: Path) -> list[str]:
     page.close()
     document = pypdfium2.PdfDocument(str(target))
     return [one.get_textpage().get_text_range() for one in document]
+
+
+SHOWN = """() => [...document.querySelectorAll(".figure")].filter((e) => e.checkVisibility()).map((e) => [
+    e.querySelector(":scope > svg").checkVisibility(), Boolean(e.querySelector(".live .main-svg")?.checkVisibility())])"""
+
+
+class Opened:
+    """A report in a page of its own, with what it asked for and what went wrong."""
+
+    def __init__(self, browser: Any, place: Path, **options: Any) -> None:
+        self.asked: list[str] = []
+        self.errors: list[str] = []
+        self.page = browser.new_context(viewport={"width": 1280, "height": 6000}, **options).new_page()
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("pageerror", lambda problem: self.errors.append(str(problem)))
+        self.page.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
+        self.page.goto(place.as_uri())
+
+    def shown(self) -> list[list[bool]]:
+        """Of every visible figure: whether its picture and its drawn figure are seen."""
+        return self.page.evaluate(SHOWN)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_figures_are_drawn_on_a_screen_and_pictures_are_printed(
+    browser: Any, pages: dict[str, Path], theme: str
+) -> None:
+    report = pages["report"]
+    one = Opened(browser, report, color_scheme=theme)
+    until(
+        lambda: one.shown() and all(live and not still for still, live in one.shown()), "all visible figures are drawn"
+    )
+    assert one.page.locator(".live .modebar").count() >= 3
+    for word in ("hare", "loud", "Send"):
+        assert one.page.locator(f".modebar-btn[data-title*='{word}']").count() == 0
+    one.page.locator(".live .scatterlayer .point").first.hover(force=True)
+    until(lambda: one.page.locator(".hovertext").count() > 0, "a point says what it is")
+    one.page.emulate_media(media="print")
+    shown = one.shown()
+    assert shown
+    assert all(still and not live for still, live in shown)
+    one.page.emulate_media(media="screen")
+    unit = one.page.locator("details.unit:not([open])").first
+    unit.locator("summary").click()
+    figure = one.page.locator("details.unit[open]").nth(1).locator(".figure").last
+    figure.scroll_into_view_if_needed()
+    until(figure.locator(".live .main-svg").first.is_visible, "the figures of a unit that is opened are drawn")
+    assert one.page.evaluate("() => document.documentElement.scrollWidth") <= 1280
+    assert one.asked == [report.as_uri()]
+    assert one.errors == []
+
+
+def test_without_scripts_the_pictures_stay(browser: Any, pages: dict[str, Path]) -> None:
+    one = Opened(browser, pages["report"], java_script_enabled=False)
+    first = one.page.locator(".figure > svg").first
+    assert first.is_visible()
+    image = pytest.importorskip("PIL.Image").open(io.BytesIO(first.screenshot()))
+    colours = {colour for _, colour in image.convert("RGB").getcolors(maxcolors=1 << 24)}
+    assert (0x00, 0x72, 0xB2) in colours  # points are there, not axes alone
+    assert one.page.locator(".figure > .live").first.is_hidden()
+
+
+def test_a_script_that_is_slipped_in_does_not_run(browser: Any, pages: dict[str, Path], tmp_path: Path) -> None:
+    changed = tmp_path / "changed.html"
+    text = pages["report"].read_text(encoding="utf-8")
+    changed.write_text(
+        text.replace("<body>", "<body><script>window.ran = true</script><img src=x onerror='window.ran = true'>", 1)
+    )
+    one = Opened(browser, changed)
+    until(lambda: one.shown() and all(live for _, live in one.shown()), "the figures are drawn all the same")
+    assert one.page.evaluate("() => window.ran === undefined")

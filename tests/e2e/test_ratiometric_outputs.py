@@ -233,13 +233,5 @@ def test_a_plan_counts_the_noise_that_sampling_folds():
     assert means.std() == pytest.approx(slow / np.sqrt(2.0), rel=0.05)
 
 
-def test_each_axis_has_a_bias_of_its_own_distribution():
-    plants = [plant_of(lot=lot_of(8, "analogue", seed=seed)) for seed in range(12)]
-    bias = np.array([plant.truth(serial).bias_g for plant in plants for serial in plant.serials])
-    preset = load_preset("analogue")
-    assert bias.mean(axis=0) == pytest.approx(preset.bias_mean_g, abs=0.015)
-    assert bias.std(axis=0) == pytest.approx(preset.bias_sd_g, rel=0.2)
-
-
 def test_the_built_in_station_states_the_same_as_its_file():
     assert load_station().uncertainty == load_station(STATION).uncertainty
