@@ -18,6 +18,7 @@ from root_process import ROOT
 from served_station import modbus_station, served, station_file
 from small_station import lot_of
 
+from inertial import effects
 from pipelines.archive import Archive
 from pipelines.serving.listening import listening_socket
 from schemas.errors import WrongUse
@@ -68,10 +69,11 @@ def test_an_error_in_a_users_effect_names_file_class_and_line(what: str, measure
     path = tmp_path / "own.py"
     path.write_text(WHOLE.replace(old, new) if old else WHOLE, encoding="utf-8")
     words = ("compare", "latest", "--archive", measured.root, "--effects", "bias,scale,misalignment,glue")
-    if not what:
-        text_of(*words, "--effect-file", path)  # it is judged
-        return
-    told = refused(*words, "--effect-file", path)
+    with effects.additions_forgotten():
+        if not what:
+            text_of(*words, "--effect-file", path)  # it is judged
+            return
+        told = refused(*words, "--effect-file", path)
     assert str(path) in told
     assert message in told
     assert what not in {"shape", "coefficients"} or "1) is needed (…, dwells, coefficients" in told

@@ -1,5 +1,6 @@
 """What README, guides and explanations tell is so: commands, options, targets of make, files, figures, pictures."""
 
+import hashlib
 import json
 import re
 import shlex
@@ -23,6 +24,7 @@ from inertial.state import State
 from pipelines.audit.rules import Rules, load_rules
 from pipelines.audit.sql import VIEWS
 from pipelines.demo.scenes import SCENES
+from pipelines.importers.exchange import read_dwells
 from pipelines.jobs.recipes import load_limits, load_recipe
 from pipelines.jobs.seating import Seating, read_seating
 from pipelines.procedures import PROCEDURES, figures_of_recipe, parts_of, refuse_unusable
@@ -238,6 +240,8 @@ def test_the_mapping_file_of_the_guide_to_imports_does_what_its_options_do(share
     file = shared_data / "xsens-tumble" / "xsens_acc.mat.gz"
     by_file = document_of("import", file, "--mapping", "mapping.toml", "--fit", "norm")
     assert json.dumps(by_file) == json.dumps(by_options)
+    assert by_file["source"]["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert len(read_dwells(by_file["run"])) == by_file["dwells"] == 38
     # 1.0 mm/s² without weights was published, 1.1 with the noise of each dwell
     assert by_options["adequate"] is True
     assert by_options["error"]["rms_ug"] < 112.0
