@@ -16,7 +16,7 @@ from in_process import text_of
 from inertial import poses
 from inertial.frames import force_from_angles
 from pipelines.archive import Run
-from pipelines.report import make_report
+from pipelines.report import make_report, render
 from pipelines.report.context import ReportContext
 from pipelines.report.panels import unit_by_unit
 
@@ -180,6 +180,15 @@ SHOWN = """() => [...document.querySelectorAll(".figure")].filter((e) => e.check
     e.querySelector(":scope > svg").checkVisibility(), Boolean(e.querySelector(".live .main-svg")?.checkVisibility())])"""
 
 
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of a run whose units have all passed."""
+    folder = tmp_path_factory.mktemp("report")
+    path = folder / "report.html"
+    path.write_text(render(small_run(folder)), encoding="utf-8")
+    return path
+
+
 class Opened:
     """A report in a page of its own, with what it asked for and what went wrong."""
 
@@ -198,10 +207,7 @@ class Opened:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_figures_are_drawn_on_a_screen_and_pictures_are_printed(
-    browser: Any, pages: dict[str, Path], theme: str
-) -> None:
-    report = pages["report"]
+def test_figures_are_drawn_on_a_screen_and_pictures_are_printed(browser: Any, report: Path, theme: str) -> None:
     one = Opened(browser, report, color_scheme=theme)
     until(
         lambda: one.shown() and all(live and not still for still, live in one.shown()), "all visible figures are drawn"
@@ -226,8 +232,8 @@ def test_figures_are_drawn_on_a_screen_and_pictures_are_printed(
     assert one.errors == []
 
 
-def test_without_scripts_the_pictures_stay(browser: Any, pages: dict[str, Path]) -> None:
-    one = Opened(browser, pages["report"], java_script_enabled=False)
+def test_without_scripts_the_pictures_stay(browser: Any, report: Path) -> None:
+    one = Opened(browser, report, java_script_enabled=False)
     first = one.page.locator(".figure > svg").first
     assert first.is_visible()
     image = pytest.importorskip("PIL.Image").open(io.BytesIO(first.screenshot()))
@@ -236,9 +242,9 @@ def test_without_scripts_the_pictures_stay(browser: Any, pages: dict[str, Path])
     assert one.page.locator(".figure > .live").first.is_hidden()
 
 
-def test_a_script_that_is_slipped_in_does_not_run(browser: Any, pages: dict[str, Path], tmp_path: Path) -> None:
+def test_a_script_that_is_slipped_in_does_not_run(browser: Any, report: Path, tmp_path: Path) -> None:
     changed = tmp_path / "changed.html"
-    text = pages["report"].read_text(encoding="utf-8")
+    text = report.read_text(encoding="utf-8")
     changed.write_text(
         text.replace("<body>", "<body><script>window.ran = true</script><img src=x onerror='window.ran = true'>", 1)
     )
