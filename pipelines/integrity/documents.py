@@ -13,6 +13,7 @@ class IntegrityFindingDocument(TypedDict):
     kind: Literal["changed", "missing", "edited", "foreign", "newer", "unreadable", "signature", "unchained"]
     path: Annotated[str, "below the archive's root"]
     message: str
+    consequences: Annotated[list[str], "sentences about further findings with this cause"]
 
 
 class SignaturesDocument(TypedDict):
