@@ -19,6 +19,7 @@ from help_examples import examples, made_in, words_of
 from in_process import command
 from typed_commands import printed_commands
 
+from pipelines.archive.signatures import VARIABLE
 from pipelines.cli import INTERRUPTED
 from schemas.errors import DONE, PART_FAILED, UNUSABLE
 
@@ -83,6 +84,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
 
 
 def _at_home(patch: pytest.MonkeyPatch, folder: Path) -> None:
+    patch.delenv(VARIABLE, raising=False)  # the key is that of the folder
     for variable, name in (("XDG_STATE_HOME", "state"), ("XDG_CONFIG_HOME", "config"), ("PREFECT_HOME", "prefect")):
         patch.setenv(variable, str(folder / name))
 
