@@ -16,23 +16,16 @@ def typed(monkeypatch):
     return type_
 
 
-@pytest.mark.parametrize(
-    ("text", "yes"), [("\n", True), ("y\n", True), ("Yes \n", True), ("n\n", False), ("stop\n", False)]
-)
-def test_enter_is_yes_and_no_is_no(typed, text, yes):
-    typed(text)
-    assert agreed("Measure?") is yes
-
-
-def test_what_is_neither_is_asked_again_with_what_is_needed(typed, capsys):
+def test_enter_is_yes_no_is_no_and_what_is_neither_is_asked_again(typed, capsys):
+    for text, yes in (("\n", True), ("y\n", True), ("Yes \n", True), ("n\n", False), ("stop\n", False)):
+        typed(text)
+        assert agreed("Measure?") is yes
+    capsys.readouterr()
     typed("maybe\nn\n")
     assert not agreed("Measure?")
     told = capsys.readouterr().err
     assert "'maybe' is neither yes nor no: y or Enter measures it, n leaves it" in " ".join(told.split())
     assert told.count("Measure? [Y/n]") == 2
-
-
-def test_a_terminal_that_closes_is_no_answer(typed):
-    typed("")
+    typed("")  # the terminal closed
     with pytest.raises(WrongUse, match="ended before an answer"):
         agreed("Measure?")

@@ -1,10 +1,7 @@
 """Export: what firmware computes is what the project's own correction gives."""
 
 import io
-import json
 import re
-import shutil
-import subprocess
 import zlib
 from dataclasses import replace
 from itertools import product
@@ -36,19 +33,6 @@ from pipelines.tables.calibration import read_calibration
 from pipelines.tables.dwells import lot_arrays
 from schemas.errors import WrongUse
 
-MAIN = """
-#include <stdio.h>
-#include "calibration.h"
-int main(void)
-{
-    const double output[3] = {200000.0, -90000.0, 120000.0};
-    double force[3];
-    if (tumbleline_correct(&tumbleline_A1, output, 41.5, force)) return 1;
-    printf("%.15g %.15g %.15g", force[0], force[1], force[2]);
-    return 0;
-}
-"""
-
 
 def test_the_polynomials_correct_as_the_model_does(run: Run) -> None:
     calibration = read_calibration(run.table("coefficients"), run.table("covariance"))
@@ -61,38 +45,18 @@ def test_the_polynomials_correct_as_the_model_does(run: Run) -> None:
         np.testing.assert_allclose(corrected, wanted[u], atol=1e-11)
 
 
-def test_the_c_header_computes_the_same(run: Run, tmp_path: Path) -> None:
-    compiler = shutil.which("cc")
-    if compiler is None:
-        pytest.skip("no C compiler here")
-    units = unit_calibrations(run, ("A1",), failed=True)
-    (tmp_path / "calibration.h").write_text(export_text("c", units, run.id), encoding="utf-8")
-    (tmp_path / "main.c").write_text(MAIN, encoding="utf-8")
-    command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "main.c", "-o", "main"]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
-    told = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout
-    wanted = units[0].correct(np.array([[200000.0, -90000.0, 120000.0]]), 41.5)[0]
-    np.testing.assert_allclose([float(word) for word in told.split()], wanted, rtol=1e-12)
-
-
-def test_json_holds_every_digit(run: Run) -> None:
-    units = unit_calibrations(run, (), failed=True)
-    document = json.loads(export_text("json", units, run.id))
-    assert document["units"][0]["bias"] == units[0].bias.tolist()
-    assert document["run"] == run.id
-
-
-def test_refuses_a_format_with_no_place_for_an_effect(tmp_path: Path) -> None:
-    run = small_run(tmp_path, None, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
-    units = unit_calibrations(run, (), failed=True)
-    for name in (name for name in FORMATS if not getattr(FORMATS[name], "COMPLETE", False)):
-        with pytest.raises(WrongUse, match="effect second_order has no place"):
-            export_text(name, units, run.id)
-
-
-def test_names_the_units_there_are(run: Run) -> None:
+def test_refuses_a_unit_that_is_not_there_an_effect_without_a_place_and_noise_without_a_static_record(
+    run: Run, tmp_path: Path
+) -> None:
     with pytest.raises(WrongUse, match="no unit B7 in this run; there are A1, A2, A3"):
         unit_calibrations(run, ("B7",), failed=False)
+    bent = small_run(tmp_path, None, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
+    units = unit_calibrations(bent, (), failed=True)
+    for name in (name for name in FORMATS if not getattr(FORMATS[name], "COMPLETE", False)):
+        with pytest.raises(WrongUse, match="effect second_order has no place"):
+            export_text(name, units, bent.id)
+    with pytest.raises(WrongUse, match="no noise terms of unit SN 1"):
+        export_text("kalibr", [replace(unit(), noise=None)], "run-1")
 
 
 Array = NDArray[np.float64]
@@ -197,15 +161,8 @@ def flown(name: str, text: str, raw: Array, t: float, sensor: int = 0) -> Array:
     return ardupilot(named_values(text), raw, t, sensor + 1)
 
 
-@each(
-    [
-        ("px4", -10.0, 60.0, 0),
-        ("px4", -10.0, 60.0, 2),
-        ("ardupilot", -10.0, 60.0, 0),
-        ("ardupilot", 30.0, 70.0, 0),
-        ("ardupilot", -40.0, 10.0, 2),
-    ]
-)
+@each([("px4", -10.0, 60.0, 0), ("px4", -10.0, 60.0, 2), ("ardupilot", -10.0, 60.0, 0), ("ardupilot", 30.0, 70.0, 0),
+       ("ardupilot", -40.0, 10.0, 2)])  # fmt: skip
 def test_an_autopilot_applies_bias_scale_and_the_bias_over_temperature(row: tuple[str, float, float, int]) -> None:
     name, low, high, sensor = row
     c = unit(across=0.0, scale_t=0.0, low=low, high=high)
@@ -276,11 +233,6 @@ def test_ros_gets_lists_by_axis_whose_processes_have_the_allan_deviation_of_b() 
         assert np.sqrt(one.sum()) == pytest.approx(0.664 * 6e-6 * G, rel=0.03)
     covariance = np.array(file["linear_acceleration_covariance"]).reshape(3, 3)
     np.testing.assert_allclose(np.diag(covariance), (1e-6 * G * np.array([15.9, 14.0, 12.0])) ** 2 * 100.0, rtol=1e-6)
-
-
-def test_a_noise_format_needs_a_static_record() -> None:
-    with pytest.raises(WrongUse, match="no noise terms of unit SN 1"):
-        export_text("kalibr", [replace(unit(), noise=None)], "run-1")
 
 
 def test_matlab_reads_the_properties_of_accelparams() -> None:

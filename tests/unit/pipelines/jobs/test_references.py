@@ -105,40 +105,28 @@ def test_of_an_honest_table_nothing_is_told_and_level_and_offsets_are_hardly_see
     assert seen["inner_offset"] == np.inf
 
 
-def test_a_run_on_a_table_as_stated_is_not_contradicted(runs: dict[float, Run]) -> None:
-    judged = references_of(runs[50.0])
-    assert judged is not None
-    assert judged["worse"] is False
-    assert contradiction(judged) == ""
-    assert certifiable.refuse_contradicted(runs[50.0]) == ""
-
-
-def test_a_run_on_a_worse_table_says_what_is_stated_and_what_was_found(
+def test_a_run_on_a_worse_table_says_what_is_stated_and_what_was_found_and_one_as_stated_does_not(
     runs: dict[float, Run], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    judged = references_of(runs[200.0])
-    assert judged is not None
-    first = judged["seen"][0]
+    honest, worse = (references_of(runs[urad]) for urad in (50.0, 200.0))
+    assert honest is not None
+    assert worse is not None
+    assert honest["worse"] is False
+    assert contradiction(honest) == certifiable.refuse_contradicted(runs[50.0]) == ""
+    first = worse["seen"][0]
     assert (first["entry"], first["unit"], first["stated"], first["worse"]) == ("pose", "urad", 50.0, True)
-    assert (
-        100.0 < first["low"] < first["found"] < (first["high"] or 0.0) < 450.0
-    )  # turned about any axis, not by two angles
-    json.dumps(judged)
-    print_references(judged)
+    # turned about any axis, not by two angles
+    assert 100.0 < first["low"] < first["found"] < (first["high"] or 0.0) < 450.0
+    json.dumps(worse)
+    print_references(worse)
     text = capsys.readouterr().out
     assert "CONTRADICTED: the table is worse than stated (p < 0.001)" in text
     assert "repeatability of the poses: stated u 50 µrad, found " in text
     assert "not seen at any size: seat of the fixture (as the misalignment of each unit), local gravity" in text
-
-
-def test_the_report_shows_stated_and_found(runs: dict[float, Run]) -> None:
     html = stated_references.render(ReportContext(runs[200.0], {}))
     assert html is not None
     assert "the table is worse than stated" in html
     assert "not contradicted" not in html.lower()
-    assert all(
-        html.count(f"<{tag}>") + html.count(f"<{tag} ") == html.count(f"</{tag}>") for tag in ("table", "tr", "td", "p")
-    )
     assert "Not contradicted" in str(stated_references.render(ReportContext(runs[50.0], {})))
 
 
@@ -147,9 +135,7 @@ def test_a_contradicted_run_is_not_certified_and_a_weaker_finding_stands_in_the_
 ) -> None:
     run = runs[200.0]
     monkeypatch.setenv(VARIABLE, "")
-    monkeypatch.setattr(
-        certifying, "refuse_inadequate", lambda _run: "ADEQUATE (p = 0.4)"
-    )  # the other judge, on its own
+    monkeypatch.setattr(certifying, "refuse_inadequate", lambda _run: "ADEQUATE (p = 0.4)")  # the other judge
     monkeypatch.setattr(certifying, "refuse_unstated", lambda _run: None)
     with pytest.raises(
         WrongUse, match=r"worse than stated .*stated u 50 µrad, found .*state in \[uncertainty\] at least what"

@@ -2,6 +2,7 @@
 
 import pytest
 import yaml
+from each import each
 from hypothesis import given
 from hypothesis import strategies as st
 from root_process import ROOT
@@ -22,25 +23,20 @@ def test_the_tags_of_a_deployment_carry_its_policy(
 ) -> None:
     policy = Policy(busy=busy, latest_start_min=minutes, missed=missed, crashed=crashed)
     assert policy_of_tags([*others, *policy.tags()]) == policy
-
-
-def test_a_run_without_tags_has_the_default_policy() -> None:
     assert policy_of_tags([]) == Policy() == policy_of("a", None)
 
 
-@pytest.mark.parametrize(
-    ("content", "told"),
-    [
-        ({"bussy": "wait"}, "policy has no key 'bussy'; did you mean busy?"),
-        ({"busy": "queue"}, "policy.busy is 'queue', wait or skip is needed"),
-        ({"missed": True}, "policy.missed is True, cancel or latest is needed"),
-        ({"latest_start_min": 0}, "policy.latest_start_min is 0, a whole number from 1 to 10080 is needed"),
-        ({"latest_start_min": "15"}, "policy.latest_start_min is '15'"),
-        ({"latest_start_min": True}, "policy.latest_start_min is True"),
-        ("wait", "policy is 'wait', a table of keys is needed"),
-    ],
-)
-def test_a_policy_with_an_unknown_key_or_value_is_refused(content: object, told: str) -> None:
+@each([
+    ({"bussy": "wait"}, "policy has no key 'bussy'; did you mean busy?"),
+    ({"busy": "queue"}, "policy.busy is 'queue', wait or skip is needed"),
+    ({"missed": True}, "policy.missed is True, cancel or latest is needed"),
+    ({"latest_start_min": 0}, "policy.latest_start_min is 0, a whole number from 1 to 10080 is needed"),
+    ({"latest_start_min": "15"}, "policy.latest_start_min is '15'"),
+    ({"latest_start_min": True}, "policy.latest_start_min is True"),
+    ("wait", "policy is 'wait', a table of keys is needed"),
+])  # fmt: skip
+def test_a_policy_with_an_unknown_key_or_value_is_refused(row: tuple[object, str]) -> None:
+    content, told = row
     with pytest.raises(WrongUse) as refused:
         policy_of("production-line", content)
     assert told in str(refused.value)

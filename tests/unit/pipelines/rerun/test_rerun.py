@@ -56,14 +56,6 @@ def files_of(run: Run) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in run.path.iterdir() if path.suffix in {".parquet", ".json"}}
 
 
-def test_nothing_is_done_where_nothing_changed(run: Run) -> None:
-    before = files_of(run)
-    outcome = again(run.archive, run.id, ModelChange())
-    assert outcome.new == run.id
-    assert set(outcome.stages.values()) == {"there"}
-    assert files_of(run) == before
-
-
 def test_other_limits_only_grade_again(run: Run) -> None:
     before = files_of(run)
     outcome = again(run.archive, run.id, change_from_options(limits="industrial"))
@@ -93,15 +85,6 @@ def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeyp
     ]  # its tables come out with the same bytes, so the key of the grade is the same
     assert [b["what"] for b in outcome.because] == ["code"]
     assert hashes(run.archive.run(outcome.new)) == hashes(run)
-
-
-def test_what_a_rerun_makes_of_tables_that_it_made_itself_has_the_same_bytes(
-    run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    other_code(monkeypatch, "reduce", "fit", "verify", "noise", "grade")
-    outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
-    assert outcome.stages["reduce"] == "computed"
-    assert check(run.archive, outcome.new).same
 
 
 def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_path: Path) -> None:
@@ -180,18 +163,18 @@ def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(
     assert run.archive.run(outcome.new).about["capture"] == run.about["capture"]
 
 
-def test_without_raw_samples_it_begins_at_the_dwells(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_raw_samples_it_begins_at_the_dwells_and_a_check_says_what_it_could_not_check(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shutil.rmtree(run.archive.root / "captures")
+    comparison = check(run.archive, run.id)
+    assert (comparison.tables["dwells"], comparison.tables["coefficients"]) == (LEFT_OUT, SAME)
+    with pytest.raises(DataRejected, match="static record is not in the archive"):
+        again(run.archive, run.id, change_from_options(effects=LARGER))
     other_code(monkeypatch, "reduce", "grade")
     outcome = again(run.archive, run.id, ModelChange())
     assert outcome.stages["reduce"] == "kept"
     assert [(b["stage"], b["what"]) for b in outcome.because] == [("grade", "code")]
-
-
-def test_refuses_another_model_where_the_static_record_is_gone(run: Run) -> None:
-    shutil.rmtree(run.archive.root / "captures")
-    with pytest.raises(DataRejected, match="static record is not in the archive"):
-        again(run.archive, run.id, change_from_options(effects=LARGER))
 
 
 def test_refuses_a_capture_that_is_not_finished(run: Run) -> None:
@@ -238,13 +221,6 @@ def test_a_check_names_the_table_and_the_size_of_what_differs(run: Run, monkeypa
         d for d in comparison.differences if d.startswith("verification: error_ug in 1 of ")
     ]
     assert "by at most 0.5" in comparison.differences[0]
-
-
-def test_a_check_says_what_it_could_not_check(run: Run) -> None:
-    shutil.rmtree(run.archive.root / "captures")
-    comparison = check(run.archive, run.id)
-    assert comparison.tables["dwells"] == LEFT_OUT
-    assert comparison.tables["coefficients"] == SAME
 
 
 def test_chooses_runs_by_what_they_are(run: Run) -> None:
