@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import CaptureDouble, measured_run, small_job
 from root_process import ROOT
 
 from benchmarks.budget_lots import plan_of
@@ -17,8 +17,6 @@ from pipelines.certificates import Ledger
 from pipelines.chain import certifiable
 from pipelines.chain import certify as certifying
 from pipelines.chain.certify import certify
-from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
 from pipelines.cli.text.verdict_text import print_references
 from pipelines.jobs.references import contradiction, references_of, unseen
 from pipelines.report.context import ReportContext
@@ -48,12 +46,8 @@ class TurnedTable(CaptureDouble):
 def run_of(folder: Path, urad: float, *changes: tuple[str, str]) -> Run:
     table = TurnedTable()
     table.urad = urad
-    runner = Runner(
-        small_job(folder, ("9.8123", "9.80665"), *changes, station=WORKSHOP), Archive(folder / "archive"), measure=table
-    )
-    for stage in ORDER[:-1]:
-        runner.stage(stage)
-    return runner.run
+    job = small_job(folder, ("9.8123", "9.80665"), *changes, station=WORKSHOP)
+    return measured_run(job, Archive(folder / "archive"), table)
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, small_job, small_run
+from capture_double import CaptureDouble, measured_run, small_job, small_run
 from each import each
 
 from pipelines.archive import Archive, Run, code_hash
-from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.rerun import steps
@@ -92,12 +90,10 @@ def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_pa
     listed = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
     (tmp_path / "first").mkdir()
     job = small_job(tmp_path / "first", (listed, f"effects = {json.dumps(effects)}"))
-    first = Runner(job, Archive(tmp_path / "first" / "archive"), measure=CaptureDouble())
-    for stage in ORDER[:-1]:
-        first.stage(stage)
+    first = measured_run(job, Archive(tmp_path / "first" / "archive"), CaptureDouble())
     outcome = again(run.archive, run.id, change_from_options(effects=",".join(effects)))
-    assert hashes(run.archive.run(outcome.new)) == hashes(first.run)
-    assert outcome.new == first.run.id
+    assert hashes(run.archive.run(outcome.new)) == hashes(first)
+    assert outcome.new == first.id
 
 
 @pytest.mark.parametrize("trouble", [KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect")])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from capture_double import CaptureDouble, recipe_file, small_job
+from capture_double import CaptureDouble, measured_run, recipe_file, small_job
 
 from pipelines.archive import Archive, files
 from pipelines.chain.chain import ORDER
@@ -49,9 +49,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Archive:
     (folder / "plain.toml").write_text(LIMITS)
     for repeat, noise in enumerate((1e-4, 2e-4)):
         job = small_job(folder, (FULL, POOR), ('limits = "consumer"', 'limits = "plain.toml"'), repeat=repeat)
-        runner = Runner(job, Archive(folder / "archive"), measure=CaptureDouble(noise_g=noise))
-        for stage in ORDER[:-1]:
-            runner.stage(stage)
+        measured_run(job, Archive(folder / "archive"), CaptureDouble(noise_g=noise))
     return Archive(folder / "archive")
 
 
