@@ -119,7 +119,6 @@ def test_one_process_at_a_time_measures_a_lot(tmp_path: Path) -> None:
 
 
 def test_samples_are_kept_record_by_record_beside_the_stations_last_state_alone(run: Run, tmp_path: Path) -> None:
-    assert run.records is not None
     assert sum(len(frame) for frame in run.records.samples()) == len(run.table("samples"))
     assert len(list(run.records.samples())) == len(run.records.finished())
     job = small_job(tmp_path)

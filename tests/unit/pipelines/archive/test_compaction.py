@@ -153,7 +153,6 @@ def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_pat
     for name in names * 2:
         number = 3 if name in names[:2] else 1 + names.index(name) % 2
         folder = known.folder(name)
-        assert folder is not None
         assert folder.files["run.json"][1:] == (100 * number, 7, number)
     assert known.folder("runs/line-1") is None
 

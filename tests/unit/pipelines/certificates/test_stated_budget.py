@@ -69,7 +69,6 @@ def test_every_form_of_a_statement_is_one_standard_uncertainty_reads_as_it_was_w
     )  # fmt: skip
     for form in forms:
         entry = stated(level={**form, "source": "s"})
-        assert entry.level is not None
         assert entry.level.standard().u == pytest.approx(20e-6)
         assert (entry.not_stated["seat"], "level" in entry.not_stated) == ("misalignment", False)
     config = load_station(LINE)
@@ -105,7 +104,6 @@ def test_a_recipes_entries_go_before_the_stations_and_the_weaker_source_counts()
         stated(grade_source="certificates", level={"u_urad": 1.0, "source": "s"}, pose={"u_urad": 5.0}),
         stated(grade_source="data_sheet", pose={"u_urad": 9.0}),
     )
-    assert both is not None
     assert both.grade_source == "data_sheet"
     assert sources(both)["pose"].stated.u == pytest.approx(9e-6)
     assert "level" in sources(both)
@@ -171,7 +169,6 @@ def test_a_run_keeps_its_budget_and_the_risk_of_its_decisions(run: Run) -> None:
 def test_a_validity_beyond_the_horizon_has_no_figure_over_the_period(run: Run) -> None:
     assert (run.table("uncertainties")["quantity"] == "bias_error_period").any()
     terms = budget_terms(job_of_run(run))
-    assert terms.stability is not None
     assert terms.stability.horizon_days > 366.0
 
 

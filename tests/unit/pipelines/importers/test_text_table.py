@@ -198,7 +198,6 @@ def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Gene
         table.loc[start : stop - 1, "t"] -= one.time[start]
     content = PLAIN | {"columns": {**PLAIN["columns"], "dwell": "part"}}  # type: ignore[dict-item]
     recording = imported(table[table["part"] != ""].reset_index(drop=True), build(content, "t"), "a.csv")
-    assert recording.dwells is not None
     assert bool(np.all(np.diff(recording.dwells["time_s"]) > 0.0))
     assert "the clock restarts 5 times" in "; ".join(recording.remarks)
 

@@ -26,7 +26,6 @@ def joint(
 
 def test_an_inquiry_ends_by_what_was_judged_and_not_where_a_class_is_open() -> None:
     ending = ending_of(joint(None))
-    assert ending is not None
     assert ending.text == "the model cannot be judged: 6 degrees of freedom, 15 are needed"
     assert ending.end in NO_FOLLOW_UP
     classes = {
@@ -45,7 +44,6 @@ def test_what_no_dwells_left_out_judge_is_named_and_said_to_be_unconfirmed() -> 
     one.document["classes"][0] |= {"scope": "sensor", "heldout_after_ug": None}
     one.document["recommended"] = []
     ending = ending_of(one)
-    assert ending is not None
     assert ending.text.endswith("no dwells left out can judge cross_coupling: confirm with a fresh run")
 
 

@@ -146,7 +146,6 @@ def test_a_contradicted_run_is_not_certified_and_a_weaker_finding_stands_in_the_
 def test_one_unit_alone_cannot_be_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "")
     judged = references_of(run_of(tmp_path, 200.0, ('"A1", "A2", "A3"', '"A1"')))
-    assert judged is not None
     assert judged["worse"] is None
     assert "one unit alone" in str(judged["reason"])
     assert unseen(judged) == "nothing of the table is seen"

@@ -71,7 +71,6 @@ def test_a_larger_fixture_takes_a_larger_lot(tmp_path: Path, slots: int) -> None
 def test_faults_of_the_command_line_and_the_recipe_become_the_stations(tmp_path: Path) -> None:
     recipe = recipe_file(tmp_path, ("seed = 5", 'seed = 5\nfaults = [{ kind = "door", at_s = 9000.0, for_s = 60.0 }]'))
     job = Request(recipe=recipe, faults=("silent:serial=A2:at_s=500", "vibration:rms_g=0.5")).job()
-    assert job.station.simulation is not None
     assert [fault.kind for fault in job.station.simulation.faults] == ["door", "silent", "vibration"]
     assert job.station.simulation.faults[2].figures == {"rms_g": 0.5}
     assert job.capture_id != Request(recipe=recipe_file(tmp_path)).job().capture_id

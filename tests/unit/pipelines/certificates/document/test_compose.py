@@ -113,14 +113,9 @@ def test_a_run_gives_a_pdf_and_an_xml_per_certified_unit_and_names_those_without
         validate(path.read_bytes())
 
 
-def test_the_same_certificate_has_the_same_bytes(run: Run, typed: Typed, tmp_path: Path) -> None:
-    assert typed("A1").exit_code == 0
-    first = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
-    assert typed("A1/1").exit_code == 0
-    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == first
-
-
-def test_a_unit_without_a_certificate_is_refused_with_the_reason(run: Run, typed: Typed, tmp_path: Path) -> None:
+def test_a_certificate_has_the_same_bytes_again_and_none_is_made_of_what_has_or_holds_none(
+    run: Run, typed: Typed, tmp_path: Path
+) -> None:
     problem = typed("A1", "A3").exception
     assert isinstance(problem, WrongUse)
     assert re.search(
@@ -128,9 +123,11 @@ def test_a_unit_without_a_certificate_is_refused_with_the_reason(run: Run, typed
     )
     assert not (tmp_path / "out").exists()  # not even that of A1
     assert "A1/7 is not in the ledger, there are A1/1" in str(typed("A1/7").exception)
-
-
-def test_a_revoked_certificate_is_not_made(run: Run, typed: Typed) -> None:
+    made = []
+    for words in ("A1", "A1/1"):
+        assert typed(words).exit_code == 0
+        made.append({path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()})
+    assert made[0] == made[1]
     assert typed("A1", "--reason", "dropped", command="revoke").exit_code == 0
     assert "certificate A1/1 of run" in str(typed("A1").exception)
     assert "was revoked (dropped)" in str(typed("A1").exception)
@@ -203,6 +200,10 @@ def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: 
         namespaces=NAMES,
     )
     assert float(scale[0].text) == pytest.approx(stated["value"] / 9.80665, rel=1e-14)
+    assert si_unit("LSB/g") == (r"\metre\tothe{-1}\second\tothe{2}", pytest.approx(1 / 9.80665))
+    assert si_unit("µg") == (r"\metre\second\tothe{-2}", pytest.approx(9.80665e-6))
+    assert si_unit("LSB/(g·K)")[0] == r"\metre\tothe{-1}\second\tothe{2}\kelvin\tothe{-1}"
+    assert si_unit("furlong") is None
 
 
 def test_nothing_says_accredited_without_an_accreditation_in_the_file(
@@ -312,13 +313,6 @@ def test_u_has_two_digits_and_the_value_ends_where_u_ends_in_certificate_and_rep
         (10.0, 0.98),
     ):
         assert report_rounding(value, expanded) == with_uncertainty(value, expanded)
-
-
-def test_units_become_si() -> None:
-    assert si_unit("LSB/g") == (r"\metre\tothe{-1}\second\tothe{2}", pytest.approx(1 / 9.80665))
-    assert si_unit("µg") == (r"\metre\second\tothe{-2}", pytest.approx(9.80665e-6))
-    assert si_unit("LSB/(g·K)")[0] == r"\metre\tothe{-1}\second\tothe{2}\kelvin\tothe{-1}"
-    assert si_unit("furlong") is None
 
 
 def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
