@@ -93,13 +93,16 @@ def test_a_wrong_model_of_the_noise_is_not_consistent(white, sd, stated, rng):
     assert estimate.consistency.stated == stated
 
 
-def test_without_a_known_force_the_bias_stays_unknown() -> None:
+def test_without_a_known_force_the_bias_stays_unknown_and_consistency_has_the_bounds_of_chi_square() -> None:
     model = one_process(1e-4, 1e-3, 100.0, turn_on=2e-3)
     nothing = np.full((500, 3), np.nan)
     estimate = track(model, np.arange(500.0), np.zeros((500, 3)), nothing, nothing[:, 0], 1.0)
     assert not estimate.updated.any()
     assert np.all(np.sqrt(estimate.covariance[-1].diagonal()) > 0.999 * np.hypot(1e-3, 2e-3))
     assert estimate.consistency.stated is None
+    for n, low, high in ((50, 0.647, 1.428), (100, 0.742, 1.296), (1000, 0.914, 1.090)):  # facts, F: bounds of χ²
+        bounds = consistency([(0, 1.0)] * n)
+        assert (bounds.low, bounds.high) == pytest.approx((low, high), abs=1e-3)
 
 
 def test_rest_in_one_pose_tells_the_bias_along_the_force_only(rng: np.random.Generator) -> None:
@@ -112,13 +115,6 @@ def test_rest_in_one_pose_tells_the_bias_along_the_force_only(rng: np.random.Gen
     assert sd_along < 5e-6
     assert abs(along @ (estimate.bias[-1] - bias)) < 4.0 * sd_along + 1e-6  # second order: |b|²/2
     assert np.sqrt(estimate.covariance[-1][1, 1]) == pytest.approx(1e-3, rel=0.01)
-
-
-def test_consistency_has_the_bounds_of_chi_square() -> None:
-    """n = 50, 100, 1000: .647–1.428, .742–1.296, .914–1.090 (facts, F)."""
-    for n, low, high in ((50, 0.647, 1.428), (100, 0.742, 1.296), (1000, 0.914, 1.090)):
-        bounds = consistency([(0, 1.0)] * n)
-        assert (bounds.low, bounds.high) == pytest.approx((low, high), abs=1e-3)
 
 
 def test_an_outlier_is_counted_and_not_used() -> None:

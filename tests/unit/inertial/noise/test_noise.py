@@ -55,23 +55,17 @@ def test_the_error_of_a_dwell_is_the_allan_deviation_at_its_length():
     assert np.mean(curve.deviation[:, at]) == pytest.approx(said, rel=0.15)
 
 
-def test_a_walk_has_its_closed_forms():
+def test_a_walk_has_its_closed_forms_a_whitener_makes_white_and_dwells_end_where_wander_begins():
     noise, time = DwellNoise(0.0, 0.0, 2e-6), np.array([110.0, 310.0])
     assert noise.error(12.0) == pytest.approx(2e-6 * np.sqrt(12.0 / 3.0))
     expected = 4e-12 * np.array([[100.0 - 2.0, 100.0], [100.0, 300.0 - 2.0]])  # a mean loses a sixth of its length
     assert dwell_covariance(time, 12.0, noise, since=10.0) == pytest.approx(expected)
-
-
-def test_a_whitener_makes_noise_white():
     time = np.array([0.0, 20.0, 40.0, 900.0, 920.0]) + 1000.0
     covariance = dwell_covariance(time, 10.0, DwellNoise(1e-5, 1e-4, 1e-6))
     white = whitener(covariance)
     assert white @ covariance @ white.T == pytest.approx(np.eye(5), abs=1e-9)
-
-
-def test_dwells_are_long_enough_when_white_noise_has_fallen_to_the_wander():
-    noise = DwellNoise(1e-5, 1e-5)
-    assert noise.white(noise.balanced()) == pytest.approx(noise.wander(noise.balanced()))
+    flicker = DwellNoise(1e-5, 1e-5)
+    assert flicker.white(flicker.balanced()) == pytest.approx(flicker.wander(flicker.balanced()))
     assert DwellNoise(1e-5).balanced() == float("inf")
 
 
@@ -94,9 +88,7 @@ def test_it_is_counted_from_the_mean_of_the_dwells_that_are_fitted() -> None:
     # differences do not depend on what the walk is counted from
     change = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     assert change @ walk_kernel(time, fitted) @ change == pytest.approx(1.0)
-
-
-def test_records_of_units_have_their_own_times() -> None:
+    # records of units have their own times
     time = np.stack([np.linspace(0.0, 50.0, 6), np.linspace(7.0, 107.0, 6)])
     both = walk_kernel(time)
     np.testing.assert_allclose(both[1], walk_kernel(time[1]) * 100.0 / 107.0, atol=1e-12)

@@ -58,13 +58,10 @@ def test_lack_of_fit_widens_the_uncertainty(run: Run) -> None:
     assert ratio > 3.0
 
 
-def test_verification_errors_lie_within_what_the_uncertainty_allows(run: Run) -> None:
+def test_verification_errors_and_noise_are_those_of_the_double(run: Run) -> None:
     verification = run.table("verification")
     assert (verification["error_ug"].abs() < 5.0 * verification["uncertainty_ug"]).all()
     assert (verification["reading_ug"] < verification["uncertainty_ug"]).all()
-
-
-def test_noise_finds_the_white_noise_of_the_double(run: Run) -> None:
     noise = run.table("noise").set_index(["unit", "axis", "term"])
     expected = 1e-4 / np.sqrt(100.0) * 1e6
     assert np.isclose(noise.loc[("A1", "x", "N"), "value"], expected, rtol=0.1)
