@@ -107,9 +107,10 @@ def test_walks_through_the_versions(tmp_path):
         ("bias", "scale"), ("bias", "scale", "misalignment"), ("bias", "scale", "misalignment", "third_order"),
     ]  # fmt: skip
     assert [v.added for v in history] == [(), ("misalignment",), ("third_order",)]
-    gone = text.replace('"third_order"]', "]").replace("version = 3\neffects", "version = 4\neffects")
-    gone += '\n[[change]]\nversion = 4\neffect = "third_order"\nby = "B"\nat = 2026-06-01\nwhy = "not confirmed"\n'
-    last = versions(parse_model(gone.replace('misalignment", ]', 'misalignment"]'), "model"))[-2:]
+    text, _ = extended(COMMENTED, step("third_order"), "model")  # and out again
+    gone = text.replace('"third_order"]', "]").replace("version = 2\neffects", "version = 3\neffects")
+    gone += '\n[[change]]\nversion = 3\neffect = "third_order"\nby = "B"\nat = 2026-06-01\nwhy = "not confirmed"\n'
+    last = versions(parse_model(gone.replace('scale", ]', 'scale"]'), "model"))[-2:]
     assert ("third_order" in last[0].effects, last[1].removed) == (True, ("third_order",))
 
 
