@@ -43,10 +43,11 @@ def refused(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recipe = recipe_file(tmp_path)
     assert "refuses" not in refused(["plan", recipe], tmp_path, monkeypatch)
-    hot = recipe_file(tmp_path, ("[0.0, 50.0]", "[0.0, 298.0]"), name="hot.toml")
+    hot = recipe_file(tmp_path, ("[0.0, 50.0]", "[0.0, 298.0]"), ('"consumer"', '"production"'), name="hot.toml")
     said = refused(["plan", hot], tmp_path, monkeypatch)
     assert "'tumbleline run' refuses this recipe" in said
     assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in said
+    assert CliRunner().invoke(app, ["plan", hot]).exit_code == 0  # a plan tells and does not refuse
     mine = recipe_file(tmp_path, ('"consumer"', '"mine.toml"'), name="limits.toml")
     assert "no file and no built-in limits are called 'mine.toml'" in refused(["plan", mine], tmp_path, monkeypatch)
     (tmp_path / "mine.toml").write_text('name = "m"\n[figures.residual_rms]\nmax = 1\nunit = "µg"\n', encoding="utf-8")
