@@ -241,8 +241,13 @@ def _kept_folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix=f"tumbleline-{os.getpid()}-", ignore_cleanup_errors=True)
 
 
-def _made(folder: Path, faults: dict[str, str], changes: tuple[tuple[str, str], ...]) -> Run:
-    runner = Runner(small_job(folder, *changes), Archive(folder / "archive"), measure=CaptureDouble(faults))
+def measured_run(job: Job, archive: Archive, measure: Any) -> Run:
+    """The run of a job, done but for its report."""
+    runner = Runner(job, archive, measure=measure)
     for stage in ORDER[:-1]:
         runner.stage(stage)
     return runner.run
+
+
+def _made(folder: Path, faults: dict[str, str], changes: tuple[tuple[str, str], ...]) -> Run:
+    return measured_run(small_job(folder, *changes), Archive(folder / "archive"), CaptureDouble(faults))

@@ -32,6 +32,21 @@ def force(angles: Array, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Ar
     return np.array(out)
 
 
+def dwell_rows(unit: str, time: Array, force_g: Array, output: Array, sd: float, **more: object) -> pd.DataFrame:
+    """Dwells of one unit in the exchange format, from forces and outputs (n, 3)."""
+    known = {
+        "unit": unit,
+        "dwell": np.arange(len(time)),
+        "time_s": time,
+        "kind": "dwell",
+        "pose": "p",
+        "out_unit": "g",
+        "n": 100,
+    }
+    axes = {f"{name}_{a}": v[:, i] for name, v in (("force", force_g), ("out", output)) for i, a in enumerate("xyz")}
+    return pd.DataFrame({**known, **axes, **{f"sd_{a}": sd for a in "xyz"}, **more})
+
+
 def lot(
     rng: np.random.Generator,
     *,

@@ -1,6 +1,8 @@
-"""Keys with certificates that they signed themselves, for tests of signatures."""
+"""Keys with certificates that they signed themselves, for tests of signatures, and a second program that checks these."""
 
+import subprocess
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
@@ -41,3 +43,15 @@ def made_key(key: CertificateIssuerPrivateKeyTypes) -> SigningKey:
 def pem(signing: SigningKey) -> bytes:
     own = signing.key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     return own + signing.certificate.public_bytes(Encoding.PEM)
+
+
+def openssl_accepts(document: bytes, trust: Path, folder: Path) -> bool:
+    """Whether ``openssl cms`` accepts the last signature of a PDF over the whole file."""
+    head = document.rindex(b"/ByteRange")
+    a, n, b, m = (int(part) for part in document[head : head + 200].split(b"[", 1)[1].split(b"]", 1)[0].split())
+    (folder / "data").write_bytes(document[a : a + n] + document[b : b + m])
+    (folder / "cms").write_bytes(bytes.fromhex(document[n + 1 : b - 1].decode()))
+    words = ["openssl", "cms", "-verify", "-binary", "-inform", "DER", "-in", "cms", "-content", "data", "-CAfile", str(trust),
+             "-purpose", "any", "-out", "out"]  # fmt: skip
+    good = subprocess.run(words, cwd=folder, capture_output=True, check=False).returncode == 0
+    return good and b + m == len(document)

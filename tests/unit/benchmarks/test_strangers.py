@@ -13,17 +13,13 @@ def lots():
     return {name: make(name, seed=11, units=2) for name in KINDS}
 
 
-def test_every_kind_makes_tables_of_the_exchange_format(lots):
+def test_every_kind_makes_tables_of_the_exchange_format_of_the_size_asked_for(lots):
     for name, lot in lots.items():
         for dwells in (lot.dwells, lot.fresh):
             table_check.check("dwells", dwells, where=name)
             assert {"outer_deg", "inner_deg"} <= set(dwells) or {"force_x", "force_y", "force_z"} <= set(dwells)
         for history in (lot.history, lot.fresh_history):
             assert history is None or len(table_check.check("history", history, where=name))
-
-
-def test_the_size_is_the_one_asked_for(lots):
-    for name, lot in lots.items():
         if lot.truth["scaled"]:
             assert lot.truth["size"] == pytest.approx(2.0, rel=0.3), name
         assert set(lot.truth["units"]) <= set(lot.dwells["unit"])

@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from each import each
 
 from deploy import environment
 from deploy.environment import NotSetUp, reason, set_up, wrong_with
@@ -41,21 +42,19 @@ FULL = "Collecting scipy==1.17.1\nERROR: Could not install packages due to an OS
 OTHER = "Collecting scipy==1.17.1\nERROR: something new\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "package", "found", "remedy"),
-    [
-        (TAMPERED, "six==1.17.0", "not that of requirements-run.lock", "pip cache purge"),
-        (UNREACHED, "six==1.17.0", "cannot be reached", "check network, proxy"),
-        (UNREACHED.partition("\n")[2], "six==1.17.0", "cannot be reached, or has nothing", "PIP_FIND_LINKS="),
-        (OLDER, "six==99.0", "does not deliver this version for Python 3", "pip config list"),
-        (NOT_BUILT, "broken", "there is no wheel for Python 3", "with PYTHON="),
-        (NOT_BEGUN, "broken-1.0.tar.gz", "there is no wheel for Python 3", "with PYTHON="),
-        (FULL, "scipy==1.17.1", "no space is left on the disk of .venv", "free 2 GB"),
-        (OTHER, "scipy==1.17.1", "pip ended with 'ERROR: something new'", "try again"),
-        ("", "pip", "pip ended with ''", "try again"),
-    ],
-)
-def test_what_pip_says_becomes_package_cause_and_remedy(text: str, package: str, found: str, remedy: str) -> None:
+@each([
+    (TAMPERED, "six==1.17.0", "not that of requirements-run.lock", "pip cache purge"),
+    (UNREACHED, "six==1.17.0", "cannot be reached", "check network, proxy"),
+    (UNREACHED.partition("\n")[2], "six==1.17.0", "cannot be reached, or has nothing", "PIP_FIND_LINKS="),
+    (OLDER, "six==99.0", "does not deliver this version for Python 3", "pip config list"),
+    (NOT_BUILT, "broken", "there is no wheel for Python 3", "with PYTHON="),
+    (NOT_BEGUN, "broken-1.0.tar.gz", "there is no wheel for Python 3", "with PYTHON="),
+    (FULL, "scipy==1.17.1", "no space is left on the disk of .venv", "free 2 GB"),
+    (OTHER, "scipy==1.17.1", "pip ended with 'ERROR: something new'", "try again"),
+    ("", "pip", "pip ended with ''", "try again"),
+])  # fmt: skip
+def test_what_pip_says_becomes_package_cause_and_remedy(row: tuple[str, str, str, str]) -> None:
+    text, package, found, remedy = row
     told = reason(text, LOCK, FOLDER)
     assert told.startswith(f"{package}: ")
     assert found in told

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from inquiries import job_of
+from lots import dwell_rows
 
 from inertial import effects as catalogue
 from inertial.criticism.diagnosis import diagnose
@@ -85,12 +86,9 @@ def test_coldness_through_two_cycles_is_that_of_a_body_that_warms_and_cools():
     assert [computed[k] for k in cycles] == pytest.approx([cold[k] for k in cycles], abs=2e-3)
 
 
-def test_warm_up_begins_again_and_ageing_goes_on():
+def test_warm_up_begins_again_and_what_ageing_counts_from_is_asked_only_where_the_power_was_switched():
     asked = ("warm_up", "aging_log", "aging_linear", "scale")
     assert [begins_again(run_of(), name) for name in asked] == [True, False, False, False]
-
-
-def test_what_ageing_counts_from_is_asked_only_where_the_power_was_switched():
     ageing = catalogue.get("aging_log")
     names = [[p.name for p in ageing.parameters(s)] for s in (run_of(), switched_off(run_of(), 600.0))]
     assert names == [["tau"], ["tau", "clock"]]
@@ -174,16 +172,10 @@ def test_a_power_order_reaches_the_recipe_the_minutes_and_the_words(tmp_path):
 
 
 def dwells_of(state: State, noise: float, rng: np.random.Generator) -> pd.DataFrame:
-    units, n = state.time.shape
     output = state.force + noise * rng.standard_normal(state.force.shape)
-    return pd.DataFrame(
-        {
-            "unit": np.repeat(list("ABC")[:units], n), "dwell": np.tile(np.arange(n), units), "time_s": state.time.ravel(),
-            "since_power_s": state.since_power.ravel(), "n": 100, "kind": "dwell", "pose": "p", "out_unit": "g", "slot": 0,
-            **{f"force_{a}": state.force[..., i].ravel() for i, a in enumerate("xyz")},
-            **{f"out_{a}": output[..., i].ravel() for i, a in enumerate("xyz")}, **{f"sd_{a}": 1e-5 for a in "xyz"},
-        }
-    )  # fmt: skip
+    rows = zip("ABC", state.time, state.force, output, state.since_power, strict=False)
+    units = [dwell_rows(unit, time, f, out, 1e-5, since_power_s=since, slot=0) for unit, time, f, out, since in rows]
+    return pd.concat(units, ignore_index=True)
 
 
 def test_dwells_of_runs_that_switched_nothing_stand_beside_those_of_one_that_did(rng):

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from pipelines.audit.exchanged_serials import _within
 from pipelines.procedures.figures import FigureValue, worst
@@ -24,23 +23,15 @@ def test_a_unit_of_which_nothing_is_known_fits_nobodys_past() -> None:
         assert _within(SimpleNamespace(values=values, errors=errors), 1, 0, bound) is fits
 
 
-@pytest.mark.parametrize(("value", "u"), [(np.nan, 1.0), (10.0, np.nan), (np.inf, 0.0)])
-def test_a_figure_that_is_no_number_does_not_pass(value: float, u: float) -> None:
-    assert not decide(parse_limits(LIMITS, "t", UNITS), "bias_error_ug", value, u).passed
-
-
-@pytest.mark.parametrize("place", [0, 1, 2])
-def test_an_axis_that_is_no_number_decides(place: int) -> None:
-    values = [FigureValue("f", axis, 0.1, 0.01) for axis in "xyz"]
-    values[place] = FigureValue("f", "xyz"[place], np.nan, 0.01)
-    assert np.isnan(worst(values).value)
-
-
-@pytest.mark.parametrize("place", [0, 1])
-def test_a_repeated_procedure_that_is_no_number_decides(place: int) -> None:
-    limits = parse_limits(LIMITS, "test", UNITS)
+def test_a_figure_an_axis_or_a_repetition_that_is_no_number_does_not_pass() -> None:
+    limits = parse_limits(LIMITS, "t", UNITS)
+    for value, u in ((np.nan, 1.0), (10.0, np.nan), (np.inf, 0.0)):
+        assert not decide(limits, "bias_error_ug", value, u).passed
+    for place in range(3):
+        values = [FigureValue("f", axis, np.nan if k == place else 0.1, 0.01) for k, axis in enumerate("xyz")]
+        assert np.isnan(worst(values).value)
     row = {"unit": "A", "figure": "bias_error_ug", "axis": "x", "unit_text": "µg", "identified": True, "note": ""}
-    rows = [row | {"value": 1.0, "uncertainty": 0.1}, row | {"value": 2.0, "uncertainty": 0.1}]
-    rows[place]["value"] = np.nan
-    [figure] = _of_procedures(pd.DataFrame(rows), "A", limits)
-    assert decide(limits, figure.name, figure.value, figure.uncertainty).outcome != "pass"
+    for place in range(2):
+        rows = [row | {"value": np.nan if k == place else 1.0 + k, "uncertainty": 0.1} for k in range(2)]
+        [figure] = _of_procedures(pd.DataFrame(rows), "A", limits)
+        assert decide(limits, figure.name, figure.value, figure.uncertainty).outcome != "pass"

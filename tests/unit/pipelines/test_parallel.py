@@ -35,26 +35,17 @@ def refuse(value: int) -> int:
 def test_results_come_in_the_order_of_the_partitions_and_nothing_to_do_starts_nothing() -> None:
     assert map_partitions(square, [3, 1, 2]) == [9, 1, 4]
     assert map_partitions(square, [], on_dask("tcp://127.0.0.1:1")) == []
+    assert map_partitions(threads, [1]) == [1]  # every partition is worked on with one thread of BLAS
+    with pytest.raises(WrongUse, match="'somewhere' is no address of a scheduler"):
+        on_dask("somewhere")
 
 
 def test_several_workers_are_other_processes_and_keep_the_order() -> None:
     squares, processes = zip(*map_partitions(square_and_process, list(range(5)), workers=2), strict=True)
     assert squares == (0, 1, 4, 9, 16)
     assert os.getpid() not in processes
-
-
-def test_every_partition_is_worked_on_with_one_blas_thread() -> None:
-    assert map_partitions(threads, [1]) == [1]
-
-
-def test_what_a_partition_refuses_comes_out_of_a_worker_as_it_was() -> None:
-    with pytest.raises(DataRejected, match="part 1: no dwell"):
+    with pytest.raises(DataRejected, match="part 1: no dwell"):  # it comes out of a worker as it was
         map_partitions(refuse, [1, 2], workers=2)
-
-
-def test_refuses_an_address_that_is_none() -> None:
-    with pytest.raises(WrongUse, match="'somewhere' is no address of a scheduler"):
-        on_dask("somewhere")
 
 
 @pytest.mark.slow
@@ -110,10 +101,5 @@ def test_a_worker_keeps_the_memory_of_its_arrays() -> None:
     with one_thread_each():
         kept = faults()
     assert kept < 0.1 * plain, (kept, plain)
-
-
-@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "gnu_get_libc_version"), reason="no GNU C library")
-def test_a_process_keeps_its_memory_from_when_it_says_so() -> None:
-    plain = faults()
-    kept = faults("from pipelines.parallel import keep_memory\nkeep_memory()\n")
+    kept = faults("from pipelines.parallel import keep_memory\nkeep_memory()\n")  # from when a process says so
     assert kept < 0.1 * plain, (kept, plain)

@@ -61,7 +61,7 @@ def test_a_hidden_low_pass_is_named_and_the_error_falls(kind: str, rng: np.rando
     assert diagnosis.where[0].high_hz == pytest.approx(5000.0)
 
 
-def test_nothing_is_named_where_nothing_is_missing(rng: np.random.Generator) -> None:
+def test_nothing_is_named_where_nothing_is_missing_and_few_points_cannot_be_judged(rng: np.random.Generator) -> None:
     f = np.geomspace(5.0, 4000.0, 40)
     for _ in range(5):
         diagnosis = diagnose_transfer(
@@ -69,11 +69,8 @@ def test_nothing_is_named_where_nothing_is_missing(rng: np.random.Generator) -> 
         )
         assert diagnosis.adequate is True
         assert diagnosis.classes == ()
-
-
-def test_few_points_cannot_be_judged() -> None:
-    f = np.geomspace(5.0, 4000.0, 4)
-    diagnosis = diagnose_transfer(points(f, -transfer(f, 2500.0, 0.7), 2e-3, 2e-3))
+    few = np.geomspace(5.0, 4000.0, 4)
+    diagnosis = diagnose_transfer(points(few, -transfer(few, 2500.0, 0.7), 2e-3, 2e-3))
     assert diagnosis.adequate is None
     assert "sweep more frequencies" in diagnosis.reason
 

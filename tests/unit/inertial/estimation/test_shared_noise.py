@@ -31,10 +31,6 @@ def model_of(rng: np.random.Generator, together: float, drift: np.ndarray, *, mi
     return Model(Problem(lot), [*PLAIN, DRIFT])
 
 
-def test_units_that_are_independent_count_in_full(rng):
-    assert shared_factor(model_of(rng, 0.0, np.full(UNITS, 2e-5)), DRIFT) == 1.0
-
-
 @pytest.mark.parametrize("missing", [False, True])
 def test_what_is_alike_in_all_units_counts_less_the_more_they_share(rng, missing):
     for together in (0.3, 0.5, 0.9):
@@ -42,7 +38,10 @@ def test_what_is_alike_in_all_units_counts_less_the_more_they_share(rng, missing
         assert factor == pytest.approx(1.0 + (UNITS - 1) * together, rel=0.12)
 
 
-def test_what_differs_in_sign_from_unit_to_unit_counts_in_full(rng):
+def test_independent_units_one_unit_and_what_differs_in_sign_from_unit_to_unit_count_in_full(rng):
+    assert shared_factor(model_of(rng, 0.0, np.full(UNITS, 2e-5)), DRIFT) == 1.0
+    lot = model_of(rng, 0.5, np.full(UNITS, 2e-5)).problem.lot
+    assert shared_factor(Model(Problem(lot.units([0])), [*PLAIN, DRIFT]), DRIFT) == 1.0
     signs = np.array([1.0, -1.0, 1.0, -1.0])
     assert shared_factor(model_of(rng, 0.6, 2e-5 * signs), DRIFT) == pytest.approx(1.0, abs=0.05)
 
@@ -58,8 +57,3 @@ def test_the_factor_is_by_how_much_a_sum_over_units_scatters_more(rng):
 
     factor = shared_factor(model_of(rng, 0.5, np.full(UNITS, 2e-5)), DRIFT)
     assert factor == pytest.approx(variance(0.5) / variance(0.0), rel=0.15)
-
-
-def test_one_unit_shares_with_nobody(rng):
-    lot = model_of(rng, 0.5, np.full(UNITS, 2e-5)).problem.lot
-    assert shared_factor(Model(Problem(lot.units([0])), [*PLAIN, DRIFT]), DRIFT) == 1.0

@@ -21,10 +21,7 @@ def test_six_positions_return_bias_scale_and_response() -> None:
     np.testing.assert_allclose(calibration.response, K, atol=1e-12)
     np.testing.assert_allclose(calibration.scale_error(100.0), [0.01, -0.01, 0.025], atol=1e-12)
     np.testing.assert_allclose(calibration.apply(out), FACES * g, atol=1e-12)
-
-
-def test_six_positions_are_found_for_a_batch() -> None:
-    up = np.stack([np.eye(3) @ K.T + BIAS, 2.0 * np.eye(3) @ K.T - BIAS])
+    up = np.stack([np.eye(3) @ K.T + BIAS, 2.0 * np.eye(3) @ K.T - BIAS])  # a batch
     down = np.stack([-np.eye(3) @ K.T + BIAS, -2.0 * np.eye(3) @ K.T - BIAS])
     np.testing.assert_allclose(six_position(up, down, 1.0).bias, [BIAS, -BIAS], atol=1e-12)
 
@@ -36,11 +33,8 @@ def test_ferraris_and_least_squares_agree_on_perfect_faces() -> None:
     np.testing.assert_allclose(better.response, K, atol=1e-12)
     np.testing.assert_allclose(better.bias, published.bias, atol=1e-12)
     assert np.all(better.rms < 1e-10)
-
-
-def test_a_second_order_term_shows_as_lack_of_fit_of_the_faces() -> None:
-    out = FACES @ K.T + BIAS + 0.5 * FACES**2
-    assert np.all(faces(out[:3], out[3:], 1.0, np.full(3, 0.01)).p_value < 1e-6)
+    bent = FACES @ K.T + BIAS + 0.5 * FACES**2  # a second-order term shows as lack of fit
+    assert np.all(faces(bent[:3], bent[3:], 1.0, np.full(3, 0.01)).p_value < 1e-6)
 
 
 def test_the_axis_polynomial_returns_its_coefficients(rng: np.random.Generator) -> None:
@@ -50,25 +44,18 @@ def test_the_axis_polynomial_returns_its_coefficients(rng: np.random.Generator) 
     fit = fit_axis_polynomial(out, force, temperature=heat)
     np.testing.assert_allclose(fit.coefficients, np.broadcast_to([*c, 1e-3], (4, 3, 5)), atol=1e-10)
     np.testing.assert_allclose(fit.apply(out, heat), force, atol=1e-10)
-
-
-def test_the_axis_polynomial_refuses_too_few_levels() -> None:
-    out = np.tile(np.array([[-1.0], [0.0], [1.0]]), (4, 3))
+    levels = np.tile(np.array([[-1.0], [0.0], [1.0]]), (4, 3))
     with pytest.raises(NotIdentified, match="do not determine degree 3"):
-        fit_axis_polynomial(out, out)
+        fit_axis_polynomial(levels, levels)
 
 
-def test_a_cubic_that_is_true_is_adequate(rng: np.random.Generator) -> None:
+def test_a_cubic_that_is_true_is_adequate_and_a_rate_term_is_not(rng: np.random.Generator) -> None:
     heat = np.linspace(-20.0, 60.0, 2000)
     truth = 9.8 + 1e-3 * heat - 2e-6 * heat**2 + 3e-7 * heat**3
     fit = fit_temperature_curve(truth[:, None] + 0.003 * rng.normal(size=(2000, 3)), heat)
     assert fit.adequate
     powers = (heat[:, None] - fit.reference_temperature) ** np.arange(4)
     np.testing.assert_allclose(powers @ fit.coefficients[0], truth, atol=5e-4)
-
-
-def test_a_rate_term_is_not_adequate(rng: np.random.Generator) -> None:
     heat = 20.0 + 40.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 2000))
-    rate = np.gradient(heat)
-    output = 1e-3 * heat[:, None] + 0.1 * rate[:, None] + 0.003 * rng.normal(size=(2000, 3))
+    output = 1e-3 * heat[:, None] + 0.1 * np.gradient(heat)[:, None] + 0.003 * rng.normal(size=(2000, 3))
     assert not fit_temperature_curve(output, heat).adequate

@@ -36,6 +36,8 @@ def test_the_axis_across_the_plane_is_found_and_general_orientations_have_none(r
     assert plane_across(rng.standard_normal((24, 3))) is None
     tilted = force @ np.linalg.qr(rng.standard_normal((3, 3)))[0]
     assert plane_across(tilted) is None
+    with pytest.raises(NotIdentified, match="more than 3 are needed"):
+        fit_plane(np.ones((3, 3)), np.eye(3), 1, np.arange(3.0), np.ones((3, 3)))
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -93,11 +95,6 @@ def test_an_arc_is_a_turn_and_gives_its_coefficients(rng: np.random.Generator) -
     fit = fit_plane_norm(output, 1, 1.0, 30.0 * np.arange(13), np.full((13, 3), NOISE))
     assert fit.misfit < 4.0 * NOISE
     assert fit.bias[[0, 2]] == pytest.approx(BIAS[[0, 2]], abs=2e-3)
-
-
-def test_too_few_poses_are_refused() -> None:
-    with pytest.raises(NotIdentified, match="more than 3 are needed"):
-        fit_plane(np.ones((3, 3)), np.eye(3), 1, np.arange(3.0), np.ones((3, 3)))
 
 
 def test_the_norm_alone_gives_no_scale_to_an_axis_that_was_not_turned(rng: np.random.Generator) -> None:

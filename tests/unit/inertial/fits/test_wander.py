@@ -13,11 +13,6 @@ from inertial.noise import generate
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.state import State
 
-
-def test_a_misfit_that_is_no_number_is_no_good_fit() -> None:
-    assert np.isnan(lack_of_fit(np.array([np.nan, 5.0]), 5)[0])
-
-
 EFFECTS = ("bias", "scale", "misalignment")
 
 
@@ -77,13 +72,6 @@ def test_the_output_may_have_any_unit(plan: State, rng: np.random.Generator) -> 
     np.testing.assert_allclose(in_counts.residuals, 256e3 * in_g.residuals, rtol=1e-4, atol=1e-4)
 
 
-def test_refuses_a_reading_without_error(plan: State, rng: np.random.Generator) -> None:
-    error = ERROR.copy()
-    error[3, 7, 1] = 0.0
-    with pytest.raises(NotIdentified, match="standard error is zero"):
-        fit_lot_with_wander(EFFECTS, plan, outputs(rng, plan, 0.0, 0.0), error)
-
-
 def test_parameters_of_the_station_are_found_within_their_errors(plan: State, rng: np.random.Generator) -> None:
     state, tilt = plan, 1e-3
     lean = force_from_angles(state.outer, state.inner, up=(tilt, 0.0, np.sqrt(1.0 - tilt**2)))
@@ -132,7 +120,13 @@ def test_a_unit_that_the_model_does_not_fit_leaves_the_others_alone(plan: State,
     assert after.lack_of_fit[3, 0] > 10.0
 
 
-def test_refuses_a_plan_without_a_dwell_to_spare(plan: State, rng: np.random.Generator) -> None:
-    out = outputs(rng, plan, 0.0, 0.0)
+def test_refuses_a_plan_without_a_dwell_to_spare_and_a_reading_without_error(
+    plan: State, rng: np.random.Generator
+) -> None:
+    out, error = outputs(rng, plan, 0.0, 0.0), ERROR.copy()
     with pytest.raises(NotIdentified, match="leave nothing to judge the noise by"):
         fit_lot_with_wander(EFFECTS, plan, out, ERROR, used=np.arange(DWELLS) < 4)
+    error[3, 7, 1] = 0.0
+    with pytest.raises(NotIdentified, match="standard error is zero"):
+        fit_lot_with_wander(EFFECTS, plan, out, error)
+    assert np.isnan(lack_of_fit(np.array([np.nan, 5.0]), 5)[0])  # a misfit that is no number is no good fit

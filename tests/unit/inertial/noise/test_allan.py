@@ -20,14 +20,9 @@ def test_equals_allantools_to_a_billionth(rate_hz: float, offset: float) -> None
         centred = x[channel] - x[channel].mean()
         _, peer, _, _ = allantools.oadev(centred, rate=rate_hz, data_type="freq", taus=curve.tau)
         np.testing.assert_allclose(curve.deviation[channel], peer, rtol=1e-9)
-
-
-def test_many_channels_equal_one_at_a_time() -> None:
-    x = np.random.default_rng(2).normal(size=(2, 3, 600))
-    together = overlapping(x, 50.0)
-    alone = overlapping(x[1, 2], 50.0)
-    np.testing.assert_allclose(together.deviation[1, 2], alone.deviation, rtol=1e-12)
-    np.testing.assert_allclose(together.edf[1, 2], alone.edf, rtol=1e-9)
+    alone = overlapping(x[2], rate_hz, curve.m)
+    np.testing.assert_allclose(curve.deviation[2], alone.deviation, rtol=1e-12)
+    np.testing.assert_allclose(curve.edf[2], alone.edf, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("term", "alpha", "tolerance"), [(0, 2, 1e-6), (1, 0, 0.03), (2, -1, 0.08), (3, -2, 0.01)])

@@ -9,7 +9,6 @@ from inertial.noise.allan import overlapping
 from inertial.noise.bias_filter import BiasFilter, consistency, track
 from inertial.noise.gauss_markov import (
     BiasModel,
-    FlickerTerms,
     allan_variance,
     bias_model,
     flicker_of_steps,
@@ -94,42 +93,16 @@ def test_a_wrong_model_of_the_noise_is_not_consistent(white, sd, stated, rng):
     assert estimate.consistency.stated == stated
 
 
-def test_flicker_after_ten_minutes_of_updates_and_an_hour_without_stays_in_its_stated_deviation(rng):
-    """Flicker made by fractional integration; one process with s = B instead stated 12.8 µg where it was wrong by 146."""
-    b, n, block, updates = 100e-6, 4200, 5, 120
-    past = generate.flicker(rng, (40, 3, n + 3600), b)[..., 3600:]  # it has run before
-    means = past.reshape(40, 3, n // block, block).mean(axis=-1).transpose(0, 2, 1)
-    steps = np.concatenate(
-        [np.arange(updates), [140, 240, 480, n // block - 1]]
-    )  # an hour without updates behind ten minutes
-    model = bias_model([2e-5] * 3, [b] * 3, [0.0] * 3, [b * 3.0] * 3, flicker_terms(block, n))
-    known = np.full((len(steps), 3), np.nan)
-    known[:updates] = 0.0
-    pulls, errors, stated = [], [], []
-    for truth in means[:, steps]:
-        output = truth + 2e-5 / np.sqrt(block) * rng.standard_normal(truth.shape)
-        estimate = track(model, float(block) * steps, output, known, np.full(len(steps), np.nan), block)
-        sd = np.sqrt(np.diagonal(estimate.covariance, axis1=1, axis2=2))
-        pulls.append((estimate.bias - truth)[updates:] / sd[updates:])
-        errors.append((estimate.bias - truth)[-1])
-        stated.append(sd[-1])
-    assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.2  # 480 pulls of 120 channels
-    assert np.sqrt(np.mean(np.square(errors))) < 1.3 * np.mean(stated)
-    naive = BiasFilter(bias_model([2e-5] * 3, [b] * 3, [0.0] * 3, [0.0] * 3, FlickerTerms(
-        np.array([1.0]), np.array([100.0]), 1.0, 1.0, 0.0)))  # fmt: skip
-    naive.predict(3600.0)
-    assert np.sqrt(naive.covariance[0, 0]) < 0.8 * np.mean(
-        stated
-    )  # what B alone as a standard deviation would have stated
-
-
-def test_without_a_known_force_the_bias_stays_unknown() -> None:
+def test_without_a_known_force_the_bias_stays_unknown_and_consistency_has_the_bounds_of_chi_square() -> None:
     model = one_process(1e-4, 1e-3, 100.0, turn_on=2e-3)
     nothing = np.full((500, 3), np.nan)
     estimate = track(model, np.arange(500.0), np.zeros((500, 3)), nothing, nothing[:, 0], 1.0)
     assert not estimate.updated.any()
     assert np.all(np.sqrt(estimate.covariance[-1].diagonal()) > 0.999 * np.hypot(1e-3, 2e-3))
     assert estimate.consistency.stated is None
+    for n, low, high in ((50, 0.647, 1.428), (100, 0.742, 1.296), (1000, 0.914, 1.090)):  # facts, F: bounds of χ²
+        bounds = consistency([(0, 1.0)] * n)
+        assert (bounds.low, bounds.high) == pytest.approx((low, high), abs=1e-3)
 
 
 def test_rest_in_one_pose_tells_the_bias_along_the_force_only(rng: np.random.Generator) -> None:
@@ -142,13 +115,6 @@ def test_rest_in_one_pose_tells_the_bias_along_the_force_only(rng: np.random.Gen
     assert sd_along < 5e-6
     assert abs(along @ (estimate.bias[-1] - bias)) < 4.0 * sd_along + 1e-6  # second order: |b|²/2
     assert np.sqrt(estimate.covariance[-1][1, 1]) == pytest.approx(1e-3, rel=0.01)
-
-
-def test_consistency_has_the_bounds_of_chi_square() -> None:
-    """n = 50, 100, 1000: .647–1.428, .742–1.296, .914–1.090 (facts, F)."""
-    for n, low, high in ((50, 0.647, 1.428), (100, 0.742, 1.296), (1000, 0.914, 1.090)):
-        bounds = consistency([(0, 1.0)] * n)
-        assert (bounds.low, bounds.high) == pytest.approx((low, high), abs=1e-3)
 
 
 def test_an_outlier_is_counted_and_not_used() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from lots import dwell_rows
 from scipy.integrate import quad
 
 from inertial import poses
@@ -49,11 +50,8 @@ def lot(seed: int, wander: float, white: float = 1e-5) -> pd.DataFrame:
         slow = generate.flicker(rng, (3, 20 * n), wander)[:, -n:].T if wander else 0.0
         gain = np.eye(3) + 0.01 * rng.normal(size=(3, 3))
         out = force @ gain.T + 0.01 * rng.normal(size=3) + slow + white * rng.normal(size=(n, 3))
-        rows.append(pd.DataFrame(
-            {"unit": f"U{unit}", "dwell": range(n), "time_s": 20.0 * np.arange(n), "pose": [f"p{k % 24}" for k in range(n)],
-             "kind": "dwell", "out_unit": "g", "unit_C": 25.0, "n": 100, **{f"sd_{a}": 10.0 * white for a in "xyz"},
-             **{f"force_{a}": force[:, i] for i, a in enumerate("xyz")}, **{f"out_{a}": out[:, i] for i, a in enumerate("xyz")}}
-        ))  # fmt: skip
+        poses_ = [f"p{k % 24}" for k in range(n)]
+        rows.append(dwell_rows(f"U{unit}", 20.0 * np.arange(n), force, out, 10.0 * white, pose=poses_, unit_C=25.0))
     return pd.concat(rows, ignore_index=True)
 
 

@@ -58,6 +58,9 @@ def test_white_noise_alone_gives_the_errors_of_the_weighted_fit():
     plain = fit_lot(THERMAL, state, state.force.copy(), np.full(state.force.shape, error))
     expected = expected_errors(THERMAL, state, error**2 * np.eye(state.time.size))
     assert expected.errors == pytest.approx(plain.standard_errors, rel=1e-6)
+    state = course(soaks=(25.0,))  # it does not determine the temperature coefficients
+    with pytest.raises(NotIdentified, match="bias_temperature"):
+        expected_errors(THERMAL, state, np.eye(state.time.size))
 
 
 def test_parameters_of_the_station_gain_with_every_unit():
@@ -67,9 +70,3 @@ def test_parameters_of_the_station_gain_with_every_unit():
     assert one.shared_errors == pytest.approx(3.0 * nine.shared_errors)
     plain = fit_lot(model, state, np.tile(state.force, (9, 1, 1)), np.full((9, 26, 3), 1e-5))
     assert nine.shared_errors == pytest.approx(np.sqrt(np.diagonal(plain.shared_covariance)), rel=1e-6)
-
-
-def test_refuses_what_the_plan_cannot_determine():
-    state = course(soaks=(25.0,))
-    with pytest.raises(NotIdentified, match="bias_temperature"):
-        expected_errors(THERMAL, state, np.eye(state.time.size))

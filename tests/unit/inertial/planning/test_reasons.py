@@ -46,20 +46,13 @@ def test_what_hides_an_effect_and_what_shows_it_is_said(row):
     assert all(part in said for part in parts), said
 
 
-def test_soaks_in_one_direction_make_time_and_temperature_one():
-    state = planned("six", (0.0, 20.0, 40.0, 60.0))
-    said = reason(state, "aging_linear", THERMAL)
+def test_soaks_in_one_direction_a_quantity_that_was_not_recorded_and_one_axis_alone_are_said():
+    said = reason(planned("six", (0.0, 20.0, 40.0, 60.0)), "aging_linear", THERMAL)
     assert said.startswith("soaks in one direction only makes t collinear with")
     assert "bias_temperature" in said
     assert said.endswith("add soaks on the way back, at 40, 20, 0 °C")
-
-
-def test_a_quantity_that_was_not_recorded_is_named_by_its_column():
     said = reason(posed(poses.plan("six")), "supply_sensitivity", PLAIN)
     assert said == "the dwells carry no supply_V: kV is invisible; record supply_V"
-
-
-def test_one_axis_alone_can_be_asked_for():
     state = posed([(0.0, 0.0), (180.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (45.0, 0.0), (135.0, 0.0), (90.0, 90.0)])
     assert reason(state, "cross_coupling", PLAIN) == ""
     assert "β in 90° steps" in reason(state, "cross_coupling", PLAIN, axis=0)

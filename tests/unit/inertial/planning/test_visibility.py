@@ -39,8 +39,5 @@ def test_a_closed_loop_hides_only_what_is_wider_than_itself() -> None:
     visibility = hysteresis((0.0, 20.0, 40.0, 60.0, 40.0, 20.0, 0.0))
     assert visibility.seen
     assert all(r.low > 29.0 for r in visibility.unseen_ranges)
-
-
-def test_an_effect_without_parameters_has_no_ranges() -> None:
     per_effect = visibilities(soaked((0.0, 40.0)), MODEL, 1e-6, ["second_order", "scale_temperature"])
-    assert [v.unseen_ranges for v in per_effect] == [(), ()]
+    assert [v.unseen_ranges for v in per_effect] == [(), ()]  # effects without parameters

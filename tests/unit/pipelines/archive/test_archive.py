@@ -1,6 +1,5 @@
 """The archive: whole or not at all, the same bytes for the same content, and trouble told in one message."""
 
-import os
 from pathlib import Path
 
 import pandas as pd
@@ -8,7 +7,6 @@ import pytest
 from capture_double import CaptureDouble, small_job, small_run
 
 from pipelines.archive import Archive, Run, files, parquet, stage_key
-from pipelines.archive.keys import sources
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from schemas.errors import ArchiveUnusable, OperatorNeeded, WrongUse
@@ -22,79 +20,49 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return small_run(tmp_path_factory.mktemp("run"))
 
 
-def test_equal_tables_give_equal_bytes() -> None:
-    assert parquet.table_bytes("t", FRAME, 1) == parquet.table_bytes("t", FRAME.copy(), 1)
+def test_a_table_reads_back_and_what_is_none_is_named(tmp_path: Path) -> None:
+    path, content = tmp_path / "t.parquet", parquet.table_bytes("t", FRAME, 1)
+    assert content == parquet.table_bytes("t", FRAME.copy(), 1)
+    files.publish(path, content)
+    pd.testing.assert_frame_equal(parquet.read_table(path, "t"), FRAME)
+    for data, said in (
+        (content[:100], r"t\.parquet \(100 bytes\) is not a whole Parquet file"),
+        (FRAME.to_parquet(), "was not written by this archive"),
+        (parquet.table_bytes("other", FRAME, 1), "holds table 'other'"),
+    ):
+        path.write_bytes(data)
+        with pytest.raises(ArchiveUnusable, match=said):
+            parquet.read_table(path, "t")
 
 
-def test_reading_gives_back_what_was_written(tmp_path: Path) -> None:
-    files.publish(tmp_path / "t.parquet", parquet.table_bytes("t", FRAME, 1))
-    pd.testing.assert_frame_equal(parquet.read_table(tmp_path / "t.parquet", "t"), FRAME)
-
-
-def test_leaves_nothing_under_a_temporary_name(tmp_path: Path) -> None:
+def test_leaves_nothing_under_a_temporary_name_and_names_a_folder_that_cannot_be_an_archive(tmp_path: Path) -> None:
     files.publish(tmp_path / "a", b"1")
     files.publish_folder(tmp_path / "b", {"x": b"1", "y": b"2"})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
-
-
-def test_names_a_truncated_file_and_its_size(tmp_path: Path) -> None:
-    path = tmp_path / "t.parquet"
-    path.write_bytes(parquet.table_bytes("t", FRAME, 1)[:100])
-    with pytest.raises(ArchiveUnusable, match=r"t\.parquet \(100 bytes\) is not a whole Parquet file"):
-        parquet.read_table(path, "t")
-
-
-def test_refuses_a_foreign_parquet_file(tmp_path: Path) -> None:
-    FRAME.to_parquet(tmp_path / "t.parquet")
-    with pytest.raises(ArchiveUnusable, match="was not written by this archive"):
-        parquet.read_table(tmp_path / "t.parquet", "t")
-
-
-def test_refuses_another_table_under_a_tables_name(tmp_path: Path) -> None:
-    files.publish(tmp_path / "t.parquet", parquet.table_bytes("other", FRAME, 1))
-    with pytest.raises(ArchiveUnusable, match="holds table 'other'"):
-        parquet.read_table(tmp_path / "t.parquet", "t")
-
-
-def test_refuses_a_folder_that_holds_something_else(tmp_path: Path) -> None:
-    (tmp_path / "holiday.jpg").write_bytes(b"")
     with pytest.raises(ArchiveUnusable, match="holds other files and no archive"):
         Archive(tmp_path).prepare()
-
-
-def test_names_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
     with pytest.raises(ArchiveUnusable, match=r"cannot be written \(.*\), a folder with write permission"):
-        Archive(tmp_path / "file" / "archive").prepare()
+        Archive(tmp_path / "a" / "archive").prepare()
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_names_a_folder_without_permission(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(ArchiveUnusable, match="Permission denied"):
-        Archive(tmp_path / "archive").prepare()
-
-
-def test_a_key_depends_on_inputs_parameters_and_code_only() -> None:
-    key = stage_key("fit", {"dwells": "1"}, {"effects": ["bias"]}, "code")
-    assert key == stage_key("fit", {"dwells": "1"}, {"effects": ["bias"]}, "code")
-    others = [
-        stage_key("fit", {"dwells": "2"}, {"effects": ["bias"]}, "code"),
-        stage_key("fit", {"dwells": "1"}, {"effects": ["scale"]}, "code"),
-        stage_key("fit", {"dwells": "1"}, {"effects": ["bias"]}, "other code"),
-    ]
-    assert len({key, *others}) == 4
-
-
-def test_a_package_covers_its_modules() -> None:
-    assert set(sources(("inertial.frames",))) < set(sources(("inertial",)))
-
-
-def test_a_manifest_says_from_what_by_whom_and_with_what(run: Run) -> None:
+def test_a_manifest_says_from_what_by_whom_and_with_what_and_a_key_depends_on_inputs_parameters_and_code(
+    run: Run,
+) -> None:
     manifest = run.manifest("coefficients")
     assert manifest["inputs"] == {name: run.manifest(name)["sha256"] for name in ("dwells", "history")}
     assert manifest["parameters"]["effects"][0] == "bias"
     assert {"who", "where", "when", "libraries", "code", "schema"} <= manifest.keys()
+    keys = [
+        stage_key("fit", {"dwells": dwells}, {"effects": [effect]}, code)
+        for dwells, effect, code in (
+            ("1", "bias", "code"),
+            ("2", "bias", "code"),
+            ("1", "scale", "code"),
+            ("1", "bias", "new"),
+        )
+    ]
+    assert len(set(keys)) == 4
+    assert stage_key("fit", {"dwells": "1"}, {"effects": ["bias"]}, "code") == keys[0]
 
 
 def test_a_finished_run_is_not_computed_again(run: Run, tmp_path: Path) -> None:
@@ -128,20 +96,14 @@ def test_other_effects_make_a_run_of_their_own_on_the_same_capture(run: Run, tmp
     pd.testing.assert_frame_equal(other.run.table("dwells"), run.table("dwells"))
 
 
-def test_finds_a_run_by_its_beginning_and_the_latest(run: Run) -> None:
+def test_finds_a_run_by_its_beginning_and_the_latest_and_names_what_is_close(run: Run) -> None:
     archive = Archive(run.archive.root)
     ids = [info.id for info in archive.runs()]
     assert run.id in ids
     assert archive.run(run.id[:-2]).id == run.id
     assert archive.run("latest").id == ids[-1]
-
-
-def test_names_close_runs(run: Run) -> None:
     with pytest.raises(WrongUse, match=f"did you mean .*{run.id}"):
-        Archive(run.archive.root).run(run.id.replace("small", "smal"))
-
-
-def test_names_close_tables(run: Run) -> None:
+        archive.run(run.id.replace("small", "smal"))
     with pytest.raises(WrongUse, match="did you mean coefficients"):
         run.table("coeficients")
 
@@ -156,15 +118,11 @@ def test_one_process_at_a_time_measures_a_lot(tmp_path: Path) -> None:
         list(Runner(job, archive, measure=second).all())
 
 
-def test_samples_are_kept_record_by_record(run: Run) -> None:
-    assert run.records is not None
+def test_samples_are_kept_record_by_record_beside_the_stations_last_state_alone(run: Run, tmp_path: Path) -> None:
     assert sum(len(frame) for frame in run.records.samples()) == len(run.table("samples"))
     assert len(list(run.records.samples())) == len(run.records.finished())
-
-
-def test_keeps_only_the_stations_last_state(tmp_path: Path) -> None:
-    job, archive = small_job(tmp_path), Archive(tmp_path / "archive")
-    records = archive.capture(job.capture_id)
+    job = small_job(tmp_path)
+    records = Archive(tmp_path / "archive").capture(job.capture_id)
     CaptureDouble()(job, records, lambda *_: None)
     assert records.last_state() == str(max(records.finished())).encode()
     assert len(list((records.path / "state").iterdir())) == 1

@@ -11,23 +11,16 @@ from pipelines.archive.code import CODE
 from pipelines.archive.keys import sources
 
 
-def test_a_stage_does_not_depend_on_what_only_others_use():
+def test_a_key_takes_in_what_its_stage_uses_by_name_or_by_discovery_and_nothing_of_others() -> None:
     assert not {n for n in sources(CODE["grade"]) if n.startswith("inertial.criticism")}
     assert "inertial.fits.wander" not in sources(CODE["reduce"])
-
-
-def test_every_effect_and_every_procedure_counts_although_nothing_names_it():
     assert {"inertial.effects.third_order", "inertial.effects.covariate"} <= set(sources(CODE["fit"]))
     assert "pipelines.procedures.sweep" in sources(CODE["procedures"])
-
-
-def test_a_package_stands_for_everything_below_it():
     assert {"inertial.noise.allan", "inertial.noise"} <= set(sources(("inertial.noise",)))
-
-
-def test_the_order_is_that_of_names_wherever_the_product_lies():
-    modules = list(sources(CODE["fit"]))
-    assert modules == sorted(modules)
+    assert list(sources(CODE["fit"])) == sorted(sources(CODE["fit"]))
+    for name in ("inertial.no_such_module", "no_such_package", "inertial.counts.number_of"):
+        with pytest.raises(LookupError, match=name):
+            sources((name,))
 
 
 def test_every_source_is_that_of_the_module_of_its_name():
@@ -37,12 +30,6 @@ def test_every_source_is_that_of_the_module_of_its_name():
         spec = find_spec(name)
         assert spec is not None, name
         assert files[name] == Path(spec.origin or ""), name
-
-
-@pytest.mark.parametrize("name", ["inertial.no_such_module", "no_such_package", "inertial.counts.number_of"])
-def test_a_declared_module_that_is_not_there_is_an_error(name):
-    with pytest.raises(LookupError, match=name):
-        sources((name,))
 
 
 def test_no_module_is_imported_for_its_source():

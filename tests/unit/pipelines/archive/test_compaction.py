@@ -70,29 +70,23 @@ def test_index_and_queries_are_as_before(archive: Archive) -> None:
     assert ask(archive, question).rows == expected
 
 
+def test_open_and_unfinished_runs_are_left_alone(archive: Archive) -> None:
+    run, before = archive.run("latest"), logical(archive)
+    with alone(run.path), pytest.raises(OperatorNeeded, match="without open runs is needed"):
+        compact(archive)
+    assert not (archive.root / packs.FOLDER / "000001-calibrations.zip").exists()
+    assert logical(archive) == before
+    (run.path / "sealed.json").unlink()
+    assert compact(archive).unfinished == [run.id]
+    assert (Path(str(run.path)) / "run.json").stat().st_size
+
+
 def test_finished_command_finds_its_packed_run(archive: Archive) -> None:
     compact(archive)
     before = single(archive)
     again = small_run(Path(str(archive.root)).parent)
     assert again.id == archive.run("latest").id
     assert {p.suffix for p in set(single(archive)) - set(before)} <= {".html", ".json"}
-
-
-def test_refused_while_a_run_is_open(archive: Archive) -> None:
-    run = archive.run("latest")
-    before = logical(archive)
-    with alone(run.path), pytest.raises(OperatorNeeded, match="without open runs is needed"):
-        compact(archive)
-    assert not (archive.root / packs.FOLDER / "000001-calibrations.zip").exists()
-    assert logical(archive) == before
-
-
-def test_unfinished_run_stays(archive: Archive) -> None:
-    run = archive.run("latest")
-    (run.path / "sealed.json").unlink()
-    done = compact(archive)
-    assert done.unfinished == [run.id]
-    assert (Path(str(run.path)) / "run.json").stat().st_size
 
 
 def test_next_event_follows_the_packed_ones(archive: Archive) -> None:
@@ -109,7 +103,9 @@ def test_next_event_follows_the_packed_ones(archive: Archive) -> None:
     assert isinstance(place, PackedPath)
 
 
-def test_copy_of_a_compacted_archive_is_of_single_files(archive: Archive, tmp_path: Path) -> None:
+def test_a_copy_of_a_compacted_archive_and_its_unpacked_zips_are_the_single_files(
+    archive: Archive, tmp_path: Path
+) -> None:
     expected = logical(archive)
     compact(archive)
     copy = Archive(tmp_path / "copy")
@@ -118,13 +114,8 @@ def test_copy_of_a_compacted_archive_is_of_single_files(archive: Archive, tmp_pa
     assert not (copy.root / packs.FOLDER).exists()
     compact(copy)
     assert copy_archive(archive, copy).files == 0
-
-
-def test_unzip_restores_the_single_files(archive: Archive) -> None:
-    expected = logical(archive)
-    compact(archive)
-    for place in Path(str(archive.root / packs.FOLDER)).glob("*.zip"):
-        with zipfile.ZipFile(place) as container:
+    for path in Path(str(archive.root / packs.FOLDER)).glob("*.zip"):
+        with zipfile.ZipFile(path) as container:
             container.extractall(archive.root)
     shutil.rmtree(archive.root / packs.FOLDER)
     assert logical(Archive(str(archive.root))) == expected
@@ -162,17 +153,13 @@ def test_every_folder_is_where_its_table_says_however_many_are_asked_for(tmp_pat
     for name in names * 2:
         number = 3 if name in names[:2] else 1 + names.index(name) % 2
         folder = known.folder(name)
-        assert folder is not None
         assert folder.files["run.json"][1:] == (100 * number, 7, number)
     assert known.folder("runs/line-1") is None
 
 
-@pytest.mark.parametrize(
-    ("sizes", "count"),
-    [((), 0), ((5,), 1), ((8, 1), 1), ((2, 1), 2), ((9, 5, 1, 1), 2), ((8, 3, 1, 1), 4), ((2**30 - 5, 9), 1)],
-)
-def test_small_packs_are_merged_with_one_at_most_twice_as_large(sizes: tuple[int, ...], count: int) -> None:
-    assert due_of(sizes) == count
+def test_small_packs_are_merged_with_one_at_most_twice_as_large() -> None:
+    counts = {(): 0, (5,): 1, (8, 1): 1, (2, 1): 2, (9, 5, 1, 1): 2, (8, 3, 1, 1): 4, (2**30 - 5, 9): 1}
+    assert {sizes: due_of(sizes) for sizes in counts} == counts
 
 
 def test_many_compactions_leave_few_packs_and_the_same_files(archive: Archive) -> None:

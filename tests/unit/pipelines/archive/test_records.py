@@ -67,20 +67,12 @@ def test_pieces_are_published_with_their_record_or_not_at_all(tmp_path: Path) ->
     assert len(records.gathered("samples")) == len(samples)
 
 
-def test_pieces_of_a_killed_record_are_swept_away(tmp_path: Path) -> None:
+def test_pieces_of_a_killed_or_spoilt_attempt_do_not_reach_the_next(tmp_path: Path) -> None:
     samples, readings, history = record(tmp_path)
-    killed = Archive(tmp_path / "archive").capture("c1")
-    killed.part(0, 0, samples[:100])
-    again = Archive(tmp_path / "archive").capture("c1")
-    again.begin()
-    assert not list(Path(str(again.path)).iterdir())
-    again.put(0, samples, readings, history, b"state")
-    pd.testing.assert_frame_equal(pd.concat(again.samples()), samples)
-
-
-def test_pieces_of_a_spoilt_attempt_do_not_reach_the_next(tmp_path: Path) -> None:
-    samples, readings, history = record(tmp_path)
+    Archive(tmp_path / "archive").capture("c1").part(0, 0, samples[:100])  # killed
     records = Archive(tmp_path / "archive").capture("c1")
+    records.begin()
+    assert not list(Path(str(records.path)).iterdir())
     records.part(0, 0, samples[:50])
     records.part(0, 1, samples[50:60])
     records.part(0, 0, samples[:100])
@@ -106,10 +98,12 @@ def cut(tables: list[pd.DataFrame], cuts: int) -> Iterator[pd.DataFrame]:
             yield table[(table["time_s"] > low) & (table["time_s"] <= high)].reset_index(drop=True)
 
 
-@pytest.mark.parametrize("fault", ["", "stuck", "nan", "infinity", "clipped", "short", "overflow"])
-@pytest.mark.parametrize("cuts", [2, 7])
+@pytest.mark.parametrize(
+    ("fault", "cuts"), [*((f, 7) for f in ("", "stuck", "nan", "infinity", "clipped", "short", "overflow")), ("", 2)]
+)
 def test_pieces_are_judged_as_the_whole_is(tmp_path: Path, fault: str, cuts: int) -> None:
     samples, readings = lot_in_memory(tmp_path, {"A2": fault} if fault else {})
+    assert [(n, len(list(own))) for n, own in by_record(cut(samples, cuts))] == [(n, cuts) for n in range(10)]
     units = [Unit(serial=serial, slot=slot) for slot, serial in enumerate(UNITS)]
     whole, pieces = validate(samples, readings, units), validate(cut(samples, cuts), readings, units)
     pd.testing.assert_frame_equal(whole, pieces)
@@ -117,11 +111,6 @@ def test_pieces_are_judged_as_the_whole_is(tmp_path: Path, fault: str, cuts: int
     pd.testing.assert_frame_equal(
         reduce(samples, readings, whole, 9.81), reduce(cut(samples, cuts), readings, pieces, 9.81), rtol=1e-12
     )
-
-
-def test_tables_of_a_record_come_together(tmp_path: Path) -> None:
-    samples, _ = lot_in_memory(tmp_path, {})
-    assert [(n, len(list(tables))) for n, tables in by_record(cut(samples, 3))] == [(n, 3) for n in range(10)]
 
 
 def test_a_long_series_is_averaged_and_keeps_its_allan_deviation(rng: np.random.Generator) -> None:

@@ -82,37 +82,23 @@ def test_when_a_unit_is_due_why_and_whether_a_certificate_holds(name: str, tmp_p
     assert told(measured(*rows, outcome=outcome), known(tmp_path, *events)) == expected
 
 
-def test_what_passed_and_was_never_certified_is_told_and_due_by_its_interval(tmp_path: Path) -> None:
+def test_what_passed_and_was_not_certified_is_told_and_due_by_its_interval(tmp_path: Path) -> None:
     ledger = known(tmp_path, event(serial="B1", start="2026-01-02"))
     all_ = measured(("A1", "r-1", "2026-02-01"), ("B1", "r-1", "2026-01-01"))
     due_units = due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger)
     assert [str(all_.unit[due_units.row[k]]) for k in uncertified(all_, due_units, ledger)] == ["A1"]
     assert (date_of(due_units.day[0]), due_units.because[0], due_units.valid[0]) == ("2027-02-01", "fixed", False)
-
-
-def test_without_a_ledger_nothing_is_told_as_uncertified(tmp_path: Path) -> None:
-    all_, ledger = measured(("A1", "r-1", "2026-02-01")), known(tmp_path)
-    due_units = due(all_, np.ones(1, dtype=bool), RULES, [], {}, ledger)
-    assert uncertified(all_, due_units, ledger).size == 0
-    assert told(all_, ledger) == ("2027-02-01", "fixed", "", False)
-
-
-def test_a_newer_pass_that_is_not_certified_is_told(tmp_path: Path) -> None:
-    ledger = known(tmp_path, event(start="2025-08-01", until="2026-08-01"))
-    all_ = measured(("A1", "r-1", "2025-07-31"), ("A1", "r-2", "2026-06-01"))
-    assert uncertified(all_, due(all_, np.ones(2, dtype=bool), RULES, [], {}, ledger), ledger).size == 1
-
-
-def test_a_run_again_of_the_same_capture_certifies_the_measurement(tmp_path: Path) -> None:
-    ledger = known(tmp_path, event(run="again-1", start="2026-01-02"), captures={"r-1": "c", "again-1": "c"})
-    all_ = measured(("A1", "r-1", "2026-01-01"))
-    due_units = due(all_, np.ones(1, dtype=bool), RULES, [], {}, ledger)
-    assert due_units.entered.all()
-
-
-def test_one_serial_on_another_kind_of_device_has_no_certificate(tmp_path: Path) -> None:
-    ledger = known(tmp_path, event(start="2026-01-02", device="SF1500"))
-    assert told(measured(("A1", "r-1", "2026-01-01")), ledger)[2:] == ("", False)
+    newer, older = measured(("A1", "r-1", "2025-07-31"), ("A1", "r-2", "2026-06-01")), tmp_path / "older"
+    ledger = known(older, event(start="2025-08-01", until="2026-08-01"))
+    assert uncertified(newer, due(newer, np.ones(2, dtype=bool), RULES, [], {}, ledger), ledger).size == 1
+    one, ledger = measured(FIRST), known(tmp_path / "none")  # without a ledger nothing is told
+    assert uncertified(one, due(one, np.ones(1, dtype=bool), RULES, [], {}, ledger), ledger).size == 0
+    assert told(one, ledger) == ("2027-01-01", "fixed", "", False)
+    captures = {"r-1": "c", "again-1": "c"}  # a run again of the same capture certifies the measurement
+    ledger = known(tmp_path / "again", event(run="again-1", start="2026-01-02"), captures=captures)
+    assert due(one, np.ones(1, dtype=bool), RULES, [], {}, ledger).entered.all()
+    ledger = known(tmp_path / "kind", event(start="2026-01-02", device="SF1500"))
+    assert told(one, ledger)[2:] == ("", False)  # a certificate of another kind of device
 
 
 def test_a_broken_history_is_told_and_leaves_the_others_alone(tmp_path: Path) -> None:
@@ -149,5 +135,4 @@ def test_whether_a_certificate_holds_is_what_the_ledger_says_on_that_day(
     if held is None:
         assert standing is None or standing.state != "valid"
     else:
-        assert standing is not None
         assert (standing.state, standing.certificate, standing.until) == ("valid", held.certificate, day_of(held.until))

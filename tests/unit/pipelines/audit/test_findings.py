@@ -41,12 +41,9 @@ def calibrations(*rows: tuple[str, str, str, float], values: np.ndarray | None =
     return unsorted.chosen(order)
 
 
-def test_one_serial_on_two_kinds_of_device_is_two_units() -> None:
-    all_ = calibrations(("A", "ADXL355", "s", 0.0), ("A", "SF1500", "s", 90.0), ("B", "ADXL355", "s", 0.0))
-    assert [one.serial for one in twice(all_)] == ["A"]
-
-
-def test_one_serial_on_two_stations_within_minutes_is_two_units_and_on_the_next_day_one() -> None:
+def test_one_serial_on_two_kinds_or_stations_within_minutes_is_two_units_and_on_the_next_day_one() -> None:
+    kinds = calibrations(("A", "ADXL355", "s", 0.0), ("A", "SF1500", "s", 90.0), ("B", "ADXL355", "s", 0.0))
+    assert [one.serial for one in twice(kinds)] == ["A"]
     at_once = calibrations(("A", "X", "s", 10.0), ("A", "X", "t", 10.002), ("B", "X", "s", 10.0), ("B", "X", "t", 11.0))
     assert [one.serial for one in twice(at_once)] == ["A"]
     again = calibrations(("A", "X", "s", 10.0), ("A", "X", "s", 10.002))  # the same station began once more
@@ -70,17 +67,11 @@ def test_among_few_units_one_that_changed_is_not_called_exchanged(rng: np.random
     assert strangers(calibrations(*rows, values=values), RULES) == []
 
 
-def test_a_unit_with_one_calibration_and_one_that_came_back_early_count_from_their_last(
-    rng: np.random.Generator,
-) -> None:
+def test_units_are_due_from_their_last_calibration_and_at_the_station_that_made_it() -> None:
     start = day_of("2024-01-10")
     all_ = calibrations(("A", "X", "s", start), ("B", "X", "s", start), ("B", "X", "s", start + 20.0))
     due_units = due(all_, np.ones(3, dtype=bool), RULES, [], {})
     assert [date_of(day) for day in due_units.day] == ["2025-01-10", "2025-01-30"]
-
-
-def test_a_unit_that_another_station_measured_since_is_not_due_at_the_first_one() -> None:
-    start = day_of("2024-01-10")
     all_ = calibrations(("A", "X", "s", start), ("A", "X", "t", start + 300.0), ("B", "X", "s", start))
     due_units = last_measured(all_, due(all_, np.ones(3, dtype=bool), RULES, [], {}), "s")
     assert [str(all_.unit[row]) for row in due_units.row] == ["B"]

@@ -3,13 +3,11 @@
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, small_job
+from capture_double import CaptureDouble, measured_run, small_job
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
 from pipelines.capture.interruptions import interruptions
-from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.cli.summary import summary
 from pipelines.report import render
@@ -38,10 +36,7 @@ class Interrupted(CaptureDouble):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     folder: Path = tmp_path_factory.mktemp("interrupted")
-    runner = Runner(small_job(folder), Archive(folder / "archive"), measure=Interrupted())
-    for stage in ORDER[:-1]:
-        runner.stage(stage)
-    return runner.run
+    return measured_run(small_job(folder), Archive(folder / "archive"), Interrupted())
 
 
 def test_an_opened_door_pauses_and_repeated_dwells_are_in_the_result(run: Run) -> None:

@@ -1,5 +1,8 @@
 """The capture's check of the table goes by the same summaries as validation, and ends a run whose units all disagree."""
 
+from functools import partial
+from itertools import starmap
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,20 +25,15 @@ def tables(angles: tuple[float, float], turned_deg: float = 0.0, record: int = 0
         for unit in UNITS
         for x, y, z in force + 1e-5 * np.random.default_rng(record).standard_normal((50, 3))
     ]
-    readings = pd.DataFrame(
-        [
-            {
-                "unit": u, "record": record, "status": "ok", "full_scale": 1e6,
-                "outer_deg": angles[0], "inner_deg": angles[1],
-            }
-            for u in UNITS
-        ]
-    )  # fmt: skip
-    return pd.DataFrame(rows), readings
+    shared = {"record": record, "status": "ok", "full_scale": 1e6, "outer_deg": angles[0], "inner_deg": angles[1]}
+    return pd.DataFrame(rows), pd.DataFrame({"unit": UNITS, **shared})
 
 
 def test_dwells_that_agree_with_the_encoders_pass():
     checks = Plausibility(reader=None, identities={})
+    samples, readings = tables(ANGLES[0])
+    checks.refuse_contradiction(0, samples.iloc[:0], readings)  # stored already: no dwell
+    assert checks.pointing.means == []
     for record, angles in enumerate(ANGLES):
         checks.refuse_contradiction(0, *tables(angles, record=record))
     samples, readings = tables(ANGLES[-1], record=len(ANGLES) - 1)
@@ -50,19 +48,7 @@ def test_a_table_whose_zero_jumps_during_a_soak_ends_the_run():
     for dwell in dwells[:9]:
         checks.refuse_contradiction(0, *dwell)
     with pytest.raises(OperatorNeeded, match=TURNED):
-        _all(checks, dwells[9:])
-
-
-def _all(checks, dwells):
-    for dwell in dwells:
-        checks.refuse_contradiction(0, *dwell)
-
-
-def test_a_record_whose_samples_are_all_stored_already_adds_no_dwell():
-    checks = Plausibility(reader=None, identities={})
-    samples, readings = tables(ANGLES[0])
-    checks.refuse_contradiction(0, samples.iloc[:0], readings)
-    assert checks.pointing.means == []
+        list(starmap(partial(checks.refuse_contradiction, 0), dwells[9:]))
 
 
 def test_the_first_sample_that_cannot_be_the_unit_s_is_told_with_the_median():

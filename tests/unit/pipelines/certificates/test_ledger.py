@@ -1,5 +1,6 @@
 """The ledger of calibrations: certified, superseded, revoked; no two of a unit on one day."""
 
+import hashlib
 import json
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
@@ -26,19 +27,30 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return small_run(tmp_path_factory.mktemp("ledger"), {"A3": "silent"})
 
 
-def test_a_calibration_holds_from_its_first_day_to_before_its_last(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    ledger.add(event())
-    assert ledger.valid_at("A1", "2025-12-31") is None
-    assert ledger.valid_at("A1", "2026-01-01").certificate == "A1/1"
-    assert ledger.valid_at("A1", "2026-12-31").certificate == "A1/1"
-    assert ledger.valid_at("A1", "2027-01-01") is None
+@pytest.fixture
+def ledger(tmp_path: Path) -> Ledger:
+    """One with a calibration for the year 2026."""
+    made = Ledger(tmp_path)
+    made.add(event())
+    return made
 
 
-def test_a_new_calibration_ends_the_one_before_where_it_begins(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    ledger.add(event())
-    ledger.add(event(start="2026-10-01", until="2027-10-01", run="r-2"))
+NEXT = {"start": "2026-10-01", "until": "2027-10-01", "run": "r-2"}
+
+
+def test_a_calibration_holds_from_its_first_day_to_before_its_last_and_is_written_once(ledger: Ledger) -> None:
+    days = ("2025-12-31", "2026-01-01", "2026-12-31", "2027-01-01")
+    held = [ledger.valid_at("A1", one) for one in days]
+    assert [one and one.certificate for one in held] == [None, "A1/1", "A1/1", None]
+    again, there = ledger.add(event())
+    assert there
+    assert [again] == ledger.events("A1")
+
+
+def test_a_new_calibration_ends_the_one_before_where_it_begins_and_names_it_by_its_hash(
+    ledger: Ledger, tmp_path: Path
+) -> None:
+    ledger.add(event(**NEXT))
     assert [e.action for e in ledger.events("A1")] == ["certify", "supersede"]
     assert ledger.valid_at("A1", "2026-09-30").run == "r-1"
     assert ledger.valid_at("A1", "2026-10-01").run == "r-2"
@@ -46,6 +58,11 @@ def test_a_new_calibration_ends_the_one_before_where_it_begins(tmp_path: Path) -
         ("superseded", "2026-10-01", "2027-01-01"),
         ("valid", "2027-10-01", "2027-10-01"),
     ]
+    [first] = tmp_path.glob("calibrations/*/*/000001.json")
+    assert ledger.events("A1")[1].previous == hashlib.sha256(first.read_bytes()).hexdigest()
+    first.unlink()
+    with pytest.raises(ArchiveUnusable, match=r"has event 000002\.json where number 1 is needed"):
+        ledger.valid_at("A1", "2026-11-01")
 
 
 def test_one_that_begins_before_a_valid_one_is_refused_unless_it_supersedes(tmp_path: Path) -> None:
@@ -56,15 +73,6 @@ def test_one_that_begins_before_a_valid_one_is_refused_unless_it_supersedes(tmp_
     assert len(ledger.events("A1")) == 1
     ledger.add(event(start="2026-01-01", run="r-2"), supersede=True)
     assert ledger.valid_at("A1", "2026-07-01").run == "r-2"
-
-
-def test_certifying_the_same_again_writes_nothing(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    first, was_there = ledger.add(event())
-    again, there = ledger.add(event())
-    assert (was_there, there) == (False, True)
-    assert again == first
-    assert len(ledger.events("A1")) == 1
 
 
 def test_what_is_revoked_holds_on_no_day_or_from_the_day_named(tmp_path: Path) -> None:
@@ -89,36 +97,22 @@ def test_a_revocation_needs_a_reason_and_something_that_holds(tmp_path: Path) ->
         ledger.revoke("A1", "why", certificate=7)
 
 
-def test_what_was_known_on_a_day_is_told_without_what_was_written_later(tmp_path: Path) -> None:
+def test_what_was_known_on_a_day_is_told_without_what_was_written_later_by_a_sound_clock(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path)
-    ledger.write_bulk(
-        [
-            event(sequence=1, when="2026-01-02T08:00:00+00:00"),
-            event(sequence=2, action="revoke", ends=(1,), when="2026-03-01T08:00:00+00:00"),
-        ]
-    )
+    first = event(sequence=1, when="2026-01-02T08:00:00+00:00")
+    ledger.write_bulk([first, event(sequence=2, action="revoke", ends=(1,), when="2026-03-01T08:00:00+00:00")])
     assert ledger.valid_at("A1", "2026-02-01") is None
     assert ledger.valid_at("A1", "2026-02-01", known="2026-02-28").certificate == "A1/1"
-
-
-def test_each_event_names_the_one_before_by_its_hash(tmp_path: Path) -> None:
-    import hashlib
-
-    ledger = Ledger(tmp_path)
-    ledger.add(event())
-    ledger.add(event(start="2026-10-01", until="2027-10-01", run="r-2"))
-    [first] = tmp_path.glob("calibrations/*/*/000001.json")
-    assert ledger.events("A1")[1].previous == hashlib.sha256(first.read_bytes()).hexdigest()
-
-
-def test_a_missing_event_is_found(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    ledger.add(event())
-    ledger.add(event(start="2026-10-01", until="2027-10-01", run="r-2"))
-    [first] = tmp_path.glob("calibrations/*/*/000001.json")
-    first.unlink()
-    with pytest.raises(ArchiveUnusable, match=r"has event 000002\.json where number 1 is needed"):
-        ledger.valid_at("A1", "2026-11-01")
+    later = (datetime.now(UTC) + timedelta(hours=2)).isoformat(timespec="milliseconds")
+    assert ledger.write_bulk([event(f"S{i:02d}", sequence=1, when=later) for i in range(50)]) == 50
+    assert sorted({one.serial for one in ledger.all()}) == ["A1", *(f"S{i:02d}" for i in range(50))]
+    with pytest.raises(ArchiveUnusable, match="set this host's clock"):
+        ledger.add(event("S07", **NEXT))
+    assert len(ledger.events("S07")) == 1
+    [path] = [path for path in tmp_path.glob("calibrations/*/*/*.json") if '"S07"' in path.read_text()]
+    path.write_text(path.read_text().replace('"schema": 1', '"schema": 9'))
+    with pytest.raises(ArchiveUnusable, match="has schema 9, this version knows up to 1; use a newer version"):
+        ledger.valid_at("S07", "2026-02-01")
 
 
 @each(["../../etc/x", "a/b", "a\\b", "A1\n", "", " A1", "A" * 65, "A1\x00"])
@@ -130,40 +124,13 @@ def test_serials_that_could_be_paths_or_lines_are_refused_and_write_nothing(seri
     assert Ledger(tmp_path).events(serial) == []
 
 
-def test_two_kinds_of_device_under_one_serial_are_told(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    ledger.add(event())
+def test_two_kinds_of_device_under_one_serial_are_told(ledger: Ledger) -> None:
+    other = event(**NEXT | {"device": "ADXL357"})
     with pytest.raises(WrongUse, match="the ledger knows this serial as ADXL355: two units have one serial"):
-        ledger.add(event(start="2026-10-01", until="2027-10-01", device="ADXL357"))
+        ledger.add(other)
     ledger.revoke("A1", "was another unit", certificate=1)
-    ledger.add(event(start="2026-10-01", until="2027-10-01", device="ADXL357"))
+    ledger.add(other)
     assert ledger.valid_at("A1", "2026-12-01").event.device == "ADXL357"
-
-
-def test_a_clock_that_went_backwards_is_told_and_nothing_is_written(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    later = (datetime.now(UTC) + timedelta(hours=2)).isoformat(timespec="milliseconds")
-    ledger.write_bulk([event(sequence=1, when=later)])
-    with pytest.raises(ArchiveUnusable, match="set this host's clock"):
-        ledger.add(event(start="2026-10-01", until="2027-10-01", run="r-2"))
-    assert len(ledger.events("A1")) == 1
-
-
-def test_an_event_of_a_newer_schema_is_told(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    ledger.add(event())
-    [path] = tmp_path.glob("calibrations/*/*/*.json")
-    path.write_text(path.read_text().replace('"schema": 1', '"schema": 9'))
-    with pytest.raises(ArchiveUnusable, match="has schema 9, this version knows up to 1; use a newer version"):
-        ledger.valid_at("A1", "2026-02-01")
-
-
-def test_the_bulk_writer_writes_what_is_read_back_of_every_unit(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path)
-    events = [event(f"S{i:03d}", sequence=1, when="2026-01-01T00:00:00+00:00") for i in range(50)]
-    assert ledger.write_bulk(events) == 50
-    assert sorted(one.serial for one in ledger.all()) == [e.serial for e in events]
-    assert ledger.events("S007") == [events[7]]
 
 
 DAYS = st.integers(0, 40).map(lambda n: (date(2026, 1, 1) + timedelta(days=n)).isoformat())
@@ -191,15 +158,13 @@ def test_no_two_calibrations_of_a_unit_hold_on_one_day_whatever_is_written(steps
         assert sum(one.holds(day) for one in calibrations_of(events)) <= 1
 
 
-def test_a_day_is_that_of_utc_and_what_is_no_date_is_refused() -> None:
-    for text, told in (("2026-05-01", "2026-05-01"), ("2026-05-01T23:30:00-02:00", "2026-05-02")):
+def test_a_day_is_that_of_utc_and_months_end_on_the_last_day_where_there_is_no_such_day() -> None:
+    for text, told in (
+        ("2026-05-01", "2026-05-01"), ("2026-05-01T23:30:00-02:00", "2026-05-02"), ("2026-05-01T12:00:00Z", "2026-05-01"),
+    ):  # fmt: skip
         assert day_of(text, "--at") == told
-    assert day_of("2026-05-01T12:00:00Z", "--at") == "2026-05-01"
     with pytest.raises(WrongUse, match=r"--at: found '31\.12\.2026', a date such as 2026-05-01"):
         day_of("31.12.2026", "--at")
-
-
-def test_months_end_on_the_last_day_where_there_is_no_such_day() -> None:
     assert months_after("2026-08-31", 6) == "2027-02-28"
     assert months_after("2026-01-15", 12) == "2027-01-15"
 
@@ -220,7 +185,7 @@ def test_only_units_that_passed_are_certified_and_the_others_are_named(run: Run)
         ask(run, "certify", run.id, "--units", "A3")
 
 
-def test_show_tells_the_calibration_of_a_date_with_its_coefficients_and_origin(run: Run) -> None:
+def test_show_tells_the_calibration_of_a_date_with_its_coefficients_origin_and_end(run: Run) -> None:
     ask(run, "certify", run.id, "--units", "A1,A2")
     status, shown = ask(run, "show", "A1", "--at", day(100))
     calibration = shown["calibration"]
@@ -231,17 +196,9 @@ def test_show_tells_the_calibration_of_a_date_with_its_coefficients_and_origin(r
     assert calibration["made"]["capture"] == run.about["capture"]
     status, shown = ask(run, "show", "A1", "--at", day(-1))
     assert (status, shown["valid"], shown["calibration"]) == (1, False, None)
-
-
-def test_a_revoked_calibration_is_shown_as_such(run: Run) -> None:
-    ask(run, "certify", run.id, "--units", "A2")
     ask(run, "revoke", "A2", "--reason", "returned damaged")
     status, shown = ask(run, "show", "A2", "--at", day(100))
-    assert status == 1
-    assert shown["history"][-1]["state"] == "revoked"
-    assert shown["history"][-1]["ended"]["reason"] == "returned damaged"
-
-
-def test_a_unit_that_nobody_certified_is_told(run: Run) -> None:
+    last = shown["history"][-1]
+    assert (status, last["state"], last["ended"]["reason"]) == (1, "revoked", "returned damaged")
     with pytest.raises(WrongUse, match="unit 'B7' has no calibration in archive"):
         ask(run, "show", "B7", "--at", "2026-01-01")

@@ -60,36 +60,22 @@ def test_a_statement_that_cannot_be_is_refused_with_its_key(row: tuple[dict, str
     assert message.split(".", 1)[0] in text
 
 
-def test_every_form_of_a_statement_is_one_standard_uncertainty() -> None:
+def test_every_form_of_a_statement_is_one_standard_uncertainty_reads_as_it_was_written_and_what_is_missing_is_said() -> (
+    None
+):
     forms = (
         {"u_urad": 20.0}, {"U_urad": 40.0, "k": 2}, {"half_width_urad": 20.0 * 3**0.5, "distribution": "rectangular"},
         {"u_deg": np.degrees(20e-6)}, {"u_arcsec": 3600 * np.degrees(20e-6)},
     )  # fmt: skip
     for form in forms:
-        entry = stated(level={**form, "source": "s"}).level
-        assert entry is not None
-        assert entry.standard().u == pytest.approx(20e-6)
-
-
-def test_gravity_by_the_formula_has_60_ppm_where_nothing_else_is_stated() -> None:
-    gravity = stated(gravity={"source": "formula", "latitude_deg": 45.0, "height_m": 0.0}).gravity
-    assert gravity is not None
-    assert gravity.value == pytest.approx(9.8061992025)
-    assert gravity.relative().u == pytest.approx(60e-6)
-
-
-def test_a_statement_reads_as_it_was_written() -> None:
+        entry = stated(level={**form, "source": "s"})
+        assert entry.level.standard().u == pytest.approx(20e-6)
+        assert (entry.not_stated["seat"], "level" in entry.not_stated) == ("misalignment", False)
     config = load_station(LINE)
     document = config.model_dump(mode="json")
     assert StationConfig.model_validate(document) == config
     level = {"U_urad": 100.0, "k": 2.0, "scope": "station", "source": "vial, 0.02 mm/m"}
     assert document["uncertainty"]["level"] == level
-
-
-def test_what_is_missing_is_said_and_never_zero() -> None:
-    missing = stated(level={"u_urad": 1.0, "source": "s"}).not_stated
-    assert missing["seat"] == "misalignment"
-    assert "level" not in missing
 
 
 @each([
@@ -118,7 +104,6 @@ def test_a_recipes_entries_go_before_the_stations_and_the_weaker_source_counts()
         stated(grade_source="certificates", level={"u_urad": 1.0, "source": "s"}, pose={"u_urad": 5.0}),
         stated(grade_source="data_sheet", pose={"u_urad": 9.0}),
     )
-    assert both is not None
     assert both.grade_source == "data_sheet"
     assert sources(both)["pose"].stated.u == pytest.approx(9e-6)
     assert "level" in sources(both)
@@ -153,15 +138,12 @@ def test_the_order_of_verification_is_the_recipes() -> None:
 LIMITS = 'name = "t"\nrule = "{rule}"\n{more}[figures]\nbias_error_ug = {{ max = 1000.0, unit = "µg" }}\n'
 
 
-def test_a_conditional_result_reads_as_not_accepted() -> None:
+def test_a_conditional_result_reads_as_not_accepted_and_a_guard_band_keeps_an_allowed_probability() -> None:
     limits = parse_limits(LIMITS.format(rule="guarded_acceptance", more=""), "limits", UNITS)
     decision = decide(limits, "bias_error_ug", 485.0, 275.0)
     assert "not accepted: inside the guard band, 485 ± 550 µg, limit 1000 µg" in decision.sentence
     assert decision.pfa == 0.0
     assert decision.pfr == pytest.approx(1.0 - 0.030553, abs=1e-6)
-
-
-def test_a_guard_band_by_an_allowed_probability() -> None:
     limits = parse_limits(LIMITS.format(rule="allowed_pfa", more="pfa_max = 0.02\n"), "limits", UNITS)
     inside, beyond = (decide(limits, "bias_error_ug", 1000.0 - w * 100.0, 100.0) for w in (2.0538, 2.0536))
     assert (inside.outcome, beyond.outcome) == ("pass", "conditional pass")
@@ -187,32 +169,22 @@ def test_a_run_keeps_its_budget_and_the_risk_of_its_decisions(run: Run) -> None:
 def test_a_validity_beyond_the_horizon_has_no_figure_over_the_period(run: Run) -> None:
     assert (run.table("uncertainties")["quantity"] == "bias_error_period").any()
     terms = budget_terms(job_of_run(run))
-    assert terms.stability is not None
     assert terms.stability.horizon_days > 366.0
 
 
-def test_plan_refuses_a_limit_that_cannot_be_reached(tmp_path: Path) -> None:
+def test_plan_refuses_a_limit_that_cannot_be_reached_and_says_where_nothing_is_stated(tmp_path: Path) -> None:
     """A QA700 moves by 50 µg from one switch-on to the next: no recipe makes it a navigation part for a year."""
     recipe = (ROOT / "deploy" / "recipes" / "qa700.toml").read_text(encoding="utf-8")
     (tmp_path / "nav.toml").write_text(recipe.replace("qa700.limits.toml", "navigation"), encoding="utf-8")
     planned = CliRunner().invoke(app, ["plan", str(tmp_path / "nav.toml")])
     assert planned.exit_code == 1
-    assert (
-        "cannot be met: bias_error_period_ug: limit 50 µg, 95 % bound of the error over 12 months"
-        in planned.output.replace("\n", " ")
-    )
-    refused = (
-        CliRunner().invoke(app, ["run", str(tmp_path / "nav.toml"), "--archive", str(tmp_path / "archive")]).exception
-    )
-    assert isinstance(refused, RecipeInvalid)
+    said = "cannot be met: bias_error_period_ug: limit 50 µg, 95 % bound of the error over 12 months"
+    assert said in planned.output.replace("\n", " ")
+    words = ["run", str(tmp_path / "nav.toml"), "--archive", str(tmp_path / "archive")]
+    assert isinstance(CliRunner().invoke(app, words).exception, RecipeInvalid)
     assert not (tmp_path / "archive" / "captures").exists()
-
-
-def test_a_station_without_a_statement_is_planned_as_noise_only() -> None:
-    station = ROOT / "deploy" / "stations" / "simulated-awry.toml"
-    planned = CliRunner().invoke(app, ["plan", "--station", str(station)])
-    assert planned.exit_code == 0
-    assert "noise only" in planned.output
+    planned = CliRunner().invoke(app, ["plan", "--station", str(ROOT / "deploy" / "stations" / "simulated-awry.toml")])
+    assert (planned.exit_code, "noise only" in planned.output) == (0, True)
 
 
 def test_what_a_certificate_states_is_a_typed_document(run: Run) -> None:

@@ -1,16 +1,26 @@
-"""Commands that answer in a fraction of a second load no more than their answer needs, and the answer is the same."""
+"""What commands load, take from their words, ask at the terminal, and say at the end of a demonstration."""
 
+import io
 import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Annotated, Any
 
 import pytest
+import typer
 from capture_double import small_run
 from in_process import command
+from typer.core import TyperCommand
+from typer.testing import CliRunner
 
 from pipelines.certificates.ledger import Ledger
 from pipelines.chain.certify import certify
+from pipelines.cli import take_texts_as_given
+from pipelines.cli.demo import _Game
+from pipelines.cli.terminal import agreed
+from pipelines.demo.scenes import scene
+from schemas.errors import WrongUse
 
 SHOWN = """
 import json, sys
@@ -52,3 +62,119 @@ def test_validity_of_a_serial_is_answered_without_numpy_and_pydantic(
     rows = json.loads(alone.stdout)["calibration"]["coefficients"]
     assert rows
     assert {row["unit"] for row in rows} == {serial}
+
+
+class _Direct(TyperCommand):
+    def __init__(self, *args: Any, **named: Any) -> None:
+        super().__init__(*args, **named)
+        take_texts_as_given(self)
+
+
+def _called(words: list[str], *, direct: bool) -> tuple[dict[str, Any], int, str]:
+    """What a command receives, its exit status and what it prints."""
+    app, received = typer.Typer(pretty_exceptions_enable=False), dict[str, Any]()
+
+    @app.command(cls=_Direct if direct else TyperCommand)
+    def command(
+        names: Annotated[list[str] | None, typer.Argument()] = None,
+        text: Annotated[str, typer.Option("--text")] = "usual",
+        short: Annotated[str, typer.Option("--short", parser=lambda given: given[:2])] = "",
+        number: Annotated[int, typer.Option("--number", min=1)] = 3,
+        file: Annotated[Path | None, typer.Option("--file")] = None,
+        every: Annotated[list[str] | None, typer.Option("--every")] = None,
+        *,
+        flag: Annotated[bool, typer.Option("--flag")] = False,
+    ) -> None:
+        received.update(locals())
+
+    result = CliRunner().invoke(app, words)
+    received.pop("received", None)
+    return received, result.exit_code, result.output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["one", "two"],
+        ["--text", "", "--short", "letters"],
+        ["--text", "naïve µg", "--every", "a", "--every", "b"],
+        ["--number", "7", "--file", "there.toml", "--flag"],
+        ["--number", "0"],
+        ["--number", "many"],
+        ["--text", "\udcff"],
+        ["--nothing"],
+        ["--help"],
+    ],
+    ids=" ".join,
+)
+def test_a_command_receives_what_typer_would_give(words: list[str]) -> None:
+    given = _called(words, direct=True)
+    assert given == _called(words, direct=False)
+    assert given[0] or given[1] or "--help" in words
+
+
+@pytest.fixture
+def entered(monkeypatch):
+    def type_(text):
+        monkeypatch.setattr("sys.stdin", io.StringIO(text))
+
+    return type_
+
+
+def test_enter_is_yes_no_is_no_and_what_is_neither_is_asked_again(entered, capsys):
+    for text, yes in (("\n", True), ("y\n", True), ("Yes \n", True), ("n\n", False), ("stop\n", False)):
+        entered(text)
+        assert agreed("Measure?") is yes
+    capsys.readouterr()
+    entered("maybe\nn\n")
+    assert not agreed("Measure?")
+    told = capsys.readouterr().err
+    assert "'maybe' is neither yes nor no: y or Enter measures it, n leaves it" in " ".join(told.split())
+    assert told.count("Measure? [Y/n]") == 2
+    entered("")  # the terminal closed
+    with pytest.raises(WrongUse, match="ended before an answer"):
+        agreed("Measure?")
+
+
+NONE = {"rms_ug": 9.0, "heldout_rms_ug": 9.5, "fresh_rms_ug": 9.9, "floor_ug": 4.0}
+CLASS = ["aging_log", "warm_up", "thermal_lag"]
+
+
+def ending(capsys: pytest.CaptureFixture[str], **changes: Any) -> str:
+    hidden = scene("warm_up", 0)
+    document = {
+        "classes": [CLASS], "unseen": [], "added": ["thermal_lag"], "found": True, "told_apart": False,
+        "not_told_apart": [CLASS], "next_measurements": [], "before": NONE, "after": NONE, **changes,
+    }  # fmt: skip
+    game = _Game(Path("game"), hidden, None, asks=False, quiet=False)  # pyright: ignore[reportArgumentType]  # no lot is read
+    game._reveal(document)
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_an_effect_added_from_a_class_is_not_called_found(capsys: pytest.CaptureFixture[str]) -> None:
+    row = {
+        "outer_deg": 0.0, "inner_deg": 90.0, "chamber_C": 25.0, "why": "aging_log | warm_up", "minutes": 12.0,
+        "separation_before": 0.4, "separation_after": 60.0, "separation_if": {"aging_log": 60.0, "warm_up": 75.0},
+        "not_parted": ["thermal_lag"],
+    }  # fmt: skip
+    said = ending(capsys, next_measurements=[row])
+    assert "Found in a class, not separated" in said
+    assert (
+        "the added effect, thermal_lag, is one of a class; these data fit equally well with aging_log, warm_up." in said
+    )
+    assert "The measurement that separates them:" in said
+    assert "expected 60 if aging_log is true, 75 if warm_up is true; not separated from the first: thermal_lag" in said
+    assert "Found." not in said
+
+
+def test_where_no_measurement_parts_the_class_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "No measurement that the station can take is certain to separate them." in ending(capsys)
+    words = {"why": "aging_log | warm_up: no steps of this station are certain to separate them; needed: a power cycle"}
+    said = ending(capsys, next_measurements=[words | {"measurable": False}])
+    assert "needed: a power cycle" in said
+
+
+def test_an_effect_that_stands_alone_is_found(capsys: pytest.CaptureFixture[str]) -> None:
+    said = ending(capsys, classes=[["warm_up"]], told_apart=True, not_told_apart=[])
+    assert "The diagnosis named warm_up. Found." in said

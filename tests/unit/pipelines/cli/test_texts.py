@@ -4,8 +4,8 @@ import io
 import re
 from pathlib import Path
 
-import pandas as pd
 import pytest
+from capture_double import recipe_file
 from each import each
 from root_process import ROOT
 from typer.testing import CliRunner
@@ -24,7 +24,7 @@ from pipelines.jobs.recipes import load_recipe
 from pipelines.report.unit_panels.budget import without_nothing
 from pipelines.report.unit_panels.figures import _line  # pyright: ignore[reportPrivateUsage]
 from schemas.decisions import decide
-from schemas.errors import DataRejected, RecipeInvalid, WrongUse
+from schemas.errors import DataRejected, RecipeInvalid
 from schemas.key_list import keys_of
 from schemas.limits import parse_limits
 from schemas.reasons import PATTERNS
@@ -32,38 +32,41 @@ from schemas.recipe import FaultOrder
 from schemas.station import StationConfig, load_station
 from stations.plant.faults.catalogue import build_fault
 
-RECIPE = """name = "hot"
-device = "adxl355"
-units = ["A1"]
-local_gravity_m_s2 = 9.81
-poses = "twelve"
-verification = [[35.0, 15.0]]
-temperatures_C = [TEMPERATURES]
-effects = ["bias", "scale", "misalignment"]
-limits = "LIMITS"
-"""
 
-
-def planned(folder: Path, monkeypatch: pytest.MonkeyPatch, temperatures: str, limits: str) -> tuple[int, str]:
+def refused(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """What a command says of what it was given, in one line."""
     monkeypatch.chdir(folder)
-    text = RECIPE.replace("TEMPERATURES", temperatures).replace("LIMITS", limits)
-    (folder / "hot.toml").write_text(text, encoding="utf-8")
-    result = CliRunner().invoke(app, ["plan", "hot.toml"])
-    return result.exit_code, result.stderr
+    done = CliRunner().invoke(app, words, env={"COLUMNS": "200"})
+    return " ".join(f"{done.output} {done.exception or ''}".split())
 
 
-def test_a_plan_says_what_run_would_refuse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    status, text = planned(tmp_path, monkeypatch, "298.0", "production")
-    assert status == 0
-    assert "'tumbleline run' refuses this recipe" in text
-    assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in " ".join(text.split())
-    _, text = planned(tmp_path, monkeypatch, "25.0", "mine.toml")
-    assert "no file and no built-in limits are called 'mine.toml'" in " ".join(text.split())
+def test_what_cannot_be_is_refused_with_what_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = recipe_file(tmp_path)
+    assert "refuses" not in refused(["plan", recipe], tmp_path, monkeypatch)
+    hot = recipe_file(tmp_path, ("[0.0, 50.0]", "[0.0, 298.0]"), ('"consumer"', '"production"'), name="hot.toml")
+    said = refused(["plan", hot], tmp_path, monkeypatch)
+    assert "'tumbleline run' refuses this recipe" in said
+    assert "298 °C, the chamber of station simulated reaches -40 to 85 °C" in said
+    assert CliRunner().invoke(app, ["plan", hot]).exit_code == 0  # a plan tells and does not refuse
+    mine = recipe_file(tmp_path, ('"consumer"', '"mine.toml"'), name="limits.toml")
+    assert "no file and no built-in limits are called 'mine.toml'" in refused(["plan", mine], tmp_path, monkeypatch)
     (tmp_path / "mine.toml").write_text('name = "m"\n[figures.residual_rms]\nmax = 1\nunit = "µg"\n', encoding="utf-8")
-    _, text = planned(tmp_path, monkeypatch, "25.0", "mine.toml")
-    assert "unknown figure 'residual_rms'" in " ".join(text.split())
-    _, text = planned(tmp_path, monkeypatch, "25.0", "production")
-    assert "refuses" not in text
+    assert "unknown figure 'residual_rms'" in refused(["plan", mine], tmp_path, monkeypatch)
+    with pytest.raises(
+        RecipeInvalid, match=r"found 'my recipe'.* a to z, digits and . _ - are needed, a letter or digit first"
+    ):
+        load_recipe(recipe_file(tmp_path, ('"small"', '"my recipe"'), name="name.toml"))
+    with pytest.raises(RecipeInvalid, match="fault door: no figure 'at'; did you mean at_s"):
+        build_fault(FaultOrder(kind="door", figures={"at": 600.0}), ["A1"])
+    dwells = tmp_path / "dwells.csv"
+    dwells.write_text("unit,dwell,time_s,volt_x\nA,1,0.0,1.0\n", encoding="utf-8")
+    with pytest.raises(DataRejected, match="columns out_x, out_y, out_z are missing") as end:
+        read_dwells(dwells)
+    assert str(end.value).count("known:") <= 1
+    dwells.write_text(DWELL + "A1,0,0,0,0,1,0.01,oops,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n", encoding="utf-8")
+    said = refused(["inspect", str(dwells)], tmp_path, monkeypatch)
+    assert "column out_y: found oops, a finite number is needed" in said
+    assert f"tumbleline compare {dwells}" in refused(["fit", str(dwells)], tmp_path, monkeypatch)
 
 
 def test_an_unsigned_pdf_is_not_sent_to_the_archive_that_cannot_prove_it() -> None:
@@ -88,31 +91,21 @@ def test_numbers_have_three_digits_and_no_exponent() -> None:
         assert _fall({"fall_ug": fall, "fall_u_ug": error}) == f"the error {text}"
 
 
-def test_missing_columns_are_named_once_with_those_that_are_there(tmp_path: Path) -> None:
-    path = tmp_path / "other.csv"
-    pd.DataFrame({"unit": ["A"], "dwell": [1], "time_s": [0.0], "volt_x": [1.0]}).to_csv(path, index=False)
-    with pytest.raises(DataRejected) as end:
-        read_dwells(path)
-    assert str(end.value).count("known:") <= 1
-    assert "columns out_x, out_y, out_z are missing" in str(end.value)
-
-
-def test_a_time_of_a_fault_is_found_by_a_similar_name() -> None:
-    with pytest.raises(RecipeInvalid, match="fault door: no figure 'at'; did you mean at_s"):
-        build_fault(FaultOrder(kind="door", figures={"at": 600.0}), ["A1"])
-
-
-def test_a_help_text_is_broken_by_the_terminal_alone() -> None:
-    text = flowing("One line\nand its end.\n\n- a list\n- stays")
-    assert text == "One line and its end.\n\n- a list\n- stays"
-    for line in CliRunner().invoke(app, ["program", "--help"], env={"COLUMNS": "80"}).stdout.splitlines():
-        assert line.strip() != "back, and verify in two poses."  # the rest of a line that was broken twice
-
-
-def test_a_contribution_of_nothing_is_not_among_the_largest() -> None:
+def test_a_contribution_of_nothing_is_not_among_the_largest_and_a_help_is_broken_by_the_terminal_alone() -> None:
     text = "noise of the dwells 99 %, references, as far as verification cannot show them 1 %, seat of the fixture 0 %"
     assert without_nothing(text) == text.removesuffix(", seat of the fixture 0 %")
     assert without_nothing("noise of the dwells 80 %, supply 20 %") == "noise of the dwells 80 %, supply 20 %"
+    assert flowing("One line\nand its end.\n\n- a list\n- stays") == "One line and its end.\n\n- a list\n- stays"
+
+
+def test_patterns_and_expanded_uncertainties_of_a_schema_are_explained_in_words() -> None:
+    rooms = (ROOT / "schemas", ROOT / "pipelines", ROOT / "stations")
+    text = "".join(path.read_text(encoding="utf-8") for room in rooms for path in room.rglob("*.py"))
+    stated = re.findall(r'[(\s]pattern=r"(.*?)"[,)]', text)
+    assert len(stated) > 10
+    assert set(stated) <= set(PATTERNS)
+    meanings = {key.name: key.meaning for key in keys_of(StationConfig)}
+    assert meanings["offset_U_ug"] == "Expanded uncertainty of the offset, µg; its factor is 'k'."
 
 
 @each([
@@ -139,25 +132,15 @@ def test_a_sample_recipe_or_station_that_is_not_here_is_named_with_its_path(row:
 DWELL = "unit,dwell,time_s,force_x,force_y,force_z,out_x,out_y,out_z,humidity_pct\n"
 
 
-def inspected(folder: Path, text: str) -> tuple[int, str]:
-    (folder / "my dwells.csv").write_text(DWELL + text, encoding="utf-8")
-    result = CliRunner().invoke(app, ["inspect", str(folder / "my dwells.csv")], env={"COLUMNS": "200"})
-    return result.exit_code, result.stdout
-
-
 def test_inspect_sends_dwells_in_the_exchange_format_to_diagnose(tmp_path: Path) -> None:
-    status, text = inspected(tmp_path, "A1,0,0,0,0,1,0.01,0.02,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n")
-    assert status == 0
-    assert text.splitlines()[-1] == f"tumbleline diagnose '{tmp_path / 'my dwells.csv'}'"
-    assert "1 unit, 2 dwells; reference: the force on each axis" in text
-    assert {"reference", "covariate"} <= set(text.split())
-    assert "--map" not in text
-
-
-def test_inspect_says_why_dwells_in_the_exchange_format_cannot_be_used(tmp_path: Path) -> None:
-    status, text = inspected(tmp_path, "A1,0,0,0,0,1,0.01,oops,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n")
-    assert status == 1
-    assert "column out_y: found oops, a finite number is needed" in text
+    path = tmp_path / "my dwells.csv"
+    path.write_text(DWELL + "A1,0,0,0,0,1,0.01,0.02,1.01,40\nA1,1,60,0,0,-1,0.01,0.02,-1.01,41\n", encoding="utf-8")
+    done = CliRunner().invoke(app, ["inspect", str(path)], env={"COLUMNS": "200"})
+    assert done.exit_code == 0
+    assert done.stdout.splitlines()[-1] == f"tumbleline diagnose '{path}'"
+    assert "1 unit, 2 dwells; reference: the force on each axis" in done.stdout
+    assert {"reference", "covariate"} <= set(done.stdout.split())
+    assert "--map" not in done.stdout
 
 
 @each(["run [OPTIONS] [RECIPE]", "diagnose [OPTIONS] DWELLS", "inspect [OPTIONS] FILE…", "show [OPTIONS] [RUN|UNIT] [TABLE]",
@@ -166,29 +149,6 @@ def test_arguments_of_a_usage_line_have_one_pair_of_brackets(usage: str) -> None
     words = usage.partition(" [OPTIONS]")[0].split()
     line = next(line for line in CliRunner().invoke(app, [*words, "--help"]).stdout.splitlines() if "Usage" in line)
     assert line.strip().removeprefix("Usage: ").split(" ", 1)[1] == usage
-
-
-def test_a_name_that_is_refused_says_what_is_needed_in_words(tmp_path: Path) -> None:
-    (tmp_path / "bad.toml").write_text(
-        RECIPE.replace('"hot"', '"my recipe"').replace("TEMPERATURES", "25.0"), encoding="utf-8"
-    )
-    with pytest.raises(RecipeInvalid, match="found 'my recipe'") as refused:
-        load_recipe(str(tmp_path / "bad.toml"))
-    assert str(refused.value).endswith("small letters a to z, digits and . _ - are needed, a letter or digit first")
-
-
-def test_every_pattern_of_a_schema_is_explained_in_words() -> None:
-    rooms = (ROOT / "schemas", ROOT / "pipelines", ROOT / "stations")
-    text = "".join(path.read_text(encoding="utf-8") for room in rooms for path in room.rglob("*.py"))
-    stated = re.findall(r'[(\s]pattern=r"(.*?)"[,)]', text)
-    assert len(stated) > 10
-    assert set(stated) <= set(PATTERNS)
-
-
-def test_the_key_of_an_expanded_uncertainty_is_explained_in_words() -> None:
-    meanings = {key.name: key.meaning for key in keys_of(StationConfig)}
-    assert meanings["offset_U_ug"] == "Expanded uncertainty of the offset, µg; its factor is 'k'."
-    assert meanings["inl_half_width_ug"].startswith("Half-width of the integral nonlinearity, µg; its shape is")
 
 
 def test_report_and_reason_give_the_digits_of_the_summary() -> None:
@@ -228,10 +188,3 @@ def test_the_tables_of_a_plan_are_not_continued_at_eighty_columns(
     assert sink.getvalue().count("coefficient") == 1
     assert "misalignment_temperature x KxzT, µg/(g·K)" in sink.getvalue()
     assert "bias x, µg/(g·K)" in sink.getvalue()
-
-
-def test_fit_of_a_file_names_the_command_for_it(tmp_path: Path) -> None:
-    (tmp_path / "dwells.csv").write_text(DWELL, encoding="utf-8")
-    result = CliRunner().invoke(app, ["fit", str(tmp_path / "dwells.csv")])
-    assert isinstance(result.exception, WrongUse)
-    assert f"tumbleline compare {tmp_path / 'dwells.csv'}" in str(result.exception)

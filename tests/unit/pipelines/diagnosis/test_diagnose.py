@@ -13,14 +13,6 @@ def cubic(force, temperature, time, rng):
     return rng.normal(0.0, 60e-6, 3) * force**3
 
 
-def test_a_good_model_is_adequate_and_nothing_is_named(rng):
-    diagnosis = diagnose(lots.lot(rng))
-    assert diagnosis["adequate"]
-    assert diagnosis["recommended"] == []
-    assert diagnosis["blocked_by"] == []
-    assert diagnosis["error"]["floor_ug"] == pytest.approx(10.0, rel=0.1)
-
-
 def test_a_cubic_transfer_curve_is_named_and_the_error_falls_to_the_floor(rng):
     table = lots.lot(rng, hidden=cubic)
     diagnosis = diagnose(table)
@@ -69,20 +61,13 @@ def test_an_effect_that_is_not_there_does_not_look_like_progress_on_a_fresh_run(
     assert more["heldout_rms_ug"] > plain["heldout_rms_ug"]
 
 
-def test_the_same_data_give_the_same_answer(rng):
+def test_the_same_data_give_the_same_answer_and_what_a_model_or_a_fresh_run_lacks_is_said(rng):
     table = lots.lot(rng, hidden=cubic)
     assert diagnose(table) == diagnose(table.sample(frac=1.0, random_state=1))
-
-
-def test_refuses_a_fresh_run_of_other_units(rng):
-    table = lots.lot(rng, units=2)
+    with pytest.raises(DataRejected, match="supply"):
+        diagnose(table, effects=["bias", "scale", "misalignment", "supply_sensitivity"])
     with pytest.raises(DataRejected, match="U009"):
         compare(table, default_model(table), fresh=table.assign(unit=table["unit"].replace("U001", "U009")))
-
-
-def test_says_which_quantity_a_model_lacks(rng):
-    with pytest.raises(DataRejected, match="supply"):
-        diagnose(lots.lot(rng), effects=["bias", "scale", "misalignment", "supply_sensitivity"])
 
 
 def test_works_from_forces_without_angles_and_without_scatter(rng):

@@ -96,26 +96,19 @@ def test_a_fault_blocks_its_unit_and_no_other(name, units, rng):
         assert diagnosis["error"]["rms_ug"] is None
 
 
-def test_swapped_units_are_known_by_their_fingerprints(rng):
-    table = lots.lot(rng)
-    one, other = (table.index[table["unit"] == u].to_numpy()[40:] for u in ("U001", "U003"))
-    kept = table.loc[one, OUT].to_numpy()
-    table.loc[one, OUT] = table.loc[other, OUT].to_numpy()
-    table.loc[other, OUT] = kept
-    faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
-    assert faults == {("units_swapped", "U001"), ("units_swapped", "U003")}
-
-
-def test_missing_dwells_at_the_end_are_a_truncated_file(rng):
-    table = lots.lot(rng)
-    rows = table.index[table["unit"] == "U002"].to_numpy()
-    blocked = diagnose(table.drop(index=rows[50:]))["blocked_by"]
-    assert [(b["fault"], b["units"]) for b in blocked] == [("truncated_file", ["U002"])]
-
-
 def lacking(table, unit, dwells):
     """The table without some dwells of a unit, by their place."""
     return table.drop(index=table.index[table["unit"] == unit].to_numpy()[dwells])
+
+
+def test_swapped_units_and_a_truncated_file_are_known(rng):
+    table = lots.lot(rng)
+    cut = diagnose(lacking(table, "U002", slice(50, None)))["blocked_by"]
+    assert [(b["fault"], b["units"]) for b in cut] == [("truncated_file", ["U002"])]
+    one, other = (table.index[table["unit"] == u].to_numpy()[40:] for u in ("U001", "U003"))
+    table.loc[[*one, *other], OUT] = table.loc[[*other, *one], OUT].to_numpy()
+    faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
+    assert faults == {("units_swapped", "U001"), ("units_swapped", "U003")}
 
 
 def test_a_unit_without_some_dwells_is_diagnosed_by_those_it_has(rng):
@@ -128,6 +121,10 @@ def test_a_unit_without_some_dwells_is_diagnosed_by_those_it_has(rng):
     (notice,) = (text for text in document["warnings"] if "missing" in text)
     assert notice.startswith(f"of {count} dwells of the lot are missing: U000 1 (5), U001 {count // 3} (")
     assert f"U002 1 ({count - 1})" in notice
+    flip(table, table.index[table["unit"] == "U003"].to_numpy(), rng)  # a fault of one unit leaves the others alone
+    document = diagnose(table)
+    assert [b["units"] for b in document["blocked_by"]] == [["U003"]]
+    assert document["recommended"] == ["third_order"]
 
 
 def test_a_unit_without_most_of_its_dwells_is_refused(rng):
@@ -137,18 +134,13 @@ def test_a_unit_without_most_of_its_dwells_is_refused(rng):
     document = diagnose(lacking(lacking(table, "U001", few), "U003", [2, 3]))
     assert [(b["fault"], b["units"]) for b in document["blocked_by"]] == [("dropped_samples", ["U001"])]
     assert ["U003 2 (2, 3)" in text for text in document["warnings"]] == [True]
-
-
-def test_dwells_that_were_numbered_again_are_no_truncated_file(rng):
-    table = lacking(lots.lot(rng), "U001", [5, 20, 21, 40])
-    own = table["unit"] == "U001"
-    table.loc[own, "dwell"] = np.arange(own.sum())
-    assert diagnose(table)["blocked_by"] == []
-
-
-def test_no_notice_is_given_of_dwells_left_out_on_purpose(rng):
-    table = lacking(lots.lot(rng), "U001", [5])
-    assert not any("missing" in text for text in examination(table, None, BASE, ["U001:5"]).document["warnings"])
+    # numbered again it is no truncated file, and of dwells left out on purpose nothing is said
+    again = lacking(table, "U001", [5, 20, 21, 40])
+    own = again["unit"] == "U001"
+    again.loc[own, "dwell"] = np.arange(own.sum())
+    assert diagnose(again)["blocked_by"] == []
+    document = examination(lacking(table, "U001", [5]), None, BASE, ["U001:5"]).document
+    assert not any("missing" in text for text in document["warnings"])
 
 
 @each(FAULTS)
@@ -159,14 +151,6 @@ def test_a_fault_is_found_where_units_lack_dwells(name, rng):
     table = lacking(lacking(table, "U000", [7]), "U002", [15, 44])
     faults = {(b["fault"], *b["units"]) for b in diagnose(table)["blocked_by"]}
     assert faults == {(name.strip(), "U000")}
-
-
-def test_the_other_units_are_diagnosed(rng):
-    table = lots.lot(rng, hidden=lambda f, t, s, r: r.normal(0.0, 60e-6, 3) * f**3)
-    flip(table, table.index[table["unit"] == "U000"].to_numpy(), rng)
-    diagnosis = diagnose(table)
-    assert diagnosis["blocked_by"][0]["units"] == ["U000"]
-    assert diagnosis["recommended"] == ["third_order"]
 
 
 @each(range(8))

@@ -16,22 +16,10 @@ from pipelines.diagnosis.sections import parameters_of
 from pipelines.diagnosis.sentences import verdict
 from pipelines.stages.unknown_poses.fit import norms_fitted
 from pipelines.tables.dwells import measured
-from pipelines.tables.leave_out import leave_out, named_dwells
-from schemas.errors import DataRejected, WrongUse
+from pipelines.tables.leave_out import leave_out
+from schemas.errors import DataRejected
 
 PLAIN = ("bias", "scale", "misalignment")
-
-
-def test_a_probability_that_is_no_number_neither_passes_nor_fails() -> None:
-    for p, answer in (
-        (0.2, True),
-        (0.01, False),
-        (np.nan, None),
-        ([0.2, np.nan], None),
-        ([0.01, np.nan], False),
-        ([], None),
-    ):
-        assert passes(p, 0.05) is answer, p
 
 
 def test_white_noise_and_a_long_first_rest_are_adequate() -> None:
@@ -51,20 +39,21 @@ def test_the_verdict_does_not_depend_on_the_unit_of_the_samples() -> None:
     assert first["white_noise_ug"] == pytest.approx(second["white_noise_ug"], rel=1e-4)
 
 
-def test_few_dwells_cannot_be_judged_and_nothing_is_named() -> None:
+def test_few_dwells_cannot_be_judged_and_nothing_is_named_but_a_gross_misfit_is_not_adequate() -> None:
     document = diagnose(make(Recording(10, cubic=3000.0), 3).dwells)
     assert document["adequate"] is None
     assert "1 degree of freedom, 15 are needed; measure 14 more dwells" in document["reason"]
     assert document["classes"] == []
     assert verdict({**document, "units": ["HAND-1"]}).startswith("CANNOT BE JUDGED: ")
-
-
-def test_a_gross_misfit_is_not_adequate_however_few_the_dwells_are() -> None:
     dwells = make(Recording(14), 4).dwells
     dwells.loc[[2, 5, 8, 11], "out_x"] += [500.0, -600.0, 550.0, -450.0]
     document = diagnose(dwells)
     assert document["error"]["rms_ug"] > 20_000.0
     assert document["adequate"] is False
+    for p, answer in (
+        (0.2, True), (0.01, False), (np.nan, None), ([0.2, np.nan], None), ([0.01, np.nan], False), ([], None),
+    ):  # fmt: skip
+        assert passes(p, 0.05) is answer, p
 
 
 def test_samples_of_a_movement_are_not_judged_and_name_nothing() -> None:
@@ -105,14 +94,6 @@ def test_bad_dwells_are_named_and_left_out_before_physics(count: int) -> None:
     assert [g["effects"] for g in document["classes"]] == [["bad_dwell"]] * count
     without = leave_out(made.dwells, [("HAND-1", dwell) for dwell in made.spoilt])
     assert diagnose(without)["adequate"] is document["leave_out"]["adequate_without"]
-
-
-def test_dwells_to_leave_out_are_named_by_unit_and_number() -> None:
-    assert named_dwells("A-1:3, A:1:4") == (("A-1", 3), ("A:1", 4))
-    with pytest.raises(WrongUse, match="UNIT:DWELL is needed"):
-        named_dwells("7")
-    with pytest.raises(DataRejected, match="dwell 99 of unit HAND-1 is not there"):
-        leave_out(make(Recording(12), 1).dwells, [("HAND-1", 99)])
 
 
 def test_a_fit_a_comparison_and_a_diagnosis_have_one_residual() -> None:
@@ -160,17 +141,15 @@ def test_what_the_norm_does_not_determine_is_refused_by_name(row: tuple[tuple[st
         norms_fitted(make(Recording(30), 2).dwells, None, row[0])
 
 
-def test_a_class_names_the_effect_that_its_parameters_are_of() -> None:
-    group = {"effects": ["aging_linear", "warm_up"], "scope": "sensor"}
-    group |= {"nonlinear": {"tau": 7200.0}, "nonlinear_of": "warm_up"}
-    assert parameters_of(group) == "warm_up: tau = 7200 s"
-    assert parameters_of({**group, "nonlinear": {}, "nonlinear_of": None}) == ""
-    assert parameters_of({**group, "effects": ["warm_up"]}) == "tau = 7200 s"
-
-
 def test_a_memory_that_was_at_rest_has_no_column_for_its_state() -> None:
     """`diagnose` of one recording in 40 with a drift after switching on ended in a traceback."""
     document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2000.0), 96_005_004).dwells)
     assert document["adequate"] is False  # the p of the drift, 4.1e-6, is that of one in 245 tests: named or not
     document = diagnose(make(Recording(60, "white 280, B 30", warm_up=2300.0), 96_005_004).dwells)
     assert any("warm_up" in group["effects"] for group in document["classes"])
+    # a class of several names the effect that its parameters are of
+    group = {"effects": ["aging_linear", "warm_up"], "scope": "sensor"}
+    group |= {"nonlinear": {"tau": 7200.0}, "nonlinear_of": "warm_up"}
+    assert parameters_of(group) == "warm_up: tau = 7200 s"
+    assert parameters_of({**group, "nonlinear": {}, "nonlinear_of": None}) == ""
+    assert parameters_of({**group, "effects": ["warm_up"]}) == "tau = 7200 s"

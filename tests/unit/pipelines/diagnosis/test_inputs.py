@@ -39,6 +39,7 @@ def settings(tmp_path: Path, rng: np.random.Generator) -> WorkbenchSettings:
 
 def test_dwells_are_left_out_by_unit_and_number(settings: WorkbenchSettings) -> None:
     frame = pd.read_csv(settings.folder / "dwells.csv")
+    assert named_dwells("A-1:3, A:1:4") == (("A-1", 3), ("A:1", 4))
     rest = leave_out(frame, named_dwells("A2:5, A1:0"))
     assert len(rest) == len(frame) - 2
     assert not ((rest["unit"] == "A2") & (rest["dwell"] == 5)).any()

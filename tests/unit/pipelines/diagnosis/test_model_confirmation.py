@@ -1,9 +1,11 @@
 """Nothing is recommended or confirmed that raises an error on data that were not fitted."""
 
+from itertools import cycle
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from each import each
 
 from inertial.criticism.examination import Named
 from inertial.criticism.left_out import LeftOut
@@ -31,34 +33,18 @@ def test_an_effect_is_recommended_only_where_dwells_left_out_are_predicted_no_wo
     assert Named(SimpleNamespace(), 1.0, before, after).predicts is predicts
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "recommended", "lines"),
-    [
-        (10.0, 9.0, ["third_order"], []),
-        (10.0, 12.0, [], ["third_order is not recommended: the error on dwells left out rises from 10.0 to 12.0 µg."]),
-        (
-            None,
-            None,
-            ["third_order"],
-            [
-                (
-                    "third_order is recommended by its evidence alone: no dwells left out can judge it; "
-                    "confirm with a fresh run of the same units."
-                )
-            ],
-        ),
-    ],
-)
-def test_it_is_said_why_an_effect_is_recommended_or_not(
-    before: float | None, after: float | None, recommended: list[str], lines: list[str]
-) -> None:
+@each([
+    (10.0, 9.0, ["third_order"], []),
+    (10.0, 12.0, [], ["third_order is not recommended: the error on dwells left out rises from 10.0 to 12.0 µg."]),
+    (None, None, ["third_order"],
+     [("third_order is recommended by its evidence alone: no dwells left out can judge it; "
+       "confirm with a fresh run of the same units.")]),
+])  # fmt: skip
+def test_it_is_said_why_an_effect_is_recommended_or_not(row: tuple) -> None:
+    before, after, recommended, lines = row
     fault = {"effects": ["bad_dwell"], "scope": "data", "heldout_after_ug": None}
-    effect = {
-        "effects": ["third_order", "odd_quadratic"],
-        "scope": "sensor",
-        "heldout_before_ug": before,
-        "heldout_after_ug": after,
-    }
+    effect = {"effects": ["third_order", "odd_quadratic"], "scope": "sensor"}
+    effect |= {"heldout_before_ug": before, "heldout_after_ug": after}
     assert why_recommended({"classes": [fault, effect], "recommended": recommended}) == lines
 
 
@@ -110,58 +96,45 @@ def test_a_run_that_may_have_a_fault_confirms_nothing_by_itself() -> None:
     assert "holds on stretches of time left out (log density +50.0), not decided by this run" in text_of(ROW, evidence)
 
 
-@pytest.mark.parametrize(("error", "confirmed"), [(1e-5, True), (0.6e-4, None), (float("nan"), True)])
-def test_a_fresh_run_does_not_confirm_a_fall_within_its_uncertainty(
-    error: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
-    monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
-    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
-    monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
-    change = ReproducedChange(1.0, 0.1, 2e-4, 1e-4, error, "base")
-    monkeypatch.setattr(confirmation, "reproduced_change", lambda *_: change)
-    monkeypatch.setattr(confirmation, "left_out", lambda *_, **__: missed(1e-4, 1.0))
-    evidence = confirmation.progress("old", SimpleNamespace(terms=()), missed(0.9e-4, 2.0), "fresh")
-    assert evidence["confirmed"] is confirmed
-    assert ("not clearly more than its uncertainty" in text_of(ROW, evidence)) is (confirmed is None)
-
-
-@pytest.mark.parametrize(("left", "confirmed"), [((2e-4, 1e-4), True), ((2e-4, 0.145), None)])
-def test_a_fresh_run_does_not_confirm_what_raises_its_error(
-    left: tuple[float, float], confirmed: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    sizes = iter(left)
-    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
-    monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
-    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
-    monkeypatch.setattr(confirmation, "residuals_of", lambda problem, model: np.full((1, 9), next(sizes)))
-    monkeypatch.setattr(
-        confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
-    )
-    monkeypatch.setattr(confirmation, "left_out", lambda *_, **__: missed(1e-4, 1.0))
-    evidence = confirmation.progress("old", SimpleNamespace(terms=()), missed(0.9e-4, 2.0), "fresh")
-    assert evidence["confirmed"] is confirmed
-    assert ("the error on the fresh run rises from 200 to 1.45e+05 µg" in text_of(ROW, evidence)) is (confirmed is None)
-
-
-@pytest.mark.parametrize(
-    ("rise", "density", "confirmed"), [(1.02, 2.0, True), (1.02, -2.0, True), (1.02, -4.0, None), (1.5, 2.0, None)]
-)
-def test_a_fresh_run_confirms_where_dwells_left_out_rise_within_their_uncertainty(
-    rise: float, density: float, confirmed: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(confirmation, "estimate", lambda model: SimpleNamespace(terms=(), model=model))
-    monkeypatch.setattr(confirmation, "Problem", lambda lot: lot)
-    monkeypatch.setattr(confirmation, "without_own_bias", lambda problem, terms, left: left)
-    monkeypatch.setattr(confirmation, "residuals_of", lambda *_: np.full((1, 9), 1e-4))
-    monkeypatch.setattr(
-        confirmation, "reproduced_change", lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, 1e-5, "base")
-    )
-    # where they rise depends on the dwell: half of them fall
-    before, after = missed(1e-4, 1.0), missed(1e-4, density)
+def rising(rise: float, density: float) -> LeftOut:
+    """Dwells left out whose errors rise or fall from dwell to dwell, and rise in all."""
+    after = missed(1e-4, density)
     after.missed["blocks of time"][:, ::2] *= rise * 1.1
     after.missed["blocks of time"][:, 1::2] *= rise / 1.1
-    monkeypatch.setattr(confirmation, "left_out", lambda *_, **__: before)
+    return after
+
+
+FALL, SAME, BETTER = (2e-4, 1e-4), (1e-4, 1e-4), missed(0.9e-4, 2.0)
+RISES = "the error on the fresh run rises from 200 to 1.45e+05 µg"
+
+
+@each([  # uncertainty of the fall, residuals before and after, dwells left out, confirmed, what is said
+    (1e-5, SAME, BETTER, True, ""),
+    (float("nan"), SAME, BETTER, True, ""),
+    (0.6e-4, SAME, BETTER, None, "not clearly more than its uncertainty"),
+    (1e-5, FALL, BETTER, True, ""),
+    (1e-5, (2e-4, 0.145), BETTER, None, RISES),
+    (1e-5, SAME, rising(1.02, 2.0), True, ""),
+    (1e-5, SAME, rising(1.02, -2.0), True, ""),
+    (1e-5, SAME, rising(1.02, -4.0), None, "the error on dwells left out rises"),
+    (1e-5, SAME, rising(1.5, 2.0), None, "the error on dwells left out rises"),
+])  # fmt: skip
+def test_a_fresh_run_confirms_a_clear_fall_that_nothing_contradicts(
+    row: tuple, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    error, sizes, after, confirmed, said = row
+    left = cycle(sizes)
+    for name, value in {
+        "estimate": lambda model: SimpleNamespace(terms=(), model=model), "Problem": lambda lot: lot,
+        "without_own_bias": lambda problem, terms, left: left,
+        "residuals_of": lambda *_: np.full((1, 9), next(left)),
+        "reproduced_change": lambda *_: ReproducedChange(1.0, 0.1, 2e-4, 1e-4, error, "base"),
+        "left_out": lambda *_, **__: missed(1e-4, 1.0),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(confirmation, name, value)
     evidence = confirmation.progress("old", SimpleNamespace(terms=()), after, "fresh")
+    text = text_of(ROW, evidence)
     assert evidence["confirmed"] is confirmed
-    assert bool(evidence["rises"]) is (confirmed is None)
+    assert said in text
+    assert bool(evidence["rises"]) is ("rises" in said)
+    assert ("not clearly more than its uncertainty" in text) is (error == 0.6e-4)

@@ -11,6 +11,7 @@ from each import each
 from inertial.errors import NotIdentified
 from pipelines.importers import files
 from pipelines.importers.clocks import stamps
+from pipelines.importers.content import Content
 from pipelines.importers.inspection import inspect
 from pipelines.importers.mapping import build
 from pipelines.importers.record import imported
@@ -40,45 +41,42 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_table_is_found_and_what_was_passed_over_is_said(name: str, tmp_path) -> None:
+def read(tmp_path: Path, text: str, encoding: str = "utf-8") -> Content:
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    return files.read_content(tmp_path / "a.csv")[0]
+
+
+@each(CASES)
+def test_the_table_is_found_and_what_was_passed_over_is_said(name: str, tmp_path: Path) -> None:
     text, names, first, remark = CASES[name]
-    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
-    content, _ = files.read_content(tmp_path / "a.csv")
-    assert list(content.table.columns) == names
-    np.testing.assert_allclose(content.table.iloc[0].to_numpy(dtype=float), first)
-    assert remark in "; ".join(content.remarks)
-    assert (remark == "") == (content.remarks == ())
+    found = read(tmp_path, text)
+    assert list(found.table.columns) == names
+    np.testing.assert_allclose(found.table.iloc[0].to_numpy(dtype=float), first)
+    assert remark in "; ".join(found.remarks)
+    assert (remark == "") == (found.remarks == ())
 
 
-@pytest.mark.parametrize(
-    ("encoding", "remark"), [("utf-8-sig", ""), ("utf-16", "text in UTF-16"), ("cp1252", "text in Windows-1252")]
-)
-def test_text_of_other_encodings_is_read_and_said(encoding: str, remark: str, tmp_path) -> None:
-    (tmp_path / "a.csv").write_bytes("t;T [°C]\r\n1;20\r\n2;21\r\n".encode(encoding))
-    content, _ = files.read_content(tmp_path / "a.csv")
-    assert list(content.table.columns) == ["t", "T [°C]"]
-    assert dict(content.units) == {"T [°C]": "°C"}
-    assert content.remarks == ((remark,) if remark else ())
+@each([
+    ("utf-8-sig", ""), ("utf-16", "text in UTF-16"), ("cp1252", "text in Windows-1252"),
+    ("utf-16-le", "text in UTF-16-LE"), ("utf-16-be", "text in UTF-16-BE"),
+])  # fmt: skip
+def test_text_of_other_encodings_is_read_and_said(row: tuple[str, str], tmp_path: Path) -> None:
+    encoding, remark = row
+    found = read(tmp_path, "t;T [°C]\r\n1;20\r\n2;21\r\n" + "3;22\r\n" * 20, encoding)
+    assert list(found.table.columns) == ["t", "T [°C]"]
+    assert dict(found.units) == {"T [°C]": "°C"}
+    assert found.remarks == ((remark,) if remark else ())
 
 
-def test_units_in_a_line_of_their_own_are_units(tmp_path) -> None:
-    (tmp_path / "a.csv").write_text("t;x;y\n[s];[g];[g]\n1;2;3\n2;3;4\n", encoding="utf-8")
-    content, _ = files.read_content(tmp_path / "a.csv")
-    assert dict(content.units) == {"t": "s", "x": "g", "y": "g"}
-    assert len(content.table) == 2
-
-
-def test_a_broken_first_row_stays_a_row(tmp_path) -> None:
-    (tmp_path / "a.csv").write_text("t,x,y\n1,abc,2\n2,3,4\n3,4,5\n4,5,6\n", encoding="utf-8")
-    table, _ = files.read(tmp_path / "a.csv")
-    assert table["x"].tolist() == ["abc", "3", "4", "5"]
-
-
-def test_rows_of_another_width_are_refused_below_a_preamble_too(tmp_path) -> None:
-    (tmp_path / "a.csv").write_text("logger\nt,x,y\n1,2,3\n2,3,4\n3,4,5,6\n4,5,6\n", encoding="utf-8")
+def test_units_in_a_line_broken_rows_short_rows_and_rows_of_another_width_are_what_they_are(tmp_path: Path) -> None:
+    found = read(tmp_path, "t;x;y\n[s];[g];[g]\n1;2;3\n2;3;4\n")
+    assert (dict(found.units), len(found.table)) == ({"t": "s", "x": "g", "y": "g"}, 2)
+    broken = read(tmp_path, "t,x,y\n1,abc,2\n2,3,4\n3,4,5\n4,5,6\n")
+    assert broken.table["x"].tolist() == ["abc", "3", "4", "5"]
+    short = read(tmp_path, "t,x,y,note\n0,1,2\n1,1,2,\n2,1,2,\n3,1,2\n4,1,2,\n5,1,2,\n")
+    assert (list(short.table.columns)[:3], len(short.table), short.remarks) == (["t", "x", "y"], 6, ())
     with pytest.raises(DataRejected, match="rows from line 3 on do not have the 3 columns"):
-        files.read(tmp_path / "a.csv")
+        read(tmp_path, "logger\nt,x,y\n1,2,3\n2,3,4\n3,4,5,6\n4,5,6\n")
 
 
 def test_a_line_break_in_a_quoted_field_of_every_row_is_part_of_the_field() -> None:
@@ -92,12 +90,6 @@ def test_a_line_break_in_a_quoted_field_of_every_row_is_part_of_the_field() -> N
 
 COUNTS = [[16005, -416, 650], [-12, 1002, 999], [7, -1024, 16384]] * 10
 PLAIN = {"columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "unit": "A1", "units": {"output": "LSB"}}
-
-
-def read(tmp_path: Path, text: str, encoding: str = "utf-8") -> tuple[pd.DataFrame, tuple[str, ...]]:
-    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
-    content, _ = files.read_content(tmp_path / "a.csv")
-    return content.table, tuple(content.remarks)
 
 
 def sheet(form: str, divider: str, rows: list[list[float]], *, quoted: bool = False) -> str:
@@ -121,10 +113,10 @@ def sheet(form: str, divider: str, rows: list[list[float]], *, quoted: bool = Fa
 )  # fmt: skip
 def test_thousands_with_a_separator_are_counts(text: str, remark: str, tmp_path: Path) -> None:
     """16,384 in quotes was read as 16.384 and taken for m/s²."""
-    table, remarks = read(tmp_path, text)
-    np.testing.assert_allclose(table[["ax", "ay", "az"]].to_numpy(dtype=float), COUNTS)
-    np.testing.assert_allclose(table["t"], 0.01 * np.arange(len(COUNTS)))
-    assert remark in "; ".join(remarks)
+    found = read(tmp_path, text)
+    np.testing.assert_allclose(found.table[["ax", "ay", "az"]].to_numpy(dtype=float), COUNTS)
+    np.testing.assert_allclose(found.table["t"], 0.01 * np.arange(len(COUNTS)))
+    assert remark in "; ".join(found.remarks)
 
 
 @pytest.mark.parametrize(
@@ -138,23 +130,9 @@ def test_thousands_with_a_separator_are_counts(text: str, remark: str, tmp_path:
 def test_three_decimals_are_no_thousands(rows: list[list[float]], decimal: str, tmp_path: Path) -> None:
     text = sheet(".3f", ";", rows)
     text = "\n".join(f"{k}{line[line.index(';') :]}" if k else line for k, line in enumerate(text.splitlines()))
-    table, remarks = read(tmp_path, text.replace(".", decimal))
-    np.testing.assert_allclose(table[["ax", "ay", "az"]].to_numpy(dtype=float), rows)
-    assert not any("thousands" in one for one in remarks)
-
-
-@each(["utf-16-le", "utf-16-be"])
-def test_utf_16_without_its_mark_is_read(encoding: str, tmp_path: Path) -> None:
-    table, remarks = read(tmp_path, sheet("d", ",", COUNTS), encoding)
-    assert table["ax"].tolist()[:3] == [16005, -12, 7]
-    assert remarks == (f"text in {encoding.upper()}",)
-
-
-def test_rows_without_their_last_fields_do_not_hide_the_header(tmp_path: Path) -> None:
-    table, remarks = read(tmp_path, "t,x,y,note\n0,1,2\n1,1,2,\n2,1,2,\n3,1,2\n4,1,2,\n5,1,2,\n")
-    assert list(table.columns)[:3] == ["t", "x", "y"]
-    assert len(table) == 6
-    assert remarks == ()
+    found = read(tmp_path, text.replace(".", decimal))
+    np.testing.assert_allclose(found.table[["ax", "ay", "az"]].to_numpy(dtype=float), rows)
+    assert not any("thousands" in one for one in found.remarks)
 
 
 def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
@@ -162,23 +140,16 @@ def test_minutes_and_seconds_of_a_spreadsheet_go_on_over_the_hour() -> None:
     np.testing.assert_allclose(times, [0.0, 0.25, 0.5, 0.75])
 
 
-def frame(rng: np.random.Generator, **more: object) -> tuple[recordings.Recording, pd.DataFrame]:
-    one = recordings.recording(rng, **more)  # type: ignore[arg-type]
-    return one, recordings.table(one, t=one.time)
-
-
-def test_a_row_of_a_summary_is_left_out_where_gaps_may_be(rng: np.random.Generator) -> None:
+def test_a_row_of_a_summary_is_left_out_where_gaps_may_be_and_rows_that_stand_twice_are_remarked_upon(
+    rng: np.random.Generator,
+) -> None:
     """The message asked for `--gaps split`, which was given."""
-    _, table = frame(rng)
+    table = recordings.table(recordings.recording(rng))
     last = pd.DataFrame({"t": ["mean"], "ax": [0.0], "ay": [0.0], "az": [0.0]})
-    table = pd.concat([table.astype(object), last], ignore_index=True)
-    recording = imported(table, build(PLAIN | {"gaps": "split"}, "t"), "a.csv")
+    summed = pd.concat([table.astype(object), last], ignore_index=True)
+    recording = imported(summed, build(PLAIN | {"gaps": "split"}, "t"), "a.csv")
     assert recording.samples is not None
-    assert len(recording.samples) == len(table) - 1
-
-
-def test_rows_that_stand_there_twice_are_remarked_upon(rng: np.random.Generator) -> None:
-    _, table = frame(rng)
+    assert len(recording.samples) == len(table)
     twice = pd.concat([table.iloc[:501], table.iloc[500:]], ignore_index=True)
     assert "CHECK THE ROWS: 1 rows" in "; ".join(imported(twice, build(PLAIN, "t"), "a.csv").remarks)
     assert "CHECK THE ROWS" not in "; ".join(imported(table, build(PLAIN, "t"), "a.csv").remarks)
@@ -186,7 +157,7 @@ def test_rows_that_stand_there_twice_are_remarked_upon(rng: np.random.Generator)
 
 def test_words_that_lost_their_sign_are_refused_with_what_to_subtract(rng: np.random.Generator, tmp_path: Path) -> None:
     """They were imported, and the fit said NOT ADEQUATE."""
-    _, table = frame(rng, positions=18)
+    table = recordings.table(recordings.recording(rng, positions=18))
     wrong = table.assign(**{name: np.round(table[name]) % 65536.0 for name in ("ax", "ay", "az")})
     with pytest.raises(DataRejected, match=r"signed words of 16 bits .* subtract 65536"):
         imported(wrong, build(PLAIN, "t"), "a.csv")
@@ -194,27 +165,23 @@ def test_words_that_lost_their_sign_are_refused_with_what_to_subtract(rng: np.ra
     assert any("without their sign" in one for one in inspect([tmp_path / "a.csv"]).document["open"])
 
 
-@pytest.mark.parametrize(
-    ("bits", "zero", "per_g"), [(12, 2048, 400), (12, 2048, 2000), (16, 32768, 4000), (10, 512, 100)]
-)
+@each([(12, 2048, 400), (12, 2048, 2000), (16, 32768, 4000), (10, 512, 100)])
 def test_a_converter_with_its_zero_in_the_middle_lost_no_sign(
-    rng: np.random.Generator, bits: int, zero: int, per_g: int
+    row: tuple[int, int, int], rng: np.random.Generator
 ) -> None:
+    bits, zero, per_g = row
     force = np.repeat(recordings.FACES, 50, axis=0)
     counts = np.clip(np.round(zero + per_g * force + rng.normal(0.0, 2.0, force.shape)), 0, 2**bits - 1)
     assert unsigned_bits(counts) == 0
 
 
-def test_a_sheet_of_positions_is_proposed_as_dwells(tmp_path: Path) -> None:
+def test_a_sheet_of_positions_is_proposed_as_dwells_and_unknown_axes_stand_in_capitals(tmp_path: Path) -> None:
     """The proposed command asked for the rate of samples."""
     (tmp_path / "a.csv").write_text("Position;X;Y;Z\nX up;0,98;0,01;0,02\nX down;-1,01;0,01;0,02\nY up;0,0;1,0;0,0\n")
     document = inspect([tmp_path / "a.csv"]).document
     assert document["open"] == []
     assert "dwell=Position" in document["command"]
     assert document["command"].endswith("--rows dwells")
-
-
-def test_axes_that_were_not_recognised_stand_in_capitals(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,ax\n" + "".join(f"{0.01 * k:.2f},0.{k}\n" for k in range(20)))
     document = inspect([tmp_path / "a.csv"]).document
     assert "x=COLUMN,y=COLUMN,z=COLUMN" in document["command"]
@@ -231,7 +198,6 @@ def test_clocks_of_labelled_parts_that_restart_are_continued(rng: np.random.Gene
         table.loc[start : stop - 1, "t"] -= one.time[start]
     content = PLAIN | {"columns": {**PLAIN["columns"], "dwell": "part"}}  # type: ignore[dict-item]
     recording = imported(table[table["part"] != ""].reset_index(drop=True), build(content, "t"), "a.csv")
-    assert recording.dwells is not None
     assert bool(np.all(np.diff(recording.dwells["time_s"]) > 0.0))
     assert "the clock restarts 5 times" in "; ".join(recording.remarks)
 

@@ -42,14 +42,17 @@ def test_a_right_model_is_adequate_and_kept(tmp_path: Path) -> None:
     assert run.about["source"]["sha256"]
 
 
-def test_the_missing_pole_is_named_and_the_error_falls(tmp_path: Path) -> None:
-    diagnosis = import_transfer(
-        written(tmp_path / "b.csv", low_pass_hz=6000.0), "S1", archive=str(tmp_path / "archive")
-    )
+def test_the_missing_pole_is_named_the_error_falls_and_the_command_says_so_by_its_status(tmp_path: Path) -> None:
+    path, archive = written(tmp_path / "b.csv", low_pass_hz=6000.0), str(tmp_path / "archive")
+    diagnosis = import_transfer(path, "S1", archive=archive)
     assert diagnosis["adequate"] is False
     assert "one_pole" in diagnosis["classes"][0]["effects"]
     assert diagnosis["extended_percent"] < 0.2 * diagnosis["error_percent"]
     assert diagnosis["left_out"][1] == pytest.approx(1.0, abs=0.25)
+    words = ["import", str(path), "--procedure", "sweep", "--unit", "S1", "--archive", archive, "--json"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 1
+    assert json.loads(result.stdout)["recommended"]
 
 
 def test_a_sweep_that_ends_too_soon_gives_an_interval(tmp_path: Path) -> None:
@@ -72,12 +75,3 @@ def test_a_file_without_units_or_values_is_refused(row: tuple[str, str, str], tm
     path.write_text(f"{head}\n{line}\n")
     with pytest.raises(DataRejected, match=needed):
         import_transfer(path, "S1", archive=str(tmp_path / "archive"))
-
-
-def test_the_command_prints_a_document_and_says_by_its_status_what_came_of_it(tmp_path: Path) -> None:
-    path, archive = written(tmp_path / "d.csv", low_pass_hz=6000.0), str(tmp_path / "archive")
-    result = CliRunner().invoke(
-        app, ["import", str(path), "--procedure", "sweep", "--unit", "S1", "--archive", archive, "--json"]
-    )
-    assert result.exit_code == 1
-    assert json.loads(result.stdout)["recommended"]

@@ -2,8 +2,9 @@
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -68,14 +69,7 @@ def _all_swapped() -> pd.DataFrame:
     return table.assign(out_x=table["out_y"], out_y=table["out_x"])
 
 
-CASES = [
-    (_plain, True),
-    (_hidden, False),
-    (_knocked, False),
-    (_few, None),
-    (_swapped, True),
-    (_all_swapped, None),
-]
+CASES = [(_plain, True), (_hidden, False), (_knocked, False), (_few, None), (_swapped, True), (_all_swapped, None)]
 
 
 @pytest.mark.usefixtures("no_next_measurement")
@@ -89,6 +83,8 @@ def test_it_is_the_verdict_of_diagnose_in_every_figure(made, adequate) -> None:
     assert {name: short[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
     assert short["faulty"] == sorted({unit for fault in whole["blocked_by"] for unit in fault["units"]})
     assert (short["reason"] is None) == (adequate is not None)
+    stored = verdict_of(judge(table, None, effects)["verdict"])  # it comes back from its table
+    assert stored == told_by(whole, table["unit"].nunique())
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +100,6 @@ def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.C
     place = ("--archive", run.archive.root)
     whole = json.loads(_command("diagnose", run.id, "--json", *place))
     document = adequacy_of(run)
-    assert document is not None
     assert document["adequate"] is whole["adequate"]
     assert {name: document[name] for name in FIGURES} == {name: whole["error"][name] for name in FIGURES}
     print_adequacy(document)
@@ -120,12 +115,15 @@ def test_line_and_panel_and_diagnose_of_one_run_agree(run: Run, capsys: pytest.C
 
 def test_the_verdict_of_a_run_is_read_from_its_archive(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("inertial.criticism.verdict.judged", None)  # nothing is judged again
+    before = {path.name: path.read_bytes() for path in Path(str(run.path)).glob("*.json")}
     document = adequacy_of(run)
+    assert {path.name: path.read_bytes() for path in Path(str(run.path)).glob("*.json")} == before
     assert document is not None
     [row] = run.table("verdict").to_dict("records")
     assert row["model"] == ",".join(run.about["recipe"]["effects"])
     assert row["p_value"] == document["p_value"]
-    [listed] = json.loads(_command("list", "--json", "--archive", run.archive.root))["runs"]
+    runs = json.loads(_command("list", "--json", "--archive", run.archive.root))["runs"]
+    [listed] = [one for one in runs if one["id"] == run.id]
     assert listed["verdict"] == row["verdict"] == ("adequate" if document["adequate"] else "not adequate")
 
 
@@ -140,44 +138,6 @@ def test_another_model_of_a_run_has_a_verdict_of_its_own(run: Run) -> None:
     assert (document["adequate"], document["p_value"]) == (whole["adequate"], whole["error"]["p_value"])
 
 
-@pytest.mark.parametrize("made", [_plain, _hidden, _knocked, _few, _swapped])
-def test_a_verdict_comes_back_from_its_table_and_is_that_of_a_diagnosis(made: Callable[[], pd.DataFrame]) -> None:
-    table = made()
-    effects = MODEL if made is not _few else MODEL[:3]
-    stored = verdict_of(judge(table, None, effects)["verdict"])
-    assert stored == told_by(diagnose(table, None, effects), table["unit"].nunique())
-
-
-def test_a_run_without_a_model_has_no_verdict() -> None:
-    assert verdict_of(judge(_plain(), None, ())["verdict"]) is None
-
-
-def test_a_judged_run_keeps_its_tables_and_hashes(run: Run) -> None:
-    before = {path.name: path.read_bytes() for path in Path(str(run.path)).glob("*.json")}
-    tables = run.tables()
-    adequacy_of(run)
-    assert run.tables() == tables
-    assert {path.name: path.read_bytes() for path in Path(str(run.path)).glob("*.json")} == before
-
-
-class Pictured:
-    """What a panel asks of a report."""
-
-    def __init__(self, run: Run) -> None:
-        self.run = run
-
-
-def test_a_run_whose_units_were_all_refused_says_what_is_missing(tmp_path: Path) -> None:
-    run = small_run(tmp_path, dict.fromkeys(("A1", "A2", "A3"), "silent"))
-    document = adequacy_of(run)
-    assert document is not None
-    assert document["adequate"] is None
-    assert "refused" in str(document["reason"])
-    panel = model_adequacy.render(Pictured(run))  # pyright: ignore[reportArgumentType]
-    assert panel is not None
-    assert "Cannot be judged: every unit was refused" in panel
-
-
 class WithoutTumbling:
     """A run of a list of procedures without a multi-position test."""
 
@@ -190,10 +150,19 @@ class WithoutTumbling:
         return ["dwells", "history"]
 
 
-def test_a_run_without_a_multi_position_test_has_neither_line_nor_panel() -> None:
-    run = WithoutTumbling()
-    assert adequacy_of(run) is None  # pyright: ignore[reportArgumentType]
-    assert model_adequacy.render(Pictured(run)) is None  # pyright: ignore[reportArgumentType]
+def _panel(run: Any) -> str | None:
+    return model_adequacy.render(SimpleNamespace(run=run))  # pyright: ignore[reportArgumentType]
+
+
+def test_a_run_that_cannot_be_judged_says_why_and_one_without_model_or_poses_says_nothing(tmp_path: Path) -> None:
+    run = small_run(tmp_path, dict.fromkeys(("A1", "A2", "A3"), "silent"))
+    document = adequacy_of(run)
+    assert document["adequate"] is None
+    assert "refused" in str(document["reason"])
+    assert "Cannot be judged: every unit was refused" in str(_panel(run))
+    assert verdict_of(judge(_plain(), None, ())["verdict"]) is None
+    assert adequacy_of(WithoutTumbling()) is None  # pyright: ignore[reportArgumentType]
+    assert _panel(WithoutTumbling()) is None
 
 
 def test_a_certificate_is_offered_for_units_that_pass_by_a_budget_under_an_adequate_model(run: Run) -> None:

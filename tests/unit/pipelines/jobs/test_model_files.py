@@ -3,11 +3,13 @@
 from datetime import UTC, datetime
 
 import pytest
+from each import each
 
 from inertial import effects
 from pipelines.diagnosis.model_history import evolution
 from pipelines.jobs.model_files import ModelStep, chosen_effects, extended, new_model, read_model, versions
 from schemas.errors import RecipeInvalid, WrongUse
+from schemas.model import parse_model
 
 NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)
 COMMENTED = """\
@@ -34,7 +36,7 @@ def step(effect, **more):
     return ModelStep(effect, "A. Tester", NOW, "the residuals say so", **more)
 
 
-def test_the_next_version_keeps_comments_and_says_who_when_and_why():
+def test_the_next_version_keeps_comments_and_says_who_when_and_why_and_takes_formulas_and_covariates(tmp_path):
     text, model = extended(COMMENTED, step("third_order", run="run-7"), "model line.toml")
     assert "# Of line 3." in text
     assert "# to begin with" in text
@@ -43,37 +45,56 @@ def test_the_next_version_keeps_comments_and_says_who_when_and_why():
     assert (last.version, last.effect, last.by, last.at, last.why, last.run) == (
         2, "third_order", "A. Tester", NOW, "the residuals say so", "run-7",
     )  # fmt: skip
-
-
-def test_a_formula_and_a_covariate_can_be_added():
     text, _ = extended(COMMENTED, step("wet"), "model line.toml")
     _, model = extended(text, step("covariate:pressure_hPa"), "model line.toml")
-    assert model.model.effects[-2:] == ["wet", "covariate:pressure_hPa"]
-    assert model.model.version == 3
+    assert (model.model.version, model.model.effects[-2:]) == (3, ["wet", "covariate:pressure_hPa"])
+    for effect, said in (("third_ordr", "did you mean third_order"), ("scale", "'scale' is in version 1 already")):
+        with pytest.raises(RecipeInvalid, match=said):
+            extended(COMMENTED, step(effect), "model line.toml")
+    with pytest.raises(WrongUse, match="leave one out"):
+        chosen_effects("bias", tmp_path / "m.toml", "compare")
 
 
-@pytest.mark.parametrize(
-    ("effect", "message"), [("third_ordr", "did you mean third_order"), ("scale", "'scale' is in version 1 already")]
-)
-def test_refuses_what_is_unknown_or_there(effect, message):
-    with pytest.raises(RecipeInvalid, match=message):
-        extended(COMMENTED, step(effect), "model line.toml")
+VERSIONS = """
+[model]
+name = "line"
+version = 2
+effects = ["bias", "scale"]
+[[change]]
+version = 1
+by = "A. Tester"
+at = 2026-01-01
+why = "start"
+[[change]]
+version = 2
+effect = "scale"
+by = "A. Tester"
+at = 2026-02-01
+why = "residuals follow the force"
+"""
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('"humidity_pct"', '"sqr(humidity_pct)"', "formula wet: unknown function 'sqr'; did you mean sqrt"),
-        ('id = "wet"', 'id = "third_order"', "the catalogue has an effect with this id"),
-        ('id = "wet"', 'id = "Wet one"', "formula.0.id"),
-        ('columns = ["humidity_pct"]', "columns = []", "formula.0.columns"),
-    ],
-)
-def test_refuses_a_formula_that_is_none(tmp_path, old, new, message):
+@each([
+    (COMMENTED, '"humidity_pct"', '"sqr(humidity_pct)"', "formula wet: unknown function 'sqr'; did you mean sqrt"),
+    (COMMENTED, 'id = "wet"', 'id = "third_order"', "the catalogue has an effect with this id"),
+    (COMMENTED, 'id = "wet"', 'id = "Wet one"', "formula.0.id"),
+    (COMMENTED, 'columns = ["humidity_pct"]', "columns = []", "formula.0.columns"),
+    (VERSIONS, "version = 2\neffects", "version = 3\neffects", "every version needs its"),
+    (VERSIONS, '["bias", "scale"]', '["bias", "bias"]', "bias is there twice"),
+    (VERSIONS, 'why = "start"', 'wy = "start"', "did you mean why"),
+    (VERSIONS, "version = 1\n", "version = 2\n", "do not rise"),
+])  # fmt: skip
+def test_refuses_a_file_with_a_slip(row, tmp_path):
+    content, old, new, message = row
     path = tmp_path / "line.toml"
-    path.write_text(COMMENTED.replace(old, new), encoding="utf-8")
+    path.write_text(content, encoding="utf-8")
+    with effects.additions_forgotten():
+        assert read_model(path).model.effects == ["bias", "scale"]
+    path.write_text(content.replace(old, new), encoding="utf-8")
     with pytest.raises(RecipeInvalid, match=message):
         read_model(path)
+    with pytest.raises(RecipeInvalid, match=r"none\.toml cannot be read"):
+        read_model(tmp_path / "none.toml")
 
 
 def test_walks_through_the_versions(tmp_path):
@@ -86,24 +107,11 @@ def test_walks_through_the_versions(tmp_path):
         ("bias", "scale"), ("bias", "scale", "misalignment"), ("bias", "scale", "misalignment", "third_order"),
     ]  # fmt: skip
     assert [v.added for v in history] == [(), ("misalignment",), ("third_order",)]
-
-
-def test_a_removed_effect_is_told_as_removed():
-    text, model = extended(COMMENTED, step("third_order"), "model")
+    text, _ = extended(COMMENTED, step("third_order"), "model")  # and out again
     gone = text.replace('"third_order"]', "]").replace("version = 2\neffects", "version = 3\neffects")
     gone += '\n[[change]]\nversion = 3\neffect = "third_order"\nby = "B"\nat = 2026-06-01\nwhy = "not confirmed"\n'
-    from schemas.model import parse_model
-
-    gone = gone.replace('scale", ]', 'scale"]')
-    history = versions(parse_model(gone, "model"))
-    assert [v.removed for v in history][-1] == ("third_order",)
-    assert "third_order" in history[-2].effects
-    assert model.model.version == 2
-
-
-def test_effects_and_model_together_are_refused(tmp_path):
-    with pytest.raises(WrongUse, match="leave one out"):
-        chosen_effects("bias", tmp_path / "m.toml", "compare")
+    last = versions(parse_model(gone.replace('scale", ]', 'scale"]'), "model"))[-2:]
+    assert ("third_order" in last[0].effects, last[1].removed) == (True, ("third_order",))
 
 
 def errors(fit, heldout, fresh, progress=None):
@@ -145,17 +153,13 @@ def test_an_effect_is_judged_against_the_version_before_it_and_refuted_only_by_e
     assert rows[2]["text"].startswith("refuted: -0.10 ± 0.20")
 
 
-def test_what_a_fresh_run_cannot_decide_asks_for_one_more_run_and_is_not_taken_out():
+def test_what_is_not_decided_asks_for_a_run_and_is_not_taken_out():
     _, model = extended(COMMENTED, step("third_order"), "model")
-    rows, _ = rows_of(model, {2: errors(15.0, 16.0, 15.5), 3: errors(14.9, 16.0, 15.4, judged(None, 0.5, 0.4, 0.1))})
-    assert rows[-1]["confirmed"] is None
-    assert "not decided" in rows[-1]["text"]
-    assert "measure another run" in rows[-1]["text"]
-
-
-def test_without_a_fresh_run_nothing_is_refuted():
-    _, model = extended(COMMENTED, step("third_order"), "model")
-    told = {2: errors(15.0, 16.0, None), 3: errors(14.0, 16.1, None, judged(None, None, None, -0.1, density=-3.0))}
-    rows, _ = rows_of(model, told)
-    assert rows[-1]["confirmed"] is None
-    assert "a fresh run of the same units decides" in rows[-1]["text"]
+    for fresh, verdict, said in (
+        ((15.5, 15.4), judged(None, 0.5, 0.4, 0.1), "measure another run"),
+        ((None, None), judged(None, None, None, -0.1, density=-3.0), "a fresh run of the same units decides"),
+    ):
+        rows, _ = rows_of(model, {2: errors(15.0, 16.0, fresh[0]), 3: errors(14.9, 16.0, fresh[1], verdict)})
+        assert rows[-1]["confirmed"] is None
+        assert "not decided" in rows[-1]["text"]
+        assert said in rows[-1]["text"]

@@ -1,6 +1,5 @@
 """Recipes: what is accepted, and that what is refused names the key and what to do."""
 
-import os
 import shutil
 from importlib.resources import files
 from pathlib import Path
@@ -72,18 +71,13 @@ def test_what_is_refused_names_the_key_and_what_to_do(row: tuple[str, str, tuple
         assert words in str(caught.value)
 
 
-@each(
-    [
-        ((), ("A1", "A2", "A1"), "serial A1 is there twice"),
-        ((('units = ["A1", "A2", "A3"]\n', ""),), (), "no unit is named"),
-        ((), ("A1", ""), "serial '' is blank"),
-        (
-            (),
-            tuple(f"S{n}" for n in range(9)),
-            "9 units, the fixture has 8 slots; measure 2 lots.* --units S0,S1,S2,S3,S4,S5,S6,S7, then --units S8$",
-        ),
-    ]
-)
+@each([
+    ((), ("A1", "A2", "A1"), "serial A1 is there twice"),
+    ((('units = ["A1", "A2", "A3"]\n', ""),), (), "no unit is named"),
+    ((), ("A1", ""), "serial '' is blank"),
+    ((), tuple(f"S{n}" for n in range(9)),
+     "9 units, the fixture has 8 slots; measure 2 lots.* --units S0,S1,S2,S3,S4,S5,S6,S7, then --units S8$"),
+])  # fmt: skip
 def test_a_lot_that_cannot_be_measured_is_refused(
     row: tuple[tuple[tuple[str, str], ...], tuple[str, ...], str], tmp_path: Path
 ) -> None:
@@ -92,25 +86,18 @@ def test_a_lot_that_cannot_be_measured_is_refused(
         small_job(tmp_path, *changes, units=units)
 
 
-def test_names_close_recipes() -> None:
-    with pytest.raises(RecipeInvalid, match="did you mean production"):
-        load_recipe("produktion")
-
-
-def test_a_short_soak_is_measured_where_somebody_answers_for_it(tmp_path: Path) -> None:
-    small_job(tmp_path, ("settle_s = 2.0", "settle_s = 2.0\nsoak_min_s = 60.0\nallow_short_soak = true"))
-
-
-@each(NAMED)
-def test_accepts_every_named_plan(plan: str, tmp_path: Path) -> None:
-    assert small_job(tmp_path, (POSES, f'poses = "{plan}"')).recipe.poses
-
-
-def test_takes_poses_as_angles(tmp_path: Path) -> None:
+def test_takes_named_plans_angles_short_soaks_that_somebody_answers_for_and_temperatures_that_come_again(
+    tmp_path: Path,
+) -> None:
+    for plan in NAMED:
+        assert small_job(tmp_path, (POSES, f'poses = "{plan}"')).recipe.poses
     angles = "poses = [[0, 0], [180, 0], [90, 0], [90, 90], [90, 180], [90, -90]]"
-    job = small_job(tmp_path, (POSES, angles))
-    assert [pose.name for pose in job.recipe.poses] == ["p1", "p2", "p3", "p4", "p5", "p6"]
-    assert np.isclose(job.recipe.poses[3].inner_deg, 90.0)
+    poses = small_job(tmp_path, (POSES, angles)).recipe.poses
+    assert [pose.name for pose in poses] == ["p1", "p2", "p3", "p4", "p5", "p6"]
+    assert np.isclose(poses[3].inner_deg, 90.0)
+    small_job(tmp_path, ("settle_s = 2.0", "settle_s = 2.0\nsoak_min_s = 60.0\nallow_short_soak = true"))
+    again = small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 25.0, 50.0, 25.0, 0.0]"))
+    assert again.recipe.temperatures_C[-1] == 0.0
 
 
 def test_takes_the_model_from_a_file(tmp_path: Path) -> None:
@@ -126,16 +113,10 @@ def test_takes_the_model_from_a_file(tmp_path: Path) -> None:
 
 
 def test_the_capture_is_shared_by_recipes_that_differ_in_the_model_only(tmp_path: Path) -> None:
-    one = small_job(tmp_path)
-    other = small_job(tmp_path, ('"scale_temperature"]', '"scale_temperature", "second_order"]'))
-    hotter = small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 51.0]"))
-    assert one.capture_id == other.capture_id
-    assert one.capture_id != hotter.capture_id
-
-
-def test_a_fresh_measurement_is_a_capture_of_its_own(tmp_path: Path) -> None:
-    path = recipe_file(tmp_path)
-    assert Request(recipe=path).job().capture_id != Request(recipe=path, repeat=1).job().capture_id
+    capture = small_job(tmp_path).capture_id
+    assert small_job(tmp_path, ('"scale_temperature"]', '"scale_temperature", "second_order"]')).capture_id == capture
+    assert small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 51.0]")).capture_id != capture
+    assert small_job(tmp_path, repeat=1).capture_id != capture  # a fresh measurement
 
 
 SOAKS = """
@@ -153,27 +134,17 @@ temperature_C = 25.0
 """
 
 
-def in_soaks() -> list[tuple[str, str]]:
-    return [("temperatures_C = [0.0, 50.0]\n", ""), ('limits = "consumer"', 'limits = "consumer"' + SOAKS)]
-
-
 def test_a_recipe_may_say_soak_by_soak_which_poses_are_measured(tmp_path: Path) -> None:
-    recipe = load_recipe(recipe_file(tmp_path, *in_soaks()))
+    in_soaks = [("temperatures_C = [0.0, 50.0]\n", ""), ('limits = "consumer"', 'limits = "consumer"' + SOAKS)]
+    recipe = load_recipe(recipe_file(tmp_path, *in_soaks))
     assert recipe.temperatures_C == [25.0, -10.0, 25.0]
     assert [p.name for p in recipe.poses_at(0)] == ["p1", "p3", "p5", "p1"]
     assert (recipe.verification_at(1), recipe.verification_at(2)) == ([], recipe.verification)
     records = [s for s in steps(recipe) if s.kind != "allan"]
     assert len(records) == 4 + len(recipe.verification) + 4 + len(recipe.poses) + len(recipe.verification)
     assert len(steps(recipe)) == recipe.planned_records
-
-
-def test_refuses_soaks_that_name_a_pose_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(RecipeInvalid, match="soak 2 names poses 10, there are 9"):
-        load_recipe(recipe_file(tmp_path, *in_soaks(), ("8]", "10]")))
-
-
-def test_a_temperature_may_come_again(tmp_path: Path) -> None:
-    assert small_job(tmp_path, ("[0.0, 50.0]", "[0.0, 25.0, 50.0, 25.0, 0.0]")).recipe.temperatures_C[-1] == 0.0
+        load_recipe(recipe_file(tmp_path, *in_soaks, ("8]", "10]")))
 
 
 SAMPLES = files("schemas") / "samples"
@@ -196,12 +167,26 @@ def put(folder: Path, kind: str, name: str, text: str) -> Path:
     return path
 
 
-def test_a_recipe_is_found_in_the_working_folder_before_that_of_the_user(home: Path) -> None:
-    put(home, "recipes", "my", RECIPE.replace("dwell_s = 10.0", "dwell_s = 20.0"))
+def test_a_recipe_is_found_in_the_working_folder_before_that_of_the_user_and_reported_once(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = put(home, "recipes", "my", RECIPE.replace("dwell_s = 10.0", "dwell_s = 20.0"))
+    lines: list[str] = []
+    own_files.report_to(lines.append)
     assert load_recipe("my").dwell_s == 20.0
+    load_recipe("my")
+    own_files.report_to(lambda _line: None)
+    assert lines == [f"recipe 'my': {path}"]
     put(Path(), "recipes", "my", RECIPE.replace("dwell_s = 10.0", "dwell_s = 30.0"))
     assert load_recipe("my").dwell_s == 30.0
     assert "my" in recipe_names()
+    for wrong, meant in (("mmy", "my"), ("produktion", "production")):
+        with pytest.raises(RecipeInvalid, match=f"did you mean {meant}"):
+            load_recipe(wrong)
+    assert own_files.own_file("recipes", "../recipes/my") is None  # a path is not searched
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("XDG_CONFIG_HOME", "config")  # a relative folder is ignored
+    assert own_files.folders("limits")[1] == home / ".config" / "tumbleline" / "limits"
 
 
 def test_a_shadowed_file_of_other_content_is_told_once_and_the_same_content_is_not(
@@ -239,29 +224,13 @@ def test_a_name_means_one_file(home: Path) -> None:
     put(home, "presets", "adxl355", "name = 'adxl355'")
     with pytest.raises(RecipeInvalid, match="is built in"):
         load_preset("ADXL355")
-
-
-def test_a_name_that_is_a_path_is_not_searched(home: Path) -> None:
-    put(home, "recipes", "my", RECIPE)
-    assert own_files.own_file("recipes", "../recipes/my") is None
-    with pytest.raises(RecipeInvalid, match="did you mean my"):
-        load_recipe("mmy")
-
-
-def test_a_preset_whose_name_differs_from_its_file_is_refused(home: Path) -> None:
     put(home, "presets", "quiet", 'name = "loud"\n')
     with pytest.raises(RecipeInvalid, match="key 'name': 'loud', 'quiet' as in the name of the file is needed"):
         load_preset("quiet")
-
-
-def test_the_file_that_is_used_is_reported_once(home: Path) -> None:
-    path = put(home, "recipes", "my", RECIPE)
-    lines: list[str] = []
-    own_files.report_to(lines.append)
-    load_recipe("my")
-    load_recipe("my")
-    own_files.report_to(lambda _line: None)
-    assert lines == [f"recipe 'my': {path}"]
+    for name, load in (("production", load_recipe), ("consumer", read_limits)):  # a file in the working folder
+        Path(name).write_text("name = 'other'\n", encoding="utf-8")
+        with pytest.raises(RecipeInvalid, match=f"'{name}' is built in, and {name} has the same name"):
+            load(name)
 
 
 def test_a_changed_preset_of_ones_own_is_measured_anew(home: Path) -> None:
@@ -277,22 +246,3 @@ def test_a_changed_preset_of_ones_own_is_measured_anew(home: Path) -> None:
     assert Request("my").job().capture_id != first.capture_id
     shutil.rmtree(home)
     assert Request().job().capture_id == built_in.capture_id
-    assert os.environ["XDG_CONFIG_HOME"]
-
-
-def test_a_relative_folder_of_the_configuration_is_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.setenv("XDG_CONFIG_HOME", "config")
-    assert own_files.folders("limits")[1] == tmp_path / ".config" / "tumbleline" / "limits"
-
-
-def test_a_file_with_the_bare_name_of_a_built_in_recipe_or_limits_is_not_taken_in_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in ("production", "consumer"):
-        Path(name).write_text("name = 'other'\n", encoding="utf-8")
-    with pytest.raises(RecipeInvalid, match="'production' is built in, and production has the same name"):
-        load_recipe("production")
-    with pytest.raises(RecipeInvalid, match="'consumer' is built in"):
-        read_limits("consumer")

@@ -65,32 +65,27 @@ def labels(traced: Lineage, kind: str) -> set[str]:
     return {node.label for node in traced.graph.nodes.values() if node.kind == kind}
 
 
-def test_a_units_lineage_goes_from_its_certificate_to_every_record(of_unit: Lineage, run: Run) -> None:
-    assert labels(of_unit, "certificate") == {"A1/1"}
+def test_a_units_lineage_goes_from_its_certificate_to_every_record_with_origin_and_hashes(
+    of_unit: Lineage, run: Run
+) -> None:
     assert len(labels(of_unit, "samples")) == len(run.records.finished())
-    assert {step.name for step in of_unit.graph.steps.values()} >= {
-        "certify", "grade", "noise", "verify", "fit", "reduce", "validate", "capture", "start",
-    }  # fmt: skip
-
-
-def test_it_names_recipe_limits_station_and_reference_standards(of_unit: Lineage) -> None:
-    assert [labels(of_unit, kind) for kind in ("recipe", "limits", "station", "reference")] == [
-        {"small"}, {"consumer"}, {"simulated"}, {"AG-7"},
-    ]  # fmt: skip
+    wanted = {
+        "certificate": "A1/1",
+        "recipe": "small",
+        "limits": "consumer",
+        "station": "simulated",
+        "reference": "AG-7",
+    }
+    assert {kind: labels(of_unit, kind) for kind in wanted} == {kind: {label} for kind, label in wanted.items()}
     [standard] = [node for node in of_unit.graph.nodes.values() if node.kind == "reference"]
     assert (standard.about["certificate"], standard.about["due"]) == ("D-K-15070-2026-03", "2028-03-01")
-
-
-def test_every_step_says_who_when_and_with_what_code_and_libraries(of_unit: Lineage) -> None:
-    fit = next(step for step in of_unit.graph.steps.values() if step.name == "fit")
-    assert {"who", "where", "when", "code", "libraries", "software", "schema", "parameters"} <= fit.about.keys()
-
-
-def test_the_hashes_are_those_of_the_files(of_unit: Lineage, run: Run) -> None:
+    made = {step.name: step for step in of_unit.graph.steps.values()}
+    assert made.keys() >= {"certify", "grade", "noise", "verify", "fit", "reduce", "validate", "capture", "start"}
+    told = {"who", "where", "when", "code", "libraries", "software", "schema", "parameters"}
+    assert told <= made["fit"].about.keys()
     with_hash = [node for node in of_unit.graph.nodes.values() if node.file and node.sha256]
     assert len(with_hash) > 60
-    for node in with_hash:
-        assert files.sha256(run.archive.root / node.file) == node.sha256
+    assert all(files.sha256(run.archive.root / node.file) == node.sha256 for node in with_hash)
 
 
 def test_a_record_leads_to_the_certificates_that_it_went_into(run: Run) -> None:
@@ -108,6 +103,8 @@ def test_a_file_that_was_copied_out_is_known_by_its_content(run: Run, tmp_path: 
     (tmp_path / "strange.parquet").write_bytes(b"strange")
     with pytest.raises(ArchiveUnusable, match="is no table and no source"):
         lineage(run.archive, str(tmp_path / "strange.parquet"))
+    with pytest.raises(WrongUse, match="'small-x' is neither a unit, a run nor a file"):
+        lineage(run.archive, "small-x")
 
 
 def test_a_run_is_followed_back_to_what_it_runs_again_and_forth(run: Run, tmp_path: Path) -> None:
@@ -124,11 +121,6 @@ def test_a_unit_without_certificate_is_followed_from_its_grades(run: Run, tmp_pa
     shutil.rmtree(tmp_path / "archive" / "calibrations")
     traced = lineage(Archive(tmp_path / "archive"), "A3")
     assert (traced.kind, traced.focus) == ("unit", (f"runs/{run.id}/grades.parquet",))
-
-
-def test_what_is_neither_unit_nor_run_nor_file_is_told(run: Run) -> None:
-    with pytest.raises(WrongUse, match="'small-x' is neither a unit, a run nor a file"):
-        lineage(run.archive, "small-x")
 
 
 def read_back(traced: Lineage) -> Rdf:
@@ -152,24 +144,14 @@ def test_prov_is_read_by_another_library_and_leads_from_certificate_to_samples(o
     }
     samples = {iri("thing", node.id) for node in of_unit.graph.nodes.values() if node.kind == "samples"}
     assert samples <= reached
-    agents = set(graph.subjects(predicate=None, object=PROV.Person))
-    assert len(agents) == 1
-
-
-def test_prov_has_an_activity_with_time_and_agent_for_every_thing_made(of_unit: Lineage) -> None:
-    graph = read_back(of_unit)
+    assert len(set(graph.subjects(predicate=None, object=PROV.Person))) == 1
     activities = set(graph.subjects(predicate=None, object=PROV.Activity))
-    made = set(graph.objects(predicate=PROV.wasGeneratedBy))
-    assert made <= activities
+    assert set(graph.objects(predicate=PROV.wasGeneratedBy)) <= activities
     for activity in activities:
         assert graph.value(activity, PROV.endedAtTime) is not None
         assert graph.value(activity, PROV.wasAssociatedWith) is not None
-
-
-def test_a_revoked_certificate_is_invalidated_in_prov(run: Run) -> None:
-    traced = lineage(run.archive, "A2")
-    graph = read_back(traced)
-    assert len(set(graph.subjects(predicate=PROV.wasInvalidatedBy))) == 1
+    revoked = read_back(lineage(run.archive, "A2"))
+    assert len(set(revoked.subjects(predicate=PROV.wasInvalidatedBy))) == 1
 
 
 def validated(crate: Path, severity: str) -> dict:
@@ -199,34 +181,20 @@ def test_the_crate_holds_every_file_and_its_hash(of_unit: Lineage, run: Run, tmp
     assert len(parts) == count
     for part in parts:
         assert files.sha256(tmp_path / "crate" / part["@id"].replace("%3A", ":").replace("%40", "@")) == part["sha256"]
-
-
-def test_a_crate_is_written_into_a_new_folder_only(of_unit: Lineage, run: Run, tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("")
     with pytest.raises(WrongUse, match="exists and is not empty"):
         write_crate(run.archive, of_unit, tmp_path)
 
 
-def ask(run: Run, *arguments: str) -> str:
-    result = CliRunner().invoke(
-        app, ["lineage", *arguments, "--archive", str(run.archive.root)], env={"COLUMNS": "200"}
-    )
-    if result.exception and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result.stdout
+def test_the_command_shows_the_way_once_and_writes_prov_crate_and_json(run: Run, tmp_path: Path) -> None:
+    def ask(*arguments: str) -> str:
+        words = ["lineage", "A1", *arguments, "--archive", str(run.archive.root)]
+        return CliRunner().invoke(app, words, env={"COLUMNS": "200"}, catch_exceptions=False).stdout
 
-
-def test_the_tree_for_people_shows_the_way_once(run: Run) -> None:
-    shown = ask(run, "A1")
+    shown = ask()
     known = ("certificate A1/1", "by fit", "raw samples  23 records", "reference AG-7", "station simulated", "pyarrow")
     assert [words for words in known if words not in shown] == []
     assert shown.count("by fit") == 1
-
-
-def test_the_command_writes_prov_crate_and_json(run: Run, tmp_path: Path) -> None:
-    document = json.loads(
-        ask(run, "A1", "--json", "--prov", str(tmp_path / "p.jsonld"), "--crate", str(tmp_path / "c"))
-    )
+    document = json.loads(ask("--json", "--prov", str(tmp_path / "p.jsonld"), "--crate", str(tmp_path / "c")))
     assert document["focus"] == [node["id"] for node in document["things"] if node["kind"] == "certificate"]
-    assert json.loads((tmp_path / "p.jsonld").read_text()) == json.loads(ask(run, "A1", "--prov", "-"))
+    assert json.loads((tmp_path / "p.jsonld").read_text()) == json.loads(ask("--prov", "-"))
     assert (tmp_path / "c" / "ro-crate-metadata.json").is_file()

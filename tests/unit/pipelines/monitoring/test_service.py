@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -92,17 +93,13 @@ def test_every_metric_of_dashboard_and_rules_exists_with_the_labels_that_they_na
     left |= {"tumbleline_archive_lag_seconds", "tumbleline_station_driven", "tumbleline_station_events"}
     left |= {"tumbleline_last_run_timestamp_seconds"}
     assert set(metrics) - shown == left, "a metric that nothing shows"
-
-
-def test_panels_of_the_dashboard_do_not_overlap_and_have_units() -> None:
-    panels = json.loads((DEPLOY / "dashboard.json").read_text(encoding="utf-8"))["panels"]
+    panels = dashboard["panels"]
     cells = Counter(
         (x, y)
         for g in (panel["gridPos"] for panel in panels)
-        for x in range(g["x"], g["x"] + g["w"])
-        for y in range(g["y"], g["y"] + g["h"])
+        for x, y in product(range(g["x"], g["x"] + g["w"]), range(g["y"], g["y"] + g["h"]))
     )
-    assert max(cells.values()) == 1
+    assert max(cells.values()) == 1, "panels overlap"
     assert max(x for x, _ in cells) < 24
     assert len({panel["id"] for panel in panels}) == len(panels)
     assert all(panel["fieldConfig"]["defaults"]["unit"] for panel in panels)
@@ -146,28 +143,22 @@ def test_a_station_that_was_not_left_safe_is_told_and_a_driven_one_is_not(tmp_pa
     assert "run-2" in stations.unsafe["line-2"]
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"queues": QueueNumbers([run("SCHEDULED", 10)], [], {"line-1": False}, {})}, "was due at 11:50 UTC"),
-        ({"stations": StationNumbers(set(), {"line-1": "run-1"})}, "station line-1: not reported safe after run-1"),
-        ({"faults": {"archive": "holds no archive"}, "archive": None}, "archive: holds no archive"),
-        ({"archive": ArchiveNumbers(free_bytes=10**6), "least_free_bytes": 1e9}, "0.0 GB are free"),
-        ({"archive": ArchiveNumbers(unsealed=2, lag_s=7200.0)}, "2 finished runs are not in the hash chain"),
-        ({"expected": ("line-2",)}, "queue line-2: no worker is online"),
-    ],
-)
-def test_what_needs_a_person_is_told_and_is_unhealthy(changes: dict, told: str) -> None:
-    taken = full(**changes)
+@each([
+    ({"queues": QueueNumbers([run("SCHEDULED", 10)], [], {"line-1": False}, {})}, "was due at 11:50 UTC"),
+    ({"stations": StationNumbers(set(), {"line-1": "run-1"})}, "station line-1: not reported safe after run-1"),
+    ({"faults": {"archive": "holds no archive"}, "archive": None}, "archive: holds no archive"),
+    ({"archive": ArchiveNumbers(free_bytes=10**6), "least_free_bytes": 1e9}, "0.0 GB are free"),
+    ({"archive": ArchiveNumbers(unsealed=2, lag_s=7200.0)}, "2 finished runs are not in the hash chain"),
+    ({"expected": ("line-2",)}, "queue line-2: no worker is online"),
+])  # fmt: skip
+def test_what_needs_a_person_is_told_and_is_unhealthy(row: tuple[dict, str]) -> None:
+    taken = full(**row[0])
     assert not taken.ok
     [problem] = taken.problems
-    assert told in problem
+    assert row[1] in problem
     assert families(text(taken))["tumbleline_healthy"][0].value == 0.0
-
-
-def test_a_run_that_waits_for_a_busy_station_is_not_late() -> None:
     waiting = QueueNumbers([run("SCHEDULED", 60), run("RUNNING", 90, "other")], [], {"line-1": False}, {})
-    assert full(queues=waiting).ok
+    assert full(queues=waiting).ok, "a run that waits for a busy station is not late"
 
 
 class _Fixed(Monitor):
@@ -194,7 +185,7 @@ def test_the_service_answers_prometheus_and_health_checks() -> None:
     assert client.post("/metrics").status_code == 405
 
 
-def test_a_source_that_cannot_be_read_is_a_fault_and_no_exception(
+def test_a_source_that_cannot_be_read_is_a_fault_and_hides_no_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
@@ -205,6 +196,10 @@ def test_a_source_that_cannot_be_read_is_a_fault_and_no_exception(
     assert {one.labels["source"]: one.value for one in families(text(taken))["tumbleline_source_up"]} == {
         "archive": 0.0, "orchestrator": 0.0, "stations": 1.0,
     }  # fmt: skip
+    monkeypatch.setattr(snapshots, "read_stations", lambda folder: {}["pid"])  # a defect
+    taken = Monitor(Archive(tmp_path / "none")).snapshot()
+    assert "KeyError" in taken.faults["stations"]
+    assert not taken.ok
 
 
 @contextmanager
@@ -254,13 +249,10 @@ def troubled(folder: Path) -> Snapshot:
     return full(queues=queues, stations=StationNumbers(set(), {"line-1": "run-1"}))
 
 
-def test_every_kind_of_trouble_is_an_alert(tmp_path: Path) -> None:
-    kinds = Counter(alert["kind"] for alert in alerts_of(troubled(tmp_path)))
-    assert kinds == {"crashed": 1, "failed": 1, "missed": 1, "late": 1, "unsafe": 1}
-
-
-def test_each_alert_is_delivered_once_although_the_receiver_fails_and_the_service_restarts(tmp_path: Path) -> None:
+def test_every_trouble_is_an_alert_that_is_delivered_once_although_receiver_and_service_fail(tmp_path: Path) -> None:
     taken = troubled(tmp_path)
+    kinds = Counter(alert["kind"] for alert in alerts_of(taken))
+    assert kinds == {"crashed": 1, "failed": 1, "missed": 1, "late": 1, "unsafe": 1}
     now = Snapshot(datetime.now(UTC), 30, None, None, None)
     of_audit = alerts_of(now, tmp_path)
     assert [alert["subject"] for alert in of_audit] == ["A1", "A2"]
@@ -307,11 +299,6 @@ def test_alerts_are_posted_as_they_come_and_go_on_after_a_refusal_and_an_unexpec
     assert [one["kind"] for one in accepted] == ["unsafe"]
 
 
-def test_a_web_hook_of_another_kind_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(WrongUse, match="an address such as https://host/path is needed"):
-        Poster("ftp://host/hook", tmp_path)
-
-
 def test_messages_are_text_or_json(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("TUMBLELINE_LOG", raising=False)
     assert log_line("line-1: it is", queue="line-1") == "tumbleline: line-1: it is\n"
@@ -332,7 +319,9 @@ def test_a_command_tells_its_error_as_json_on_request() -> None:
     assert "no command is called 'shw'" in content["message"]
 
 
-def test_a_receiver_that_redirects_has_not_accepted_an_alert(tmp_path: Path) -> None:
+def test_a_receiver_that_redirects_has_accepted_nothing_and_one_refused_alert_holds_up_no_other(
+    tmp_path: Path,
+) -> None:
     alerts = alerts_of(full(stations=StationNumbers(set(), {"line-1": "run-1"})))
     with receiver([307, 302, 301]) as (address, accepted):
         for status in ("307", "302", "301"):
@@ -340,25 +329,11 @@ def test_a_receiver_that_redirects_has_not_accepted_an_alert(tmp_path: Path) -> 
             assert (count, status in fault) == (0, True)
         assert Poster(address, tmp_path).post(alerts) == (1, "")
     assert len(accepted) == 1
-
-
-def test_an_alert_that_is_refused_for_its_content_does_not_hold_up_the_others(tmp_path: Path) -> None:
     alerts = alerts_of(troubled(tmp_path))
+    (tmp_path / "other").mkdir()
     with receiver([400]) as (address, accepted):
-        count, fault = Poster(address, tmp_path).post(alerts)
+        count, fault = Poster(address, tmp_path / "other").post(alerts)
     assert (count, "400" in fault) == (len(alerts) - 1, True)
     assert [one["id"] for one in accepted] == [one["id"] for one in alerts[1:]]
-
-
-def test_an_unexpected_error_of_one_source_does_not_hide_the_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(_folder: Path) -> StationNumbers:
-        raise KeyError("pid")
-
-    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
-    monkeypatch.delenv("PREFECT_API_URL", raising=False)
-    monkeypatch.setattr(snapshots, "read_stations", broken)
-    taken = Monitor(Archive(tmp_path / "none")).snapshot()
-    assert "KeyError" in taken.faults["stations"]
-    assert not taken.ok
+    with pytest.raises(WrongUse, match="an address such as https://host/path is needed"):
+        Poster("ftp://host/hook", tmp_path)

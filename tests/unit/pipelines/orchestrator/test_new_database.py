@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -114,9 +115,11 @@ def test_prefect_makes_its_own_where_none_can_be_made(
         case "no cache":
             (tmp_path / "cache").write_bytes(b"no folder can be made below it")
         case "no home":
-            monkeypatch.setattr(new_database, "cache_folder", _no_home)
+            error = RuntimeError("Could not determine home directory.")
+            monkeypatch.setattr(new_database, "cache_folder", Mock(side_effect=error))
         case "prefect fails":
-            monkeypatch.setattr(new_database, "_migrate", _fails)
+            error = subprocess.CalledProcessError(1, ["prefect"])
+            monkeypatch.setattr(new_database, "_migrate", Mock(side_effect=error))
         case _:
             home = home / "missing"
     assert not make_database(home)
@@ -136,11 +139,3 @@ def nothing_is_written_into_the_environment() -> Iterator[None]:
 def _folder(path: Path) -> Path:
     path.mkdir()
     return path
-
-
-def _no_home() -> Path:
-    raise RuntimeError("Could not determine home directory.")
-
-
-def _fails(_: Path) -> None:
-    raise subprocess.CalledProcessError(1, ["prefect"])

@@ -25,10 +25,13 @@ def key_file(folder: Path, text: str, mode: int = 0o600, name: str = "prefect-au
     return path
 
 
-def test_no_two_keys_are_the_same_and_none_is_short() -> None:
+def test_keys_are_long_and_a_command_has_one_for_client_and_server_and_no_foreign_origin(tmp_path: Path) -> None:
     keys = {new_key() for _ in range(100)}
     assert len(keys) == 100
     assert min(len(key) for key in keys) >= len("tumbleline:") + 43  # 32 random bytes
+    environment = settings(tmp_path, 4321, "a:key")
+    assert environment[SERVER_KEY] == environment[CLIENT_KEY] == "a:key"
+    assert environment["PREFECT_SERVER_CORS_ALLOWED_ORIGINS"] == "http://127.0.0.1:4321,http://localhost:4321"
 
 
 def test_it_is_taken_from_a_file_that_is_named_or_from_the_credentials_of_a_unit(
@@ -46,33 +49,22 @@ def test_it_is_taken_from_a_file_that_is_named_or_from_the_credentials_of_a_unit
     assert use_key(CLIENT_KEY) == other
 
 
-@pytest.mark.parametrize("key", ["", "short:key", "x" * 40])
-def test_a_key_that_is_missing_short_or_without_a_user_is_refused_and_not_told(
-    key: str, monkeypatch: pytest.MonkeyPatch
+def test_a_key_that_is_missing_short_or_open_to_others_is_refused_and_not_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(SERVER_KEY, key)
-    with pytest.raises(WrongUse, match="one of the form user:password") as told:
-        use_key(SERVER_KEY)
-    assert not key or key not in str(told.value)
-
-
-@pytest.mark.parametrize("mode", [0o644, 0o640, 0o604])
-def test_a_file_that_others_may_read_is_refused(tmp_path: Path, mode: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_FILE, str(key_file(tmp_path, new_key(), mode)))
-    with pytest.raises(WrongUse, match=f"has mode {mode:04o}, 0600 or less is needed"):
-        use_key(SERVER_KEY)
-
-
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for key in ("", "short:key", "x" * 40):
+        monkeypatch.setenv(SERVER_KEY, key)
+        with pytest.raises(WrongUse, match="one of the form user:password") as told:
+            use_key(SERVER_KEY)
+        assert not key or key not in str(told.value)
+    monkeypatch.delenv(SERVER_KEY)
+    for mode in (0o644, 0o640, 0o604):
+        monkeypatch.setenv(KEY_FILE, str(key_file(tmp_path, new_key(), mode)))
+        with pytest.raises(WrongUse, match=f"has mode {mode:04o}, 0600 or less is needed"):
+            use_key(SERVER_KEY)
     monkeypatch.setenv(KEY_FILE, str(tmp_path / "none"))
     with pytest.raises(WrongUse, match="cannot be read"):
         use_key(SERVER_KEY)
-
-
-def test_client_and_server_of_a_command_have_the_same_key_and_no_foreign_origin(tmp_path: Path) -> None:
-    environment = settings(tmp_path, 4321, "a:key")
-    assert environment[SERVER_KEY] == environment[CLIENT_KEY] == "a:key"
-    assert environment["PREFECT_SERVER_CORS_ALLOWED_ORIGINS"] == "http://127.0.0.1:4321,http://localhost:4321"
 
 
 def test_what_an_older_version_left_open_is_closed(tmp_path: Path) -> None:

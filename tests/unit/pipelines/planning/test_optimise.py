@@ -39,16 +39,12 @@ def test_no_soak_has_a_dwell_too_many(timed: TimedDesign) -> None:
     assert design is not None
     assert np.all(timed.ratio_and_seconds(design)[0] <= allowed)
     assert len(set(design.counts)) > 1
+    assert fewest_dwells(timed, made, np.full((3, 6), 0.05)) is None  # none is enough
+    assert [smallest_passing(lambda n: n >= 7, 1, most) for most in (20, 6)] == [7, None]
     for soak, count in enumerate(design.counts):
         fewer = list(design.counts)
         fewer[soak] -= 1
         assert count == FEWEST or np.any(timed.ratio_and_seconds(replace(design, counts=tuple(fewer)))[0] > allowed)
-
-
-def test_no_number_of_dwells_is_given_where_none_is_enough(timed: TimedDesign) -> None:
-    assert fewest_dwells(timed, PlanDesign((25.0, -10.0, 60.0, 25.0), (), 2.0), np.full((3, 6), 0.05)) is None
-    assert smallest_passing(lambda n: n >= 7, 1, 20) == 7
-    assert smallest_passing(lambda n: n >= 7, 1, 6) is None
 
 
 def test_the_table_of_flicker_gives_the_covariance_of_dwells(timed: TimedDesign) -> None:

@@ -7,6 +7,7 @@ import independent_noise as made
 import numpy as np
 import pandas as pd
 import pytest
+from lots import dwell_rows
 
 from inertial.noise.dwells import DwellNoise
 from inertial.noise.measurands import walk_mean
@@ -42,17 +43,17 @@ def scattered(noise: DwellNoise, seed: int) -> Scatter:
         means = UG * (means + noise.white(length) / UG * rng.standard_normal(means.shape)).reshape(UNITS, 3, -1)
         sd = noise.density * np.sqrt(100.0 / 2.0)
         rows = [
-            pd.DataFrame(
-                {
-                    "unit": f"U{u}", "dwell": np.arange(len(start)), "time_s": state.time, "kind": "dwell", "pose": "p",
-                    "out_unit": "g", "unit_C": state.temperature, "n": round(100 * length),
-                    **{f"force_{a}": state.force[:, i] for i, a in enumerate("xyz")},
-                    **{f"out_{a}": state.force[:, i] + means[u, i] for i, a in enumerate("xyz")},
-                    **{f"sd_{a}": sd for a in "xyz"},
-                }
+            dwell_rows(
+                f"U{u}",
+                state.time,
+                state.force,
+                state.force + means[u].T,
+                sd,
+                unit_C=state.temperature,
+                n=round(100 * length),
             )
             for u in range(UNITS)
-        ]  # fmt: skip
+        ]
         fitted = fit(pd.concat(rows, ignore_index=True), lots.NO_HISTORY, RECIPE.effects)
         bias = fitted["coefficients"].query("effect == 'bias'").sort_values(["unit", "axis"])["value"].to_numpy() / UG
         record, day = slow[:, first:last].mean(axis=1), slow[:, last:].mean(axis=1)

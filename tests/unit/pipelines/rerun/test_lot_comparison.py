@@ -61,20 +61,15 @@ def test_every_quantity_has_the_numbers_of_the_table(
         np.testing.assert_array_equal(known.of(row["unit"])[row["quantity"], row["axis"]], numbers)
     for unit, own in rows.groupby("unit"):
         assert list(known.of(str(unit))) == list(zip(own["quantity"], own["axis"], strict=True))
+    assert not known.of("nobody")
+    unit = str(rows["unit"].iloc[0])
+    assert ("weight", "x") not in known.of(unit)
+    assert known.of(unit).get(("bias_error", "w")) is None
     covariance = whole["budget_covariance"]
     np.testing.assert_array_equal(
         known.covariance[:, covariance["row"].max(), : covariance["column"].max() + 1].ravel(),
         covariance["value"][covariance["row"] == covariance["row"].max()],
     )
-
-
-def test_unknown_units_and_quantities_have_no_rows(given: tuple[ArchivedJob, BudgetTables, BudgetTerms]) -> None:
-    _, tables, terms = given
-    known = DecisionBudget(tables, terms)
-    unit = str(tables.coefficients["unit"].iloc[0])
-    assert not known.of("nobody")
-    assert ("weight", "x") not in known.of(unit)
-    assert known.of(unit).get(("bias_error", "w")) is None
 
 
 @pytest.mark.parametrize(
@@ -131,11 +126,6 @@ def test_nothing_is_known_where_nothing_is_stated(given: tuple[ArchivedJob, Budg
     _, tables, terms = given
     assert decision_budget(tables, replace(terms, stated=None)) is None
     assert decision_budget(replace(tables, coefficients=tables.coefficients.iloc[:0]), terms) is None
-
-
-def test_some_columns_of_a_table_are_those_of_the_whole_table(run: Run) -> None:
-    columns = ["unit", "residual_ug"]
-    pd.testing.assert_frame_equal(run.table("residuals", columns), run.table("residuals")[columns])
 
 
 def test_a_change_in_a_column_that_is_not_read_is_refused(run: Run, tmp_path: Path) -> None:

@@ -3,17 +3,16 @@
 import json
 import shutil
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import CaptureDouble, small_job, small_run
+from capture_double import CaptureDouble, measured_run, small_job, small_run
 from each import each
 
 from pipelines.archive import Archive, Run, code_hash
-from pipelines.chain.chain import ORDER
-from pipelines.chain.runner import Runner
 from pipelines.integrity import verify
 from pipelines.jobs.model_change import ModelChange, change_from_options
 from pipelines.rerun import steps
@@ -56,18 +55,20 @@ def files_of(run: Run) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in run.path.iterdir() if path.suffix in {".parquet", ".json"}}
 
 
-def test_nothing_is_done_where_nothing_changed(run: Run) -> None:
-    before = files_of(run)
-    outcome = again(run.archive, run.id, ModelChange())
-    assert outcome.new == run.id
-    assert set(outcome.stages.values()) == {"there"}
-    assert files_of(run) == before
+def finished(run: Run, outcome: RerunOutcome) -> Run:
+    """The new run, which is finished in the list and has no finding."""
+    new = run.archive.run(outcome.new)
+    assert {info.id: info.finished for info in run.archive.runs()}[new.id]
+    report = verify(run.archive, keys={}).checked
+    assert report.findings == []
+    assert [remark for remark in report.remarks if new.id in remark] == []
+    return new
 
 
 def test_other_limits_only_grade_again(run: Run) -> None:
     before = files_of(run)
     outcome = again(run.archive, run.id, change_from_options(limits="industrial"))
-    new = run.archive.run(outcome.new)
+    new = finished(run, outcome)
     assert outcome.new != run.id
     assert computed(outcome) == ["grade"]
     assert new.about["rerun_of"] == run.id
@@ -78,7 +79,7 @@ def test_other_limits_only_grade_again(run: Run) -> None:
 
 def test_another_model_begins_at_the_fit_and_says_so(run: Run) -> None:
     outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
-    new = run.archive.run(outcome.new)
+    new = finished(run, outcome)
     assert computed(outcome) == ["fit", "judge", "verify", "noise", "budget", "procedures", "grade"]
     assert "third_order" in set(new.table("coefficients")["effect"])
     assert new.manifest("dwells")["taken_from"] == run.id
@@ -95,26 +96,15 @@ def test_changed_code_of_one_stage_leaves_the_stages_before_it(run: Run, monkeyp
     assert hashes(run.archive.run(outcome.new)) == hashes(run)
 
 
-def test_what_a_rerun_makes_of_tables_that_it_made_itself_has_the_same_bytes(
-    run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    other_code(monkeypatch, "reduce", "fit", "verify", "noise", "grade")
-    outcome = again(run.archive, run.id, change_from_options(effects=LARGER))
-    assert outcome.stages["reduce"] == "computed"
-    assert check(run.archive, outcome.new).same
-
-
 def test_a_rerun_gives_the_bytes_of_a_first_run_with_that_model(run: Run, tmp_path: Path) -> None:
     effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature", "third_order"]
     listed = 'effects = ["bias", "scale", "misalignment", "bias_temperature", "scale_temperature"]'
     (tmp_path / "first").mkdir()
     job = small_job(tmp_path / "first", (listed, f"effects = {json.dumps(effects)}"))
-    first = Runner(job, Archive(tmp_path / "first" / "archive"), measure=CaptureDouble())
-    for stage in ORDER[:-1]:
-        first.stage(stage)
+    first = measured_run(job, Archive(tmp_path / "first" / "archive"), CaptureDouble())
     outcome = again(run.archive, run.id, change_from_options(effects=",".join(effects)))
-    assert hashes(run.archive.run(outcome.new)) == hashes(first.run)
-    assert outcome.new == first.run.id
+    assert hashes(run.archive.run(outcome.new)) == hashes(first)
+    assert outcome.new == first.id
 
 
 @pytest.mark.parametrize("trouble", [KeyboardInterrupt(), DataRejected("verify: no pose"), ValueError("a defect")])
@@ -136,15 +126,6 @@ def test_a_rerun_that_fails_or_is_stopped_leaves_nothing(
     outcome = again(run.archive, run.id, change)
     assert outcome.stages["verify"] == "computed"
     assert verify(run.archive, keys={}).checked.findings == []
-
-
-@pytest.mark.parametrize("change", [{"effects": LARGER}, {"limits": "industrial"}])
-def test_a_rerun_is_finished_in_the_list_and_for_verify(run: Run, change: dict[str, str]) -> None:
-    new = again(run.archive, run.id, change_from_options(**change)).new
-    assert {info.id: info.finished for info in run.archive.runs()}[new]
-    report = verify(run.archive, keys={})
-    assert report.checked.findings == []
-    assert [remark for remark in report.checked.remarks if new in remark] == []
 
 
 def test_a_rerun_that_only_takes_over_is_sealed_too(run: Run) -> None:
@@ -180,25 +161,18 @@ def test_an_old_capture_keeps_its_name_whatever_names_are_made_of_today(
     assert run.archive.run(outcome.new).about["capture"] == run.about["capture"]
 
 
-def test_without_raw_samples_it_begins_at_the_dwells(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_raw_samples_it_begins_at_the_dwells_and_a_check_says_what_it_could_not_check(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shutil.rmtree(run.archive.root / "captures")
+    comparison = check(run.archive, run.id)
+    assert (comparison.tables["dwells"], comparison.tables["coefficients"]) == (LEFT_OUT, SAME)
+    with pytest.raises(DataRejected, match="static record is not in the archive"):
+        again(run.archive, run.id, change_from_options(effects=LARGER))
     other_code(monkeypatch, "reduce", "grade")
     outcome = again(run.archive, run.id, ModelChange())
     assert outcome.stages["reduce"] == "kept"
     assert [(b["stage"], b["what"]) for b in outcome.because] == [("grade", "code")]
-
-
-def test_refuses_another_model_where_the_static_record_is_gone(run: Run) -> None:
-    shutil.rmtree(run.archive.root / "captures")
-    with pytest.raises(DataRejected, match="static record is not in the archive"):
-        again(run.archive, run.id, change_from_options(effects=LARGER))
-
-
-def test_refuses_a_capture_that_is_not_finished(run: Run) -> None:
-    capture = run.archive.root / "captures" / run.about["capture"]
-    (capture / "complete.json").unlink()
-    with pytest.raises(DataRejected, match=r"its capture has \d+ records and is not finished"):
-        again(run.archive, run.id, ModelChange())
 
 
 def test_one_run_that_cannot_be_run_again_does_not_stop_the_others(run: Run) -> None:
@@ -209,18 +183,19 @@ def test_one_run_that_cannot_be_run_again_does_not_stop_the_others(run: Run) -> 
     outcomes = run_again(Batch(run.archive.address, ("broken", run.id)))
     assert "run broken: key 'dwell_s': found -1.0" in outcomes[0].error
     assert not outcomes[1].error
+    (run.archive.root / "captures" / run.about["capture"] / "complete.json").unlink()
+    with pytest.raises(DataRejected, match=r"its capture has \d+ records and is not finished"):
+        again(run.archive, run.id, ModelChange())
 
 
-def test_the_same_code_gives_the_same_bytes_and_a_check_writes_nothing(original: Run) -> None:
-    before = sorted(str(path) for path in original.archive.root.rglob("*"))
-    comparison = check(original.archive, original.id)
+def test_a_check_writes_nothing_and_names_the_table_and_the_size_of_what_differs(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = sorted(str(path) for path in run.archive.root.rglob("*"))
+    comparison = check(run.archive, run.id)
     assert comparison.same
-    assert set(comparison.tables.values()) == {SAME}
-    assert set(comparison.tables) == set(original.tables())
-    assert sorted(str(path) for path in original.archive.root.rglob("*")) == before
-
-
-def test_a_check_names_the_table_and_the_size_of_what_differs(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert comparison.tables == dict.fromkeys(run.tables(), SAME)
+    assert sorted(str(path) for path in run.archive.root.rglob("*")) == before
     real = steps.BY_NAME["verify"].call
 
     def moved(job: object, own: Run) -> dict[str, pd.DataFrame]:
@@ -228,23 +203,12 @@ def test_a_check_names_the_table_and_the_size_of_what_differs(run: Run, monkeypa
         made["verification"].loc[3, "error_ug"] += 0.5
         return made
 
-    changed = [
-        stage if stage.name != "verify" else type(stage)(**{**vars(stage), "call": moved}) for stage in steps.STAGES
-    ]
+    changed = [replace(stage, call=moved) if stage.name == "verify" else stage for stage in steps.STAGES]
     monkeypatch.setattr(steps, "STAGES", tuple(changed))
     comparison = check(run.archive, run.id)
     assert not comparison.same
-    assert comparison.differences == [
-        d for d in comparison.differences if d.startswith("verification: error_ug in 1 of ")
-    ]
+    assert all(d.startswith("verification: error_ug in 1 of ") for d in comparison.differences)
     assert "by at most 0.5" in comparison.differences[0]
-
-
-def test_a_check_says_what_it_could_not_check(run: Run) -> None:
-    shutil.rmtree(run.archive.root / "captures")
-    comparison = check(run.archive, run.id)
-    assert comparison.tables["dwells"] == LEFT_OUT
-    assert comparison.tables["coefficients"] == SAME
 
 
 def test_chooses_runs_by_what_they_are(run: Run) -> None:
@@ -293,7 +257,9 @@ def imported(tmp_path: Path) -> Run:
     )
 
 
-def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:
+def test_imported_dwells_are_fitted_with_the_plain_model_and_graded_where_limits_are_named(
+    imported: Run, tmp_path: Path
+) -> None:
     outcome = again(imported.archive, imported.id, ModelChange())
     new = imported.archive.run(outcome.new)
     assert outcome.because[0]["what"] == "not fitted yet"
@@ -301,9 +267,6 @@ def test_imported_dwells_are_fitted_with_the_plain_model(imported: Run) -> None:
     assert bias["value"].to_numpy() == pytest.approx(0.01, abs=5e-4)
     assert check(new.archive, new.id).same
     assert again(new.archive, new.id, ModelChange()).new == new.id
-
-
-def test_imported_dwells_are_graded_where_limits_are_named(imported: Run, tmp_path: Path) -> None:
     limits = tmp_path / "limits.toml"
     limits.write_text('name = "plain"\n[figures]\nzero_g_offset_mg = { max = 5.0, unit = "mg" }\n')
     outcome = again(imported.archive, imported.id, change_from_options(limits=str(limits)))

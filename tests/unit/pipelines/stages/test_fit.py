@@ -4,6 +4,7 @@ import independent_lots as lots
 import numpy as np
 import pandas as pd
 import pytest
+from lots import dwell_rows
 
 from inertial import poses
 from inertial.frames import force_from_angles
@@ -75,16 +76,9 @@ def lot(
         gain = np.eye(3) + 0.01 * rng.normal(size=(3, 3))
         out = force @ gain.T + 0.02 * rng.normal(size=3) + (own - 25.0)[:, None] * 1e-4 * rng.normal(size=3)
         out = out + lagging * behind[:, None] + slow + WHITE * rng.normal(size=(n, 3))
-        dwells.append(
-            pd.DataFrame(
-                {
-                    "unit": f"U{u}", "dwell": range(n), "time_s": time, "pose": [f"p{k % 26}" for k in range(n)],
-                    "kind": np.where(np.arange(n) % 26 < 24, "dwell", "verification"), "out_unit": "g", "unit_C": own, "n": 100,
-                    **{f"force_{a}": force[:, i] for i, a in enumerate("xyz")},
-                    **{f"out_{a}": out[:, i] for i, a in enumerate("xyz")}, **{f"sd_{a}": 10.0 * WHITE for a in "xyz"},
-                }
-            )
-        )  # fmt: skip
+        kinds = np.where(np.arange(n) % 26 < 24, "dwell", "verification")
+        poses_ = [f"p{k % 26}" for k in range(n)]
+        dwells.append(dwell_rows(f"U{u}", time, force, out, 10.0 * WHITE, pose=poses_, kind=kinds, unit_C=own))
         history.append(
             pd.DataFrame(
                 {"time_s": fine[::10], "chamber_C": heat[::10], "slot": u, "unit": f"U{u}", "unit_C": heat[::10]}

@@ -1,12 +1,14 @@
 """Limits, decision rules and grades."""
 
+import pandas as pd
 import pytest
 from each import each
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipelines.jobs.recipes import sample_names
+from pipelines.jobs.recipes import read_limits, sample_names
 from pipelines.stages.figures import UNITS
+from pipelines.stages.grade import _of_procedures
 from schemas.decisions import GRADES, decide, grade_of
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits, parse_limits
@@ -54,11 +56,9 @@ def test_refuses_limits_by_what_is_wrong_in_them(row: tuple[str, str, str]) -> N
     old, new, said = row
     with pytest.raises(RecipeInvalid, match=said):
         parse_limits(TEXT.replace(old, new).format(rule="simple_acceptance"), "limits test", UNITS)
-
-
-def test_grades_by_the_bias_that_is_left() -> None:
-    for value, grade in ((30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)):
-        assert grade_of(value, 0.0, "guarded_acceptance") == grade
+    for text, message in (("max = 1.0, min = 2.0, ", "both given"), ("", "neither given")):  # a limit has one side
+        with pytest.raises(RecipeInvalid, match=message):
+            parse_limits(f'name = "x"\n[figures]\nsweep_bandwidth_hz = {{ {text}unit = "Hz" }}\n', "test", UNITS)
 
 
 @given(st.floats(0.0, 3000.0), st.floats(0.0, 500.0))
@@ -66,9 +66,8 @@ def test_uncertainty_never_raises_a_grade(value: float, expanded: float) -> None
     order = [*GRADES, None]
     sure, unsure = (grade_of(value, u, "guarded_acceptance") for u in (0.0, expanded))
     assert order.index(unsure) >= order.index(sure)
-
-
-def test_there_are_limits_for_every_grade() -> None:
+    for bias, grade in ((30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)):
+        assert grade_of(bias, 0.0, "guarded_acceptance") == grade
     assert set(sample_names("limits-")) - {"production"} == set(GRADES)
 
 
@@ -104,31 +103,15 @@ def test_a_least_value_says_its_side_its_margin_and_its_risk() -> None:
     assert near.risk == pytest.approx(0.5)
     assert own.model_dump()["figures"] == {"sweep_bandwidth_hz": {"min": 800.0, "unit": "Hz"}}
     assert limits().model_dump()["figures"] == {"bias_error_ug": {"max": 100.0, "unit": "µg"}}
-
-
-def test_a_limit_has_one_side() -> None:
-    for text, message in (("max = 1.0, min = 2.0, ", "both given"), ("", "neither given")):
-        with pytest.raises(RecipeInvalid, match=message):
-            parse_limits(f'name = "x"\n[figures]\nsweep_bandwidth_hz = {{ {text}unit = "Hz" }}\n', "test", UNITS)
-
-
-def test_of_several_axes_the_smallest_is_decided_for_a_least_value() -> None:
-    import pandas as pd
-
-    from pipelines.stages.grade import _of_procedures
-
-    own = parse_limits(LEAST.format(rule="guarded_acceptance"), "test", UNITS)
     rows = [
         {"unit": "A", "figure": "sweep_bandwidth_hz", "axis": axis, "value": value, "uncertainty": 5.0, "identified": True,
          "unit_text": "Hz", "note": ""}
         for axis, value in (("x", 950.0), ("y", 805.0), ("z", 990.0))
     ]  # fmt: skip
-    assert [one.value for one in _of_procedures(pd.DataFrame(rows), "A", own)] == [805.0]
+    assert [one.value for one in _of_procedures(pd.DataFrame(rows), "A", own)] == [805.0]  # the smallest of the axes
 
 
 def test_a_least_value_of_a_figure_of_which_the_largest_axis_is_kept_is_refused(tmp_path) -> None:
-    from pipelines.jobs.recipes import read_limits
-
     (tmp_path / "least.toml").write_text(
         'name = "least"\n[figures]\nturn_on_repeatability_ug = { min = 5.0, unit = "µg" }\n', encoding="utf-8"
     )

@@ -3,6 +3,8 @@
 Larger numbers: `python benchmarks/noise_verdicts.py verification` and `bias`.
 """
 
+from itertools import product
+
 import independent_lots as lots
 import numpy as np
 import pytest
@@ -45,21 +47,17 @@ def test_stated_uncertainties_are_the_standard_deviations_between_runs(name: str
     assert np.median(u_record) / np.sqrt(np.mean(np.square(wrong))) == pytest.approx(1.0, abs=within + 0.05)
 
 
-@pytest.mark.parametrize("sizes", [[1.0], [1.0] * 4, [1.0] * 30, [10.0, *[0.3] * 20], [5.0, 3.0, 1.0, 0.2, 0.1]])
-@pytest.mark.parametrize("error", [0.0, 30.0])
-def test_the_standard_deviation_of_a_root_of_squares_agrees_with_drawn_numbers(
-    sizes: list[float], error: float
-) -> None:
-    rng = np.random.default_rng(20_261_202)
-    drawn = rng.standard_normal((20_000, len(sizes))) * np.sqrt(sizes)
-    drawn[:, 0] += error
-    u = rms_uncertainty(drawn, np.broadcast_to(np.diag(sizes), (20_000, len(sizes), len(sizes))))
-    assert np.mean(u) / np.std(np.sqrt(np.mean(drawn**2, axis=1))) == pytest.approx(1.0, abs=0.08)
-
-
-def test_errors_of_no_noise_have_no_uncertainty() -> None:
-    assert rms_uncertainty(np.array([3.0, 4.0]), np.zeros((2, 2))) == 0.0
-    assert rms_uncertainty(np.zeros(2), np.zeros((2, 2))) == 0.0
+def test_the_standard_deviation_of_a_root_of_squares_agrees_with_drawn_numbers_and_is_none_of_no_noise() -> None:
+    for sizes, error in product(
+        ([1.0], [1.0] * 4, [1.0] * 30, [10.0, *[0.3] * 20], [5.0, 3.0, 1.0, 0.2, 0.1]), (0.0, 30.0)
+    ):
+        drawn = np.random.default_rng(20_261_202).standard_normal((20_000, len(sizes))) * np.sqrt(sizes)
+        drawn[:, 0] += error
+        u = rms_uncertainty(drawn, np.broadcast_to(np.diag(sizes), (20_000, len(sizes), len(sizes))))
+        spread = np.std(np.sqrt(np.mean(drawn**2, axis=1)))
+        assert np.mean(u) / spread == pytest.approx(1.0, abs=0.08), (sizes, error)
+    for errors in (np.array([3.0, 4.0]), np.zeros(2)):
+        assert rms_uncertainty(errors, np.zeros((2, 2))) == 0.0
 
 
 def test_a_mean_of_the_record_is_what_the_mean_of_its_dwells_shows() -> None:

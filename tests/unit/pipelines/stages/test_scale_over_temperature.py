@@ -50,21 +50,15 @@ def dwells_of(made: PlantDevices, noise_ug: float, rng: np.random.Generator, uni
     out = made.output(np.repeat(force[:, None], units, axis=1), own)
     out = out + 1e-6 * noise_ug * rng.standard_normal(out.shape)
     time = 30.0 * np.arange(n) + 3600.0 * (np.arange(n) // 24)
-    return pd.concat(
-        [
-            pd.DataFrame(
-                {
-                    "unit": f"U{u}", "dwell": np.arange(n), "kind": "dwell", "pose": np.arange(n).astype(str), "time_s": time,
-                    "outer_deg": np.degrees(angles[:, 0]), "inner_deg": np.degrees(angles[:, 1]), "unit_C": own[:, u],
-                    "n": 1000, "out_unit": "g", **{f"force_{a}": force[:, i] for i, a in enumerate("xyz")},
-                    **{f"out_{a}": out[:, u, i] for i, a in enumerate("xyz")},
-                    **{f"sd_{a}": 1e-6 * noise_ug * np.sqrt(1000.0) * rng.uniform(0.97, 1.03, n) for a in "xyz"},
-                }
-            )
-            for u in range(units)
-        ],
-        ignore_index=True,
-    )  # fmt: skip
+    angles_deg = dict(zip(("outer_deg", "inner_deg"), np.degrees(angles).T, strict=True))
+    rows = [
+        lots.dwell_rows(
+            f"U{u}", time, force, out[:, u], 1e-6 * noise_ug * np.sqrt(1000.0) * rng.uniform(0.97, 1.03), n=1000,
+            pose=np.arange(n).astype(str), unit_C=own[:, u], **angles_deg,
+        )
+        for u in range(units)
+    ]  # fmt: skip
+    return pd.concat(rows, ignore_index=True)
 
 
 @pytest.mark.parametrize("name", PRESETS)

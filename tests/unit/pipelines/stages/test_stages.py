@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from capture_double import LSB_PER_G, STANDARD_G, CaptureDouble, plan, small_job, small_run
+from capture_double import STANDARD_G, CaptureDouble, plan, small_job, small_run
 
-from inertial.frames import force_from_angles
 from pipelines.archive import Records, Run
 from pipelines.stages.fit import fit
 from pipelines.stages.reduce import reduce
@@ -20,23 +19,16 @@ from schemas.errors import DataRejected
 NO_HISTORY = pd.DataFrame({"time_s": [], "chamber_C": [], "slot": [], "unit": [], "unit_C": []})
 
 
-def test_reduce_gives_means_spreads_and_numbers(run: Run) -> None:
+def test_reduce_gives_means_spreads_numbers_and_the_reference_in_standard_g(run: Run) -> None:
     samples, dwells = run.table("samples"), run.table("dwells")
     row = dwells.iloc[4]
     own = samples[(samples["unit"] == row["unit"]) & (samples["record"] == row["record"])]
     assert row["n"] == len(own)
     assert np.isclose(row["out_y"], own["y"].mean())
     assert np.isclose(row["sd_z"], own["z"].std())
-
-
-def test_reduce_states_the_reference_in_standard_g_from_local_gravity(run: Run) -> None:
-    dwells = run.table("dwells")
     norm = np.linalg.norm(dwells[["force_x", "force_y", "force_z"]], axis=1)
     np.testing.assert_allclose(norm, 9.8123 / STANDARD_G, rtol=1e-12)
-
-
-def test_reduce_leaves_the_static_record_out(run: Run) -> None:
-    assert set(run.table("dwells")["kind"]) == {"dwell", "verification"}
+    assert set(dwells["kind"]) == {"dwell", "verification"}  # without the static record
 
 
 def test_fit_finds_what_the_devices_are(run: Run, tmp_path: Path) -> None:
@@ -48,36 +40,10 @@ def test_fit_finds_what_the_devices_are(run: Run, tmp_path: Path) -> None:
         errors = calibration.standard_error("bias")[slot, :, 0]
         assert np.all(np.abs(calibration.value("bias")[slot, :, 0] - zero) < 4.5 * errors + 1.0)
     assert job.recipe.effects == list(calibration.effects)
-
-
-def test_fit_without_noise_is_exact() -> None:
-    angles = np.radians([(0, 0), (180, 0), (90, 0), (90, 90), (90, 180), (90, -90), (45, 30)])
-    force = force_from_angles(angles[:, 0], angles[:, 1])
-    out = 2.0 * force + np.array([0.1, 0.2, 0.3])
-    dwells = pd.DataFrame(
-        {
-            "unit": "A", "dwell": range(7), "time_s": np.arange(7.0), "kind": "dwell", "pose": "p", "out_unit": "V",
-            **{f"force_{a}": force[:, i] for i, a in enumerate("xyz")},
-            **{f"out_{a}": out[:, i] for i, a in enumerate("xyz")},
-            **{f"sd_{a}": 1e-3 for a in "xyz"}, "n": 100,
-        }
-    )  # fmt: skip
-    table = fit(dwells, NO_HISTORY, ["bias", "scale", "misalignment"])["coefficients"].set_index(["axis", "effect"])[
-        "value"
-    ]
-    np.testing.assert_allclose(table["x", "scale"], 2.0, rtol=1e-12)
-    np.testing.assert_allclose(table["z", "bias"], 0.3, rtol=1e-12)
-
-
-def test_coefficients_name_their_units(run: Run) -> None:
-    table = run.table("coefficients").drop_duplicates("effect").set_index("effect")["unit_text"]
-    assert table.to_dict() == {
-        "bias": "LSB",
-        "scale": "LSB/g",
-        "misalignment": "LSB/g",
-        "bias_temperature": "LSB/K",
-        "scale_temperature": "LSB/(g·K)",
-    }
+    units = run.table("coefficients").drop_duplicates("effect").set_index("effect")["unit_text"]
+    assert units.to_dict() == {
+        "bias": "LSB", "scale": "LSB/g", "misalignment": "LSB/g", "bias_temperature": "LSB/K", "scale_temperature": "LSB/(g·K)",
+    }  # fmt: skip
 
 
 def test_lack_of_fit_widens_the_uncertainty(run: Run) -> None:
@@ -92,13 +58,10 @@ def test_lack_of_fit_widens_the_uncertainty(run: Run) -> None:
     assert ratio > 3.0
 
 
-def test_verification_errors_lie_within_what_the_uncertainty_allows(run: Run) -> None:
+def test_verification_errors_and_noise_are_those_of_the_double(run: Run) -> None:
     verification = run.table("verification")
     assert (verification["error_ug"].abs() < 5.0 * verification["uncertainty_ug"]).all()
     assert (verification["reading_ug"] < verification["uncertainty_ug"]).all()
-
-
-def test_noise_finds_the_white_noise_of_the_double(run: Run) -> None:
     noise = run.table("noise").set_index(["unit", "axis", "term"])
     expected = 1e-4 / np.sqrt(100.0) * 1e6
     assert np.isclose(noise.loc[("A1", "x", "N"), "value"], expected, rtol=0.1)
@@ -106,14 +69,10 @@ def test_noise_finds_the_white_noise_of_the_double(run: Run) -> None:
     assert not noise.loc[("A1", "x", "B"), "identified"]
 
 
-def test_units_measured_in_different_dwells_are_not_fitted_together(run: Run) -> None:
+def test_units_with_different_dwells_or_units_of_output_are_not_fitted_together(run: Run) -> None:
     dwells = run.table("dwells")
     with pytest.raises(DataRejected, match="every unit needs every dwell"):
         lot_arrays(dwells.iloc[1:])
-
-
-def test_outputs_in_different_units_are_not_fitted_together(run: Run) -> None:
-    dwells = run.table("dwells")
     dwells.loc[dwells["unit"] == "A2", "out_unit"] = "V"
     with pytest.raises(DataRejected, match="outputs in LSB and V"):
         lot_arrays(dwells)
@@ -157,10 +116,6 @@ def test_a_unit_that_never_answered_has_a_verdict(tmp_path: Path) -> None:
     verdicts = validate(samples, without, job.lot.units).set_index("unit")
     assert verdicts.loc["A3", "refused"]
     assert "no reading for 23 of 23 records" in verdicts.loc["A3", "reason"]
-
-
-def test_scale_of_the_double_is_that_of_the_part() -> None:
-    assert np.isclose(LSB_PER_G, 256000.0)
 
 
 def test_the_samples_of_a_run_are_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -108,8 +108,5 @@ def test_digits_coarser_than_the_noise_leave_a_limit_that_holds_and_no_value(cal
     assert not spoken["identified"].any()
     assert spoken["note"].str.contains("finer resolution").all()
     assert (spoken["high"] >= WHITE).all()
-
-
-def test_fine_digits_are_not_spoken_of() -> None:
-    assert not Coarse(step=0.1, variance=1.0, most=np.inf).matters
-    assert not Coarse(step=0.0, variance=0.0, most=np.inf).matters
+    fine = (Coarse(step=0.1, variance=1.0, most=np.inf), Coarse(step=0.0, variance=0.0, most=np.inf))
+    assert [one.matters for one in fine] == [False, False]

@@ -47,7 +47,6 @@ def test_the_order_of_the_rows_does_not_matter(rng: np.random.Generator) -> None
     np.testing.assert_array_equal(mixed.output, lot.output)
     np.testing.assert_array_equal(mixed.standard_error, lot.standard_error)
     assert lot.state.history is not None
-    assert mixed.state.history is not None
     np.testing.assert_array_equal(mixed.state.history.temperature, lot.state.history.temperature)
 
 
@@ -57,15 +56,9 @@ def test_arrays_hold_the_rows_of_every_unit(rng: np.random.Generator) -> None:
     own, told = table[table["unit"] == "B2"], temperatures[temperatures["unit"] == "B2"].dropna()
     np.testing.assert_array_equal(lot.output[1], own[["out_x", "out_y", "out_z"]])
     np.testing.assert_allclose(lot.standard_error[1], own[["sd_x", "sd_y", "sd_z"]] / 10.0)
-    assert lot.state.history is not None
     expected = np.interp(lot.state.history.time, told["time_s"], told["unit_C"])
     np.testing.assert_array_equal(lot.state.history.temperature[1], expected)
-
-
-def test_only_dwells_of_the_kinds_that_are_wanted_are_there(rng: np.random.Generator) -> None:
-    table = dwells(rng)
-    lot = lot_arrays(table, kinds=("dwell", "verification"))
-    chosen = lot_arrays(table[table["kind"] != "allan"])
+    lot, chosen = lot_arrays(table, kinds=("dwell", "verification")), lot_arrays(table[table["kind"] != "allan"])
     assert lot.dwells.tolist() == [0, 1, 2, 3]
     np.testing.assert_array_equal(lot.output, chosen.output)
     assert lot.kinds.tolist() == chosen.kinds.tolist()
@@ -76,7 +69,6 @@ def test_a_unit_without_temperatures_leaves_the_lot_without_a_history(rng: np.ra
     for missing in (temperatures[temperatures["unit"] != "C3"], temperatures.iloc[:0]):
         assert lot_arrays(dwells(rng), missing).state.history is None
     more = lot_arrays(dwells(rng).query("unit != 'A1'"), temperatures).state.history
-    assert more is not None
     assert more.temperature.shape[0] == 2
 
 

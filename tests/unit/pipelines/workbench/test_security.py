@@ -12,7 +12,7 @@ from itertools import product
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
-from urllib.parse import unquote
+from urllib.parse import quote, unquote
 
 import httpx
 import pytest
@@ -54,14 +54,13 @@ def change(client: AsgiClient, **headers: str) -> httpx.Response:
     return client.post("/operator/nothing/stop", headers=headers)
 
 
-@each(["tumbleline.example", "127.0.0.1.example", "", "localhost.evil", "[::2]"])
-def test_refuses_a_host_name_that_is_not_its_own(host: str, client: AsgiClient) -> None:
-    assert client.get("/units", headers={"host": host}).status_code == 403
-
-
-@each(["127.0.0.1:8321", "localhost:8321", "[::1]:8321"])
-def test_answers_to_the_names_of_this_machine(host: str, client: AsgiClient) -> None:
-    assert client.get("/upload", headers={"host": host}).status_code == 200
+def test_answers_to_the_names_of_this_machine_alone(client: AsgiClient) -> None:
+    for status, hosts in (
+        (403, ("tumbleline.example", "127.0.0.1.example", "", "localhost.evil", "[::2]")),
+        (200, ("127.0.0.1:8321", "localhost:8321", "[::1]:8321")),
+    ):
+        for host in hosts:
+            assert client.get("/upload", headers={"host": host}).status_code == status, host
 
 
 def test_a_change_needs_its_own_origin_and_the_token(client: AsgiClient) -> None:
@@ -142,20 +141,17 @@ def test_a_session_is_of_one_origin_and_ends(
     assert told(settings, "127.0.0.1:8321") == 403
 
 
-@each([
-    ("", "0 bits"), ("secret", "a token of 6 characters"), ("0123456789abcdef012345678", "100 bits"),
-    ("1" * 40, "1 different characters"), ("Zq8vXy3nR5tB7wK1mP4s", "121 bits"),
-    ("Zq8vXy3nR5tB7wK1mP4sD9 &x=", "characters other than"),
-])  # fmt: skip
-def test_a_token_that_can_be_guessed_is_refused(case: tuple[str, str], settings: WorkbenchSettings) -> None:
+def test_a_token_that_can_be_guessed_is_refused_and_those_that_are_made_are_long(settings: WorkbenchSettings) -> None:
+    for token, said in (
+        ("", "0 bits"), ("secret", "a token of 6 characters"), ("0123456789abcdef012345678", "100 bits"),
+        ("1" * 40, "1 different characters"), ("Zq8vXy3nR5tB7wK1mP4s", "121 bits"),
+        ("Zq8vXy3nR5tB7wK1mP4sD9 &x=", "characters other than"),
+    ):  # fmt: skip
+        with pytest.raises(WrongUse, match=f"{said}.*at least 128 bits"):
+            create_app(replace(settings, token=token))
     replace(settings, token="0123456789abcdef" * 2 + "g").refuse_unsafe()
-    with pytest.raises(WrongUse, match=f"{case[1]}.*at least 128 bits"):
-        create_app(replace(settings, token=case[0]))
-
-
-def test_tokens_that_the_workbench_makes_are_long_enough(tmp_path: Path) -> None:
     for _ in range(200):
-        WorkbenchSettings(archive="x", folder=tmp_path).refuse_unsafe()
+        WorkbenchSettings(archive="x", folder=settings.folder).refuse_unsafe()
 
 
 @each([
@@ -176,6 +172,8 @@ def test_behind_a_proxy_or_by_another_name_nothing_is_local(settings: WorkbenchS
     proxied = AsgiClient(create_app(replace(settings, proxied=True)), ORIGIN)
     assert proxied.get("/units").status_code == 403
     assert "through a proxy the token is needed" in proxied.get("/units").text
+    assert raw(settings, "/upload").status_code == 200
+    assert raw(settings, "/upload", http="1.0").status_code == 403  # a proxy that shows itself by its protocol alone
 
 
 @each(["//evil.example", "//evil.example/%2e%2e", "/%5Cevil.example", "/\\evil.example", "/%2Fevil.example",
@@ -210,11 +208,6 @@ def raw(settings: WorkbenchSettings, path: str, query: str = "", http: str = "1.
     return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=body)
 
 
-def test_a_proxy_that_shows_itself_by_its_old_protocol_alone_is_not_local(settings: WorkbenchSettings) -> None:
-    assert raw(settings, "/upload").status_code == 200
-    assert raw(settings, "/upload", http="1.0").status_code == 403
-
-
 def test_from_another_machine_nothing_is_read_without_the_token(archive: Path, tmp_path: Path) -> None:
     far = WorkbenchSettings(
         archive=str(archive), folder=tmp_path, host="0.0.0.0", names=("bench.example",), token=TOKEN, proxied=True
@@ -236,41 +229,35 @@ def test_pages_carry_a_policy_that_runs_no_script_but_our_files(client: AsgiClie
     assert " on" + "click" not in answer.text
 
 
-@each(["/units?search=", "/unit?run=latest&unit=", "/missing?source=", "/upload?file=", "/plan?recipe=", "/run?run="])
-def test_what_an_address_says_never_becomes_markup(address: str, client: AsgiClient) -> None:
-    answer = client.get(address + httpx.QueryParams({"q": SCRIPT})["q"], headers={"accept": "text/html"})
-    assert answer.status_code in {200, 422}
-    assert "<img src=x" not in answer.text
-    assert "<script>alert" not in answer.text
+ADDRESSES: list[tuple[str, set[int], str]] = [  # address, statuses, and what stands on the page
+    *((f"/units?search={quote(text)}", {200}, "No calibration matches")
+      for text in ("' OR 1=1 --", "%", "_", "!", "'; DROP TABLE units; --", "x' UNION SELECT 1 --")),
+    *((address, {200}, "cannot be used") for address in (
+        "/units?page=0&outcome=maybe&since=yesterday", "/units?page=9e9", "/missing?colour=red&source=latest",
+        "/audit?since=2026-1-1")),
+    *((f"/missing?source={quote(file)}", {200}, 'role="alert"')
+      for file in ("/etc/passwd", "../archive/archive.json", "no-such-run", "a\0b")),
+    *((f"/upload?file={quote(file)}", {200}, "") for file in ("/etc/passwd", "../archive/archive.json", "a\0b")),
+    *((address + quote(SCRIPT), {200, 422}, "") for address in (
+        "/units?search=", "/unit?run=latest&unit=", "/missing?source=", "/upload?file=", "/plan?recipe=", "/run?run=")),
+    *((address, {400}, "correct it") for address in (
+        "/run/table/a%00b.csv?run=latest", "/unit/figure/a%00b.png", "/jobs/a%00b", "/static/a%00/b%00.js")),
+    *((address, {200, 404, 422}, "") for address in (
+        "/units?search=a%00b", "/run?run=a%00b", "/unit?run=latest&unit=a%00b", "/a?a%00b=1",
+        "/run/table/units.csv?run=a%00b", "/station?run=a%00", "/models?model=a%00b")),
+]  # fmt: skip
 
 
-@each(["' OR 1=1 --", "%", "_", "!", "'; DROP TABLE units; --", "x' UNION SELECT 1 --"])
-def test_what_is_searched_for_is_a_text_and_no_sql(text: str, client: AsgiClient) -> None:
-    answer = client.get("/units", params={"search": text})
-    assert answer.status_code == 200
-    assert "No calibration matches" in answer.text
-
-
-@each(
-    [
-        "/units?page=0&outcome=maybe&since=yesterday",
-        "/units?page=9e9",
-        "/missing?colour=red&source=latest",
-        "/audit?since=2026-1-1",
-    ]
-)
-def test_what_an_address_says_wrongly_is_said_on_the_page(address: str, client: AsgiClient) -> None:
-    answer = client.get(address)
-    assert answer.status_code == 200
-    assert "cannot be used" in answer.text
-
-
-@each(["/etc/passwd", "../archive/archive.json", "no-such-run", "a\0b"])
-def test_no_other_file_of_the_machine_is_offered(source: str, client: AsgiClient) -> None:
-    answer = client.get("/missing", params={"source": source})
-    assert answer.status_code == 200
-    assert 'role="alert"' in answer.text
-    assert client.get("/upload", params={"file": source}).status_code == 200
+@each(ADDRESSES, ascii)
+def test_what_an_address_says_is_text_and_never_markup_sql_a_file_or_a_defect(
+    row: tuple[str, set[int], str], client: AsgiClient
+) -> None:
+    address, statuses, said = row
+    answer = client.get(address, headers={"accept": "text/html"})
+    assert answer.status_code in statuses
+    assert said in answer.text
+    for word in ("<img src=x", "<script>alert", "defect"):
+        assert word not in answer.text
 
 
 def test_the_drawing_library_is_the_one_that_was_checked(client: AsgiClient) -> None:
@@ -302,21 +289,6 @@ def test_a_figure_of_a_unit_without_data_is_a_sentence(figure: tuple[str, str], 
     answer = client.get(f"/unit/figure/{'.'.join(figure)}?run=latest&unit=NOBODY&dwell=NOBODY:1&parameter=x")
     assert answer.status_code == 422
     assert re.search("; (choose|click) ", answer.json()["problem"])
-
-
-@each(["/run/table/a%00b.csv?run=latest", "/unit/figure/a%00b.png", "/jobs/a%00b", "/static/a%00/b%00.js"])
-def test_a_null_byte_in_a_path_is_a_sentence(address: str, client: AsgiClient) -> None:
-    answer = client.get(address)
-    assert answer.status_code == 400
-    assert "correct it" in answer.text
-
-
-@each(["/units?search=a%00b", "/run?run=a%00b", "/unit?run=latest&unit=a%00b", "/a?a%00b=1",
-       "/run/table/units.csv?run=a%00b", "/station?run=a%00", "/models?model=a%00b"])  # fmt: skip
-def test_a_null_byte_in_a_query_is_no_defect(address: str, client: AsgiClient) -> None:
-    answer = client.get(address)
-    assert answer.status_code in {200, 404, 422}
-    assert "defect" not in answer.text
 
 
 SLOTS = ("slot-x", "slot-", "slot-²", "slot-0", "slot--1", "slot-01", "slot-99999", "slot-" + "9" * 5000)

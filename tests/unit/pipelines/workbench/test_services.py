@@ -36,7 +36,9 @@ def ended(table: Jobs, name: str) -> job_table.BackgroundJob:
     return job
 
 
-def test_two_that_want_the_same_share_a_job_and_a_failure_is_a_sentence(tmp_path: Path) -> None:
+def test_two_that_want_the_same_share_a_job_and_a_failure_is_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     table = Jobs(tmp_path / "jobs.json", workers=1)
     request = {"recipe": str(tmp_path / "none.toml"), "effects": [], "station": "", "archive": str(tmp_path)}
     first, second = table.submit("plan", "a plan", request), table.submit("plan", "a plan", request)
@@ -47,6 +49,9 @@ def test_two_that_want_the_same_share_a_job_and_a_failure_is_a_sentence(tmp_path
     assert table.result("plan", request) is None
     assert table.submit("plan", "a plan", request).id == first.id  # a failure can be tried again
     table.close()
+    state, text = done_in_process("diagnose", {}, lambda *_: None)  # a defect does not end the process
+    assert (state, "defect" in text) == ("failed", True)
+    assert "Traceback" in capsys.readouterr().err
 
 
 def test_a_stopped_job_ends_its_process_and_the_next_one_runs(tmp_path: Path) -> None:
@@ -63,24 +68,13 @@ def test_a_stopped_job_ends_its_process_and_the_next_one_runs(tmp_path: Path) ->
     assert table.get(job.id).state == "stopped"
     assert table.result("plan", request) is None
     table.close()
-
-
-def test_what_a_dead_server_was_at_is_interrupted_and_never_running(tmp_path: Path) -> None:
-    place = tmp_path / "jobs.json"
+    path = tmp_path / "jobs.json"  # what a dead server was at is interrupted and never running
     running = {"id": "a", "kind": "plan", "title": "t", "state": "running"}
-    place.write_text(json.dumps({"jobs": [running, {**running, "id": "b", "state": "done"}]}))
-    table = Jobs(place, workers=1)
-    assert table.get("a").state == "interrupted"
-    assert table.get("b") is None
-    place.write_text("no json")
-    assert Jobs(place, workers=1).all() == []
-
-
-def test_a_defect_in_work_is_said_and_does_not_end_the_process(capsys: pytest.CaptureFixture[str]) -> None:
-    state, text = done_in_process("diagnose", {}, lambda *_: None)
-    assert state == "failed"
-    assert "defect" in text
-    assert "Traceback" in capsys.readouterr().err
+    path.write_text(json.dumps({"jobs": [running, {**running, "id": "b", "state": "done"}]}))
+    table = Jobs(path, workers=1)
+    assert (table.get("a").state, table.get("b")) == ("interrupted", None)
+    path.write_text("no json")
+    assert Jobs(path, workers=1).all() == []
 
 
 def lot_of(settings: WorkbenchSettings, **state: object) -> str:

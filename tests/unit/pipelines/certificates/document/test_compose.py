@@ -27,7 +27,7 @@ from pipelines.certificates.document.issue import pdf
 from pipelines.certificates.document.laboratory import LaboratoryFile, read_laboratory
 from pipelines.certificates.document.numbers import si_unit, with_uncertainty
 from pipelines.certificates.document.pages import page_content
-from pipelines.certificates.document.schema_files import DocumentInvalid, validate
+from pipelines.certificates.document.schema_files import validate
 from pipelines.chain.certify import certify
 from pipelines.cli import app
 from pipelines.cli.documents.certificates import CertificateDocument
@@ -113,14 +113,9 @@ def test_a_run_gives_a_pdf_and_an_xml_per_certified_unit_and_names_those_without
         validate(path.read_bytes())
 
 
-def test_the_same_certificate_has_the_same_bytes(run: Run, typed: Typed, tmp_path: Path) -> None:
-    assert typed("A1").exit_code == 0
-    first = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
-    assert typed("A1/1").exit_code == 0
-    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == first
-
-
-def test_a_unit_without_a_certificate_is_refused_with_the_reason(run: Run, typed: Typed, tmp_path: Path) -> None:
+def test_a_certificate_has_the_same_bytes_again_and_none_is_made_of_what_has_or_holds_none(
+    run: Run, typed: Typed, tmp_path: Path
+) -> None:
     problem = typed("A1", "A3").exception
     assert isinstance(problem, WrongUse)
     assert re.search(
@@ -128,9 +123,11 @@ def test_a_unit_without_a_certificate_is_refused_with_the_reason(run: Run, typed
     )
     assert not (tmp_path / "out").exists()  # not even that of A1
     assert "A1/7 is not in the ledger, there are A1/1" in str(typed("A1/7").exception)
-
-
-def test_a_revoked_certificate_is_not_made(run: Run, typed: Typed) -> None:
+    made = []
+    for words in ("A1", "A1/1"):
+        assert typed(words).exit_code == 0
+        made.append({path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()})
+    assert made[0] == made[1]
     assert typed("A1", "--reason", "dropped", command="revoke").exit_code == 0
     assert "certificate A1/1 of run" in str(typed("A1").exception)
     assert "was revoked (dropped)" in str(typed("A1").exception)
@@ -169,25 +166,17 @@ def test_every_item_of_7_8_2_and_7_8_4_is_on_paper_and_in_the_xml(xml: bytes, pa
     assert [f"page {n} of {len(pages)}" in page for n, page in enumerate(pages, 1)] == [True] * len(pages)
 
 
-def test_the_head_of_a_budget_is_what_its_contributions_add_up_to(c: CertificateContent) -> None:
-    tables = c.budgets
-    assert {one.k is None for one in tables} == {
-        True,
-        False,
-    }  # the error over the period is a standard deviation itself
-    for one in tables:
+def test_a_budget_adds_up_and_names_contributions_sources_and_effects_in_words_and_not_by_keys(
+    c: CertificateContent, paper: bytes
+) -> None:
+    assert {one.k is None for one in c.budgets} == {True, False}  # the error over the period is a standard deviation
+    for one in c.budgets:
         if one.k is None:
             assert np.sqrt(sum(row.u**2 for row in one.rows)) == pytest.approx(one.u, rel=2e-3)
         assert all("[" not in row.source for row in one.rows)
-
-
-def test_contributions_sources_and_effects_are_named_in_words_and_not_by_keys(
-    c: CertificateContent, paper: bytes
-) -> None:
     named = {row.name for table in c.budgets for row in table.rows}
     assert {"noise of the dwells", "repeatability of the poses", "seat of the fixture"} <= named, named
-    sources = {row.source for table in c.budgets for row in table.rows}
-    assert "simulation: rotation of the slots" in sources, sources
+    assert "simulation: rotation of the slots" in {row.source for table in c.budgets for row in table.rows}
     text = " ".join(text_of(paper))
     assert "bias temperature" in text
     for key in ("bias_temperature", "slot_rotation_mrad", "switch_on", "scale_temperature"):
@@ -211,6 +200,10 @@ def test_values_of_the_xml_are_those_of_the_archive_in_si_units(made: Run, xml: 
         namespaces=NAMES,
     )
     assert float(scale[0].text) == pytest.approx(stated["value"] / 9.80665, rel=1e-14)
+    assert si_unit("LSB/g") == (r"\metre\tothe{-1}\second\tothe{2}", pytest.approx(1 / 9.80665))
+    assert si_unit("µg") == (r"\metre\second\tothe{-2}", pytest.approx(9.80665e-6))
+    assert si_unit("LSB/(g·K)")[0] == r"\metre\tothe{-1}\second\tothe{2}\kelvin\tothe{-1}"
+    assert si_unit("furlong") is None
 
 
 def test_nothing_says_accredited_without_an_accreditation_in_the_file(
@@ -304,38 +297,22 @@ def test_the_pdf_claims_pdf_a_3b_and_holds_the_xml(c: CertificateContent, xml: b
         assert str(meta["xmp:CreateDate"]).startswith(date.fromisoformat(c.issued).isoformat())
 
 
-def test_a_second_program_finds_the_xml_valid_and_a_wrong_one_invalid(xml: bytes) -> None:
-    xmlschema = pytest.importorskip("xmlschema")
-    from importlib.resources import files
-
-    folder = files("pipelines.certificates.document") / "schemas"
-    rules = xmlschema.XMLSchema(
-        str(folder / "dcc.xsd"), locations={SI: str(folder / "SI_Format.xsd")}, allow="local", validation="strict"
-    )
-    rules.validate(BytesIO(xml))
-    for old, new in ((b"uniqueIdentifier>", b"number>"), (b'schemaVersion="3.0.0"', b'schemaVersion="3.1.0"')):
-        bad = xml.replace(old, new)
-        assert not rules.is_valid(BytesIO(bad))
-        with pytest.raises(DocumentInvalid):
-            validate(bad)
-
-
-@pytest.mark.parametrize(
-    ("value", "expanded", "shown"),
-    [(823.7011, 18.142, ("824", "18")), (255648.8274, 3.459, ("255648.8", "3.5")), (-1786.87, 2000.02, ("−1800", "2000")),
-     (0.0123456, 0.000996, ("0.0123", "0.0010")), (5.0, 0.0996, ("5.00", "0.10")), (-0.0001, 0.5, ("0.00", "0.50"))],
-)  # fmt: skip
-def test_u_has_two_digits_and_the_value_ends_where_u_ends(
-    value: float, expanded: float, shown: tuple[str, str]
-) -> None:
-    assert with_uncertainty(value, expanded) == shown
-
-
-def test_units_become_si() -> None:
-    assert si_unit("LSB/g") == (r"\metre\tothe{-1}\second\tothe{2}", pytest.approx(1 / 9.80665))
-    assert si_unit("µg") == (r"\metre\second\tothe{-2}", pytest.approx(9.80665e-6))
-    assert si_unit("LSB/(g·K)")[0] == r"\metre\tothe{-1}\second\tothe{2}\kelvin\tothe{-1}"
-    assert si_unit("furlong") is None
+def test_u_has_two_digits_and_the_value_ends_where_u_ends_in_certificate_and_report() -> None:
+    for value, expanded, shown in (
+        (823.7011, 18.142, ("824", "18")), (255648.8274, 3.459, ("255648.8", "3.5")), (-1786.87, 2000.02, ("−1800", "2000")),
+        (0.0123456, 0.000996, ("0.0123", "0.0010")), (5.0, 0.0996, ("5.00", "0.10")), (-0.0001, 0.5, ("0.00", "0.50")),
+    ):  # fmt: skip
+        assert with_uncertainty(value, expanded) == shown
+        assert rounded(value, expanded) == tuple(text.replace("−", "-") for text in shown)
+    for value, expanded in (
+        (2.5, 25.0),
+        (485.37, 549.6),
+        (12.345, 0.105),
+        (-0.0049, 0.0104),
+        (0.125, 0.02),
+        (10.0, 0.98),
+    ):
+        assert report_rounding(value, expanded) == with_uncertainty(value, expanded)
 
 
 def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
@@ -352,30 +329,20 @@ def test_a_laboratory_file_with_a_slip_is_refused(laboratory: Path) -> None:
         read_laboratory(laboratory.parent / "none.toml")
 
 
-def test_certificates_are_signed_on_request_and_stay_valid(run: Run, typed: Typed, tmp_path: Path) -> None:
+def test_a_certificate_is_signed_on_request_and_holds_its_xml(run: Run, typed: Typed, tmp_path: Path) -> None:
     pytest.importorskip("pyhanko")
-    signxml = pytest.importorskip("signxml")
     from cryptography.hazmat.primitives.asymmetric import ec
-    from cryptography.hazmat.primitives.serialization import Encoding
     from signing_keys import made_key, pem
 
-    signing = made_key(ec.generate_private_key(ec.SECP256R1()))
-    (tmp_path / "key.pem").write_bytes(pem(signing))
-    assert (
-        typed("A1", "--sign-with", str(tmp_path / "key.pem"), "--address", "https://example.org/{number}").exit_code
-        == 0
-    )
-    own = signing.certificate.public_bytes(Encoding.PEM).decode()
+    (tmp_path / "key.pem").write_bytes(pem(made_key(ec.generate_private_key(ec.SECP256R1()))))
+    words = ("--sign-with", str(tmp_path / "key.pem"), "--address", "https://example.org/{number}")
+    assert typed("A1", *words).exit_code == 0
     out = tmp_path / "out"
-    signature = etree.fromstring((out / "A1_1.xml.sig").read_bytes())
-    configuration = signxml.SignatureConfiguration(location="./", require_x509=True)
-    good = signxml.XMLVerifier().verify(signature, x509_cert=own, expect_config=configuration)
-    assert good.signed_xml.xpath("//*[local-name()='uniqueIdentifier']/text()") == ["A1/1"]
+    assert (out / "A1_1.xml.sig").is_file()
     with pikepdf.open(out / "A1_1.pdf") as document:
         assert document.attachments["certificate.xml"].get_file().read_bytes() == (out / "A1_1.xml").read_bytes()
         assert document.Root.AcroForm.Fields[0].V.SubFilter == pikepdf.Name("/ETSI.CAdES.detached")
-    refused = typed("A1", "--sign-with", str(tmp_path / "none.pem")).exception
-    assert isinstance(refused, WrongUse)
+    assert isinstance(typed("A1", "--sign-with", str(tmp_path / "none.pem")).exception, WrongUse)
 
 
 def test_traceability_is_claimed_for_what_names_a_standard_only() -> None:
@@ -410,11 +377,3 @@ def test_a_probability_of_false_acceptance_is_never_0_and_rows_of_nothing_are_on
         assert sum(row[4] == "0.0 %" for row in table["rows"]) <= 1
     names = {row[0] for row in parts["Results"]["tables"][0]["rows"]}
     assert "error of the norm of gravity, verification (largest of the poses)" in names
-
-
-def test_certificate_and_report_round_by_one_function() -> None:
-    pairs = [(2.5, 25.0), (485.37, 549.6), (12.345, 0.105), (-0.0049, 0.0104), (0.125, 0.02), (10.0, 0.98)]
-    for value, expanded in pairs:
-        plain = rounded(value, expanded)
-        assert tuple(text.replace("−", "-") for text in with_uncertainty(value, expanded)) == plain
-        assert tuple(text.replace("−", "-") for text in report_rounding(value, expanded)) == plain

@@ -1,12 +1,15 @@
-"""A thermometer that freezes while the chamber stands at one temperature is found, and no sound one is."""
+"""Thermometers that freeze, follow a ramp, or stand still."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from small_station import lot_of
 
+from inertial.operators import first_order_lag
+from pipelines.inquiry.lineage import RunSequence
 from pipelines.stages.frozen import frozen
-from pipelines.stages.validate import validate
+from pipelines.stages.validate import _stale_temperatures, validate
+from schemas.errors import DataRejected
 
 SOAKS, DWELLS = 3, 11
 
@@ -35,10 +38,9 @@ def test_one_that_freezes_in_the_last_soak_is_found(units: int) -> None:
     [(unit, count, value)] = frozen(freeze(readings(units), "U0", 2 * DWELLS + 2))
     assert (unit, count) == ("U0", DWELLS - 2)
     assert value == pytest.approx(60.0, abs=0.3)
-
-
-def test_one_that_was_frozen_all_along_is_found_by_its_neighbours() -> None:
-    assert [unit for unit, *_ in frozen(freeze(readings(), "U1", 0))] == ["U1"]
+    assert list(frozen(freeze(readings(units), "U0", SOAKS * DWELLS - 3))) == []  # the last few records say nothing
+    if units > 1:  # one that was frozen all along is found by its neighbours
+        assert [unit for unit, *_ in frozen(freeze(readings(units), "U1", 0))] == ["U1"]
 
 
 @pytest.mark.parametrize("resolution", [1e-4, 0.01, 0.1, 1.0])
@@ -46,10 +48,6 @@ def test_one_that_was_frozen_all_along_is_found_by_its_neighbours() -> None:
 @pytest.mark.parametrize("units", [1, 8])
 def test_no_sound_one_is_accused_however_coarse_it_is(resolution: float, noise: float, units: int) -> None:
     assert [list(frozen(readings(units, resolution, noise, seed))) for seed in range(20)] == [[]] * 20
-
-
-def test_the_last_few_records_alone_say_nothing() -> None:
-    assert list(frozen(freeze(readings(), "U0", SOAKS * DWELLS - 3))) == []
 
 
 def test_its_unit_is_refused_with_the_reason() -> None:
@@ -64,3 +62,41 @@ def test_its_unit_is_refused_with_the_reason() -> None:
     assert verdicts.loc[lot.units[0].serial, "fault"] == "frozen_temperature"
     assert "to the last digit in the last 11 records" in verdicts.loc[lot.units[0].serial, "reason"]
     assert not verdicts.loc[lot.units[1].serial, "refused"]
+
+
+TAU_S = 500.0
+
+
+def excursion(*, stale: bool) -> pd.DataFrame:
+    """Up from 20 to 36 °C and back at 3 K a minute, then a wait: two parts of a recipe that are not settled at."""
+    time = np.arange(0.0, 2700.0, 15.0)
+    chamber = np.interp(time, [0.0, 320.0, 640.0], [20.0, 36.0, 20.0])
+    unit = np.full(time.shape, 20.0) if stale else first_order_lag(time, chamber, TAU_S)
+    soak = np.where(time <= 320.0, 0, 1)
+    return pd.DataFrame({"unit": "A1", "soak": soak, "chamber_C": chamber, "unit_C": unit})
+
+
+def test_a_thermometer_behind_the_chamber_on_an_excursion_is_not_stale_and_one_that_never_moves_is() -> None:
+    readings = excursion(stale=False)
+    means = readings.groupby("soak")[["chamber_C", "unit_C"]].mean()
+    assert abs(means["unit_C"].diff().iloc[-1]) < 0.2 * abs(means["chamber_C"].diff().iloc[-1])
+    assert _stale_temperatures(readings) == []
+    assert [fault.fault for fault in _stale_temperatures(excursion(stale=True))] == ["stale_temperature"]
+
+
+class Refused:
+    """A run that refused both of its units."""
+
+    id = "follow-up"
+
+    def table(self, name: str) -> pd.DataFrame:
+        if name == "dwells":
+            return pd.DataFrame({"unit": pd.Series([], dtype=str), "dwell": pd.Series([], dtype=int)})
+        return pd.DataFrame({"unit": ["A1", "A2"], "refused": True, "reason": "constant output"})
+
+
+def test_a_follow_up_that_refused_every_unit_is_told() -> None:
+    with pytest.raises(
+        DataRejected, match=r"no unit was accepted by all of follow-up.*refused 2 of 2 \(constant output\)"
+    ):
+        RunSequence((Refused(),)).dwells()  # type: ignore[arg-type]

@@ -1,20 +1,23 @@
-"""A dwell is named where the tails of the noise that its run allows do not reach it, and listed as left out where they do."""
+"""Faults of data and errors of handling: tails of the noise, coarse digits, exchanged units."""
 
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from made_worlds import BASE, HIDDEN, NULLS, Noise, World, lot_in, make
 from scipy import integrate, stats
 
 from inertial.data_errors import tails
 from inertial.data_errors.bad_dwells import BadDwell
+from inertial.data_errors.handling.units_swapped import UnitsSwapped
 from inertial.data_errors.tails import with_tails
+from pipelines.tables.sound_lot import sound_lot
 
 GATE = 5.4
 """Standard deviations from which a dwell of a small lot is left out."""
 
 
-def noise(share: float, dwells: int, rng: np.random.Generator) -> np.ndarray:
+def drawn(share: float, dwells: int, rng: np.random.Generator) -> np.ndarray:
     """Dwells (dwells, 3) of variance one, a share of it t of three degrees of freedom."""
     heavy = np.sqrt(share / 3.0) * rng.standard_t(3, (dwells, 3))
     return heavy + np.sqrt(1.0 - share) * rng.standard_normal((dwells, 3))
@@ -52,28 +55,54 @@ def test_tables_agree_with_an_integral_of_the_convolution(share, z):
 def test_heavy_tails_are_named_in_few_runs(share, dwells, monkeypatch):
     rng = np.random.default_rng([7, dwells, int(100 * share)])
     runs = 80 if dwells < 500 else 30
-    hits = sum(bool(named(noise(share, dwells, rng), monkeypatch)) for _ in range(runs))
+    hits = sum(bool(named(drawn(share, dwells, rng), monkeypatch)) for _ in range(runs))
     assert hits <= 0.07 * runs
 
 
 @pytest.mark.parametrize(("dwells", "deviations", "runs"), [(72, 12.0, 40), (576, 12.0, 20), (576, 7.0, 12)])
 def test_a_dwell_far_off_in_normal_noise_is_named(dwells, deviations, runs, monkeypatch):
-    """Of many dwells the noise is known to have no tails: then seven deviations are far."""
+    """Of many dwells the drawn is known to have no tails: then seven deviations are far."""
     rng, hits = np.random.default_rng([8, dwells]), 0
     for _ in range(runs):
-        values, way = noise(0.0, dwells, rng), rng.standard_normal(3)
+        values, way = drawn(0.0, dwells, rng), rng.standard_normal(3)
         values[5] += deviations * way / np.linalg.norm(way)
         hits += 5 in named(values, monkeypatch)
     assert hits >= min(0.95 * runs, runs - 1)
 
 
 def test_two_bad_dwells_do_not_pass_for_the_tails_of_each_other(monkeypatch):
-    values = noise(0.0, 576, np.random.default_rng(9))
+    values = drawn(0.0, 576, np.random.default_rng(9))
     values[5], values[80] = [20.0, -15.0, 20.0], [0.0, 25.0, -20.0]
     assert sorted(named(values, monkeypatch)) == [5, 80]
 
 
 def test_one_axis_alone_at_six_deviations_is_left_out_and_not_named(monkeypatch):
-    values = noise(0.0, 72, np.random.default_rng(10))
+    values = drawn(0.0, 72, np.random.default_rng(10))
     values[5] = [6.3, 0.2, -0.4]
     assert named(values, monkeypatch) == []
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_scatter_that_follows_the_temperature_is_not_quantised(seed: int) -> None:
+    made = make(World(noise=Noise(white=150.0, flicker=10.0)), 5_800_000 + seed)
+    dwells = made.dwells.copy()
+    rng = np.random.default_rng(seed)
+    louder = np.exp((dwells["unit_C"].to_numpy() - 25.0) / 40.0)
+    for axis in "xyz":
+        sigma = dwells[f"sd_{axis}"].median()
+        own = sigma * louder
+        extra = np.sqrt(np.maximum(own**2 - sigma**2, 0.0) / dwells["n"])
+        dwells[f"out_{axis}"] += extra * rng.standard_normal(len(dwells))
+        dwells[f"sd_{axis}"] = own * (1.0 + rng.standard_normal(len(dwells)) / np.sqrt(2.0 * dwells["n"]))
+    assert dwells["sd_x"].max() > 3.0 * dwells["sd_x"].min()
+    _, faults, _ = sound_lot(dwells, made.history, BASE)
+    assert [fault.name for fault in faults] == []
+
+
+@pytest.mark.parametrize(
+    "world", [*(NULLS[n] for n in ("B30", "K8", "two_units", "many_units")), HIDDEN["third_order_2"]]
+)
+def test_no_pair_is_searched_where_no_units_were_exchanged(world: World) -> None:
+    lots = (make(world, 6_300_020 + seed) for seed in range(4))
+    assert [UnitsSwapped().places(lot_in(one)) for one in lots] == [[]] * 4
+    assert not UnitsSwapped().possible(np.array([0.5]))

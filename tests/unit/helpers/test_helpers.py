@@ -1,0 +1,179 @@
+"""What the helpers of the tests do: rules over many things, wrong clocks, logs of a server, and what a test leaves open."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from each import each
+from orchestrator import BUSY, errors_in
+from wrong_clock import WrongClocks
+
+
+def test_every_value_is_tried_and_all_that_are_wrong_are_named() -> None:
+    seen = []
+
+    @each([1, 2, 3, 4])
+    def rule(value: int) -> None:
+        seen.append(value)
+        assert value != 2
+        if value == 4:
+            raise KeyError("gone")
+
+    with pytest.raises(AssertionError, match=r"2 of 4 wrong\n2: AssertionError(.|\n)*4: KeyError: 'gone'"):
+        rule()
+    assert seen == [1, 2, 3, 4]
+
+
+def test_a_value_that_is_skipped_is_passed_over_and_no_value_at_all_is_wrong() -> None:
+    def rule(value: int) -> None:
+        if value:
+            pytest.skip("not here")
+
+    each([0, 1])(rule)()
+    with pytest.raises(pytest.skip.Exception):
+        each([1, 1])(rule)()
+    with pytest.raises(AssertionError, match="nothing to check"):
+        each([])(rule)()
+
+
+@each(["first", "second"])
+def test_every_value_has_a_folder_and_patches_of_its_own(value: str, tmp_path, monkeypatch) -> None:
+    import os
+
+    assert list(tmp_path.iterdir()) == []
+    assert "TUMBLELINE_EACH" not in os.environ
+    (tmp_path / value).touch()
+    monkeypatch.setenv("TUMBLELINE_EACH", value)
+
+
+CODE = """
+import sys, threading, time
+for line in sys.stdin:
+    before = time.monotonic()
+    time.sleep(0.05)
+    threading.Event().wait(0.05)
+    print(time.time(), time.monotonic() - before, flush=True)
+"""
+
+
+@pytest.mark.skipif(not WrongClocks.available(), reason="no C compiler, or no GNU C library")
+def test_a_clock_is_wrong_at_once_for_a_process_that_runs_and_its_sleeps_are_right(tmp_path: Path) -> None:
+    clocks = WrongClocks(tmp_path / "clocks")
+    environment = {**os.environ, **clocks.environment("line-1")}
+    with subprocess.Popen(
+        [sys.executable, "-c", CODE], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for wrong_s in (0, -3600, 3600, 0):
+            clocks.set("line-1", wrong_s)
+            process.stdin.write("\n")
+            process.stdin.flush()
+            now, slept = map(float, process.stdout.readline().split())
+            assert abs(now - time.time() - wrong_s) < 20.0
+            assert 0.09 < slept < 20.0
+        assert clocks.holds(process.pid, "line-1") == 1
+        process.stdin.close()
+
+
+STARTED = "02:26:50.483 | WARNING | prefect.server - slow\n"
+FAILED = "02:26:49.950 | ERROR   | prefect.server.services.scheduler - Unexpected error\nTraceback (most recent call last):\n"
+
+
+@pytest.mark.parametrize(
+    "text", [FAILED, "CRITICAL: x\n", "ERROR:    Exception in ASGI application\n", "Traceback (most\n"]
+)
+def test_an_error_is_found_with_what_follows_it(tmp_path: Path, text: str) -> None:
+    log = tmp_path / "log"
+    log.write_text(STARTED + text)
+    assert errors_in(log).endswith(text)
+
+
+def test_an_error_behind_one_that_sqlite_makes_of_itself_is_found(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    busy = f"02:26:50.900 | ERROR   | prefect.server - Encountered error\nTraceback (most\n{BUSY}\n"
+    log.write_text(STARTED + busy)
+    assert not errors_in(log)
+    log.write_text(STARTED + busy + FAILED + STARTED)
+    assert errors_in(log) == FAILED
+
+
+def test_warnings_and_a_missing_log_are_no_errors(tmp_path: Path) -> None:
+    (tmp_path / "log").write_text(STARTED + "02:26:50.483 | INFO    | x - no ERROR here\n")
+    assert errors_in(tmp_path / "log") == errors_in(tmp_path / "none") == ""
+
+
+TESTS = Path(__file__).resolve().parents[2]
+LEAKS = """
+import asyncio
+import socket
+
+import pytest
+
+
+class Kept:
+    \"\"\"Something open in a circle of references: the collector alone ends it.\"\"\"
+
+    def __init__(self, value):
+        self.value, self.own = value, self
+
+
+@pytest.fixture
+def of_a_test():
+    return Kept(socket.socket())
+
+
+@pytest.fixture(scope="module")
+def of_the_module():
+    return Kept(socket.socket())
+
+
+def test_socket():
+    Kept(socket.socket())
+
+
+def test_file():
+    Kept(open(__file__))
+
+
+def test_loop():
+    Kept(asyncio.new_event_loop())
+
+
+def test_fixture(of_a_test): ...
+
+
+def test_failing():
+    held = Kept(socket.socket())
+    assert held is None
+
+
+def test_closed():
+    with socket.socket() as here:
+        Kept(here)
+
+
+def test_last_of_its_module(of_the_module): ...
+"""
+
+
+def test_each_test_that_leaves_something_open_is_named_and_no_other(tmp_path: Path) -> None:
+    (tmp_path / "test_leaks.py").write_text(LEAKS, encoding="utf-8")
+    options = ["-p", "left_open", "-p", "no:randomly", "-p", "no:cacheprovider", "-W", "error", "-q", "-rE"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "--rootdir", tmp_path, *options, tmp_path],
+        env={**os.environ, "PYTHONPATH": str(TESTS), "COLUMNS": "200"},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    told = {line.split("::")[1].split(" ")[0] for line in done.stdout.splitlines() if line.startswith("ERROR ")}
+    assert told == {"test_socket", "test_file", "test_loop", "test_fixture", "test_failing", "test_last_of_its_module"}
+    assert "test_socket leaves open:\n  unclosed <socket.socket" in done.stdout
+    assert "test_last_of_its_module, or a fixture that ended with it, leaves open:" in done.stdout
+    assert "test_file leaves open:\n  unclosed file" in done.stdout
+    assert "unclosed event loop" in done.stdout

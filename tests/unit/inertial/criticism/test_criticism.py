@@ -1,0 +1,115 @@
+"""Small modules of the judge: what places gain, what stays unseen, the smallest size, classes of equals, evenness."""
+
+import numpy as np
+import pytest
+from made_worlds import BASE, Noise, World, make
+
+from inertial import effects as catalogue
+from inertial import poses
+from inertial.criticism.field import Candidates
+from inertial.criticism.jumps import _evenness
+from inertial.criticism.search import judge, ranked
+from inertial.criticism.unseen import unseen
+from inertial.data_errors.handling.wrong_pose import WrongPose
+from inertial.estimation.model import Model
+from inertial.estimation.problem import Lot, Problem
+from inertial.estimation.refinement import terms_of
+from inertial.estimation.space import Gain
+from inertial.estimation.term import Term
+from inertial.frames import force_from_angles
+from inertial.state import State
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.tables.dwells import lot_of, measured
+
+
+def test_a_column_of_one_dwell_gains_the_same_without_being_whitened():
+    made = make(World(units=3, durations=(2.0, 60.0), noise=Noise(unit_white=(5.0, 1.0, 1.0))), 5_500_000)
+    there = (made.dwells["unit"] != "W002") | ~made.dwells["dwell"].isin([5, 6])
+    problem = Problem(lot_of(measured(made.dwells[there], made.history)))
+    model = Model(problem, terms_of(catalogue.get_all([*BASE, "level_error"]), problem))
+    field = Candidates(problem, [], [WrongPose()])
+    quick = field.gains(model.space, set(), handling=True)["wrong_pose"]
+    pieces = problem.pieces(WrongPose(), field.grids["wrong_pose"])
+    plain = Gain.joined([model.space.gain(piece) for piece in pieces])
+    np.testing.assert_array_equal(quick.rank, plain.rank)
+    np.testing.assert_allclose(quick.drop, plain.drop, rtol=1e-6, atol=1e-6)
+
+
+SEED = 5_500_000
+
+
+@pytest.mark.parametrize("history", [True, False])
+def test_the_scatter_of_a_thermometer_shows_no_narrow_hysteresis(history):
+    made, rng = make(World(units=1, poses=12), SEED), np.random.default_rng(3)
+    tables = [made.dwells.copy(), made.history.copy()]
+    for table in tables:
+        table["unit_C"] += 0.1 * rng.standard_normal(len(table))
+    problem = Problem(lot_of(measured(tables[0], tables[1] if history else None)))
+    base = Model(problem, terms_of(catalogue.get_all(BASE), problem))
+    effect = catalogue.get("thermal_hysteresis")
+    (_, ranges), *_ = unseen(Candidates(problem, [effect]), base, [effect])[1]
+    # soaks that only climb by 35 K hide a play that is narrower
+    assert ranges[0].low == 1.0
+    assert 15.0 < ranges[0].high < 35.0
+
+
+def stepped(dwells, size_ug: float):
+    """Every series with a step in the middle of this RMS, its sign at random."""
+    rng = np.random.default_rng(4)
+    changed = dwells.copy()
+    for _, own in dwells.groupby("unit"):
+        step = (own["time_s"] > own["time_s"].median()).to_numpy(float)
+        step *= 1e-6 * size_ug / np.sqrt(np.mean(step**2))
+        for axis in "xyz":
+            changed.loc[own.index, f"out_{axis}"] += step * rng.choice([-1.0, 1.0])
+    return changed
+
+
+def test_random_walk_raises_the_sizes_that_are_named_and_the_document_says_so() -> None:
+    quiet, loud = (make(World(units=2, poses=12, noise=Noise(flicker=5.0, walk=k)), 43_000_001) for k in (0.0, 4.0))
+    sizes = []
+    for made in (quiet, loud):
+        rows = {row["effect"]: row for row in diagnose(made.dwells, made.history)["smallest_named"]}
+        sizes.append(rows["step_change"]["size_ug"])
+        assert rows["step_change"]["without_slow_noise_ug"] <= rows["step_change"]["size_ug"]
+    assert sizes[1] > 4.0 * sizes[0]
+    named = [
+        any(
+            "step_change" in g["effects"] for g in diagnose(stepped(loud.dwells, f * sizes[1]), loud.history)["classes"]
+        )
+        for f in (0.4, 2.0)
+    ]
+    assert named == [False, True]
+
+
+UNITS = 4
+PLAIN = [Term(catalogue.get(name)) for name in ("bias", "scale", "misalignment")]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cubic_and_quintic_at_faces_and_edges_are_equal_beside_a_table_that_rests_anew(seed: int) -> None:
+    """Components of 0, ±√½ and ±1: beside a scale x³ and x⁵ are one column, and the data cannot prefer either."""
+    rng = np.random.default_rng([seed, 18])
+    angles = np.radians(np.concatenate([rng.permutation(poses.plan("eighteen")) for _ in range(2)]))
+    n = len(angles)
+    force = np.broadcast_to(force_from_angles(*angles.T), (UNITS, n, 3))
+    # the rest position of the table is common to all units, their own noise is smaller
+    noise = 3e-6 * rng.standard_normal((n, 3)) + 2e-6 * rng.standard_normal((UNITS, n, 3))
+    time = np.broadcast_to(15.0 * np.arange(n), (UNITS, n))
+    error = np.full((UNITS, n, 3), 2e-6)
+    lot = Lot(State(force=force, time=time), force + 90e-6 * force**3 + noise, error, np.tile(np.eye(3), (UNITS, 1, 1)))
+    problem = Problem(lot)
+    model = Model(problem, PLAIN)
+    terms = [Term(catalogue.get(name)) for name in ("third_order", "fifth_order")]
+    field = Candidates(problem, [t.effect for t in terms], ())
+    first, second = ranked([judge(field, model, t) for t in terms])
+    assert first.log_p < np.log(1e-6)
+    assert second.cost - first.cost < 0.1
+
+
+def test_coefficients_of_one_distribution_are_even_and_two_of_many_are_not() -> None:
+    rng = np.random.default_rng(5)
+    even = [_evenness(40.0 * rng.standard_normal(24) ** 2) for _ in range(200)]
+    assert np.mean(np.array(even) < -5.0) < 0.05
+    assert _evenness(np.array([600.0, 150.0, *np.full(22, 1.0)])) < -50.0
+    assert _evenness(np.array([141.0, 0.0, 0.0])) > -20.0  # three axes cannot say much

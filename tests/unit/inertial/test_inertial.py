@@ -1,0 +1,130 @@
+"""Small modules of the science: frames and poses, operators, roots, correction and static intervals."""
+
+import lots
+import numpy as np
+import pytest
+from each import each
+from scipy import optimize
+
+from inertial import frames, operators, poses
+from inertial.correction import correct, remaining_step
+from inertial.roots import root
+from inertial.state import State
+from inertial.static_intervals import find
+
+
+def test_forces_are_products_of_right_handed_rotations_and_angles_turn_gravity_back(rng):
+    for plan, up in (("fibonacci", (0.0, 0.0, 1.0)), ("six", (1e-3, -2e-3, 1.0))):
+        angles = lots.directions(plan)
+        np.testing.assert_allclose(frames.force_from_angles(*angles.T, up), lots.force(angles, up), atol=1e-15)
+    np.testing.assert_allclose(frames.rotation_x(np.pi / 2) @ [0, 1, 0], [0, 0, 1], atol=1e-15)
+    np.testing.assert_allclose(frames.rotation_z(np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    wanted = directions(rng, 50)
+    np.testing.assert_allclose(frames.force_from_angles(*frames.angles_from_force(wanted)), wanted, atol=1e-12)
+
+
+@each(["six", "nine", "twelve", "eighteen", "twenty_six", "fibonacci24", "orthogonal24"])
+def test_named_plans_have_their_poses_on_the_sphere(name):
+    angles = np.radians(poses.plan(name))
+    counts = {"six": 6, "nine": 9, "twelve": 12, "eighteen": 18, "twenty_six": 26}
+    assert angles.shape == (counts.get(name, 24), 2)
+    force = frames.force_from_angles(angles[:, 0], angles[:, 1])
+    np.testing.assert_allclose(np.linalg.norm(force, axis=1), 1.0, atol=1e-12)
+    if name != "nine":  # six faces and three edges lean to one side by design
+        np.testing.assert_allclose(force.mean(axis=0), 0.0, atol=2e-3)
+    if name == "orthogonal24":  # every face is up four times
+        _, times = np.unique(np.round(force) + 0.0, axis=0, return_counts=True)
+        assert times.tolist() == [4] * 6
+
+
+def point_by_point(signal: np.ndarray, half_width: float, start: float) -> np.ndarray:
+    """The definition: every step moves the position, which stays within −1 … 1."""
+    out = np.empty(signal.shape)
+    out[..., 0] = start
+    for k, change in enumerate(np.moveaxis(np.diff(signal, axis=-1), -1, 0)):
+        out[..., k + 1] = np.clip(out[..., k] + change / half_width, -1.0, 1.0)
+    return out
+
+
+@pytest.mark.parametrize("shape", [(1,), (2,), (7,), (3, 1), (3, 101), (2, 3, 50), (65, 400)])
+@pytest.mark.parametrize("half_width", [0.3, 5.0, 1000.0])
+def test_a_play_is_its_definition_point_by_point(shape: tuple[int, ...], half_width: float) -> None:
+    signal = np.cumsum(np.random.default_rng(20_261_150).standard_normal(shape), axis=-1)
+    for start in (-1.0, 0.0, 0.3, 1.0):
+        expected = point_by_point(signal, half_width, start)
+        np.testing.assert_allclose(operators.play(signal, half_width, start), expected, atol=1e-12)
+    memory = 0.5 * (point_by_point(signal, half_width, 1.0) - point_by_point(signal, half_width, -1.0))
+    np.testing.assert_allclose(operators.play_memory(signal, half_width), memory, atol=1e-12)
+
+
+@each([1, 3, 8, 9, 30])
+def test_a_recursion_of_few_signals_is_that_of_many(rows: int, rng: np.random.Generator) -> None:
+    keep, drive, start = rng.random(40), rng.normal(size=(rows, 40)), rng.normal(size=rows)
+    expected = [start]
+    for k in range(drive.shape[1]):
+        expected.append(keep[k] * expected[-1] + drive[:, k])
+    np.testing.assert_array_equal(operators.recursion(start, keep, drive), np.stack(expected, axis=1))
+
+
+@pytest.mark.parametrize("place", [3e-6, 0.02, 0.4, 0.999])
+@pytest.mark.parametrize("steep", [0.3, 3.0, 200.0])
+def test_the_root_is_that_of_scipy(place: float, steep: float) -> None:
+    def rises(x: float) -> float:
+        return float(np.tanh(steep * (x / place - 1.0)) + 0.01 * (x / place - 1.0))
+
+    assert root(rises, 1e-9, 1.0) == optimize.brentq(rises, 1e-9, 1.0)
+
+
+def test_roots_at_ends_and_at_jumps_are_found_and_without_a_change_of_sign_there_is_none() -> None:
+    assert [root(lambda x: x, *ends) for ends in ((0.0, 1.0), (-1.0, 0.0))] == [0.0, 0.0]
+    assert root(lambda x: -1.0 if x < 0.3 else 1.0, 0.0, 1.0) == pytest.approx(0.3, abs=4e-12)
+    with pytest.raises(ValueError, match="no change of sign"):
+        root(lambda x: x + 2.0, 0.0, 1.0)
+
+
+EFFECTS = ["bias", "scale", "third_order"]
+COEFFICIENTS = np.tile([0.01, 1.0, 1e-3], (3, 1))  # each axis, in g
+
+
+def solved(output: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The corrected output, and the further step that is left in each row."""
+    nothing = State(np.zeros(output.shape), np.zeros(len(output)))
+    corrected = correct(EFFECTS, nothing, output, COEFFICIENTS, {})
+    step = remaining_step(EFFECTS, State(corrected, np.zeros(len(output))), output, COEFFICIENTS, {}, corrected)
+    return corrected, np.abs(step).max(axis=1)
+
+
+def test_a_force_in_range_is_solved_and_an_output_far_outside_leaves_a_step(rng: np.random.Generator) -> None:
+    force = rng.uniform(-1.0, 1.0, (50, 3))
+    output = 0.01 + force + 1e-3 * force**3
+    output[49] = [900.0, 0.0, 0.0]
+    with np.errstate(all="ignore"):
+        corrected, step = solved(output)
+    np.testing.assert_allclose(corrected[:49], force[:49], atol=1e-9)
+    assert np.all(step[:49] < 1e-9)
+    assert not step[49] < 1e-6
+
+
+def directions(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    f = rng.normal(size=(*shape, 3))
+    return f / np.linalg.norm(f, axis=-1, keepdims=True)
+
+
+def test_static_intervals_are_those_that_were_made(rng: np.random.Generator) -> None:
+    rate, still = 50.0, []
+    parts = []
+    for _ in range(8):
+        still.append((sum(map(len, parts)), 400))
+        parts += [np.tile(directions(rng), (400, 1)), 0.5 * rng.normal(size=(150, 3))]
+    record = np.concatenate(parts) + 2e-3 * rng.normal(size=(8 * 550, 3))
+    for scale in (1.0, 4e3):
+        intervals = find(record * scale, rate)
+        assert len(intervals) == 8
+        for (start, length), a, b in zip(still, intervals.start, intervals.stop, strict=True):
+            assert start <= a < start + 60
+            assert start + length - 60 < b <= start + length
+
+
+def test_a_record_that_never_moves_is_one_interval(rng: np.random.Generator) -> None:
+    intervals = find(rng.normal(size=(5000, 3)), 100.0)
+    assert (intervals.start.tolist(), intervals.stop.tolist()) == ([0], [5000])
