@@ -12,7 +12,7 @@ from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
 from inertial.dynamics.transfer_effects import Conditions
-from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, factor
+from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, factor
 from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import probability
 
@@ -39,31 +39,28 @@ def figures_of_transfer(
             for name in ("sweep_bandwidth_hz", "sweep_natural_hz", "sweep_damping")
         ]
         return [*lost, _flatness(part, points), _sensitivity(part, fit, static)]
-    fit, other = best_of_exchange(points, fit)
     return [
         _bandwidth(axis, fit, points),
-        _parameter("sweep_natural_hz", "natural_hz", axis, fit, other),
-        _parameter("sweep_damping", "damping", axis, fit, other),
+        _parameter("sweep_natural_hz", "natural_hz", axis, diagnosis),
+        _parameter("sweep_damping", "damping", axis, diagnosis),
         _flatness(part, points),
         _sensitivity(part, fit, static),
     ]
 
 
-def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: TransferFit | None = None) -> FigureValue:
-    if not fit.has(name):
+def _parameter(figure: str, name: str, axis: str, diagnosis: TransferDiagnosis) -> FigureValue:
+    if not diagnosis.extended.has(name):
         return FigureValue.not_determined(figure, axis, f"the model has no {WORD.get(name, name)}")
-    value, error, low, high = fit.of(name)
-    if other is not None:
-        ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
-        note = (
-            f"two solutions fit equally well, {value:.4g} and {other.of(name)[0]:.4g}: the sprung mass and the two-pole "
-            "low-pass can be exchanged; state the low-pass, or excite the mass alone"
-        )
-        return FigureValue.not_determined(figure, axis, note, ends[0], ends[-1])
-    if not fit.identified(name):
-        note = f"not identified by this sweep: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
-        return FigureValue.not_determined(figure, axis, note, low, high)
-    return FigureValue(figure, axis, value, error, low, high)
+    one = diagnosis.parameter(name)
+    if one.identified:
+        return FigureValue(figure, axis, one.value, one.uncertainty, one.low, one.high)
+    note = f"not identified by this sweep: 95 % interval {one.low:.4g} … {one.high:.4g}"
+    if one.rival is not None:
+        model, of_rival = " + ".join(one.rival.effects), one.rival.of(name)[0]
+        note += f"; {model}, with {of_rival:.4g}, describes the points as well"
+    where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)
+    note += f"; measure at {where}" if where else "; sweep to higher frequencies"
+    return FigureValue.not_determined(figure, axis, note, one.low, one.high)
 
 
 def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
@@ -183,11 +180,12 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     if diagnosis.unexplained:
         out.append(("unexplained", "a significant deviation remains that no effect of the catalogue describes"))
     for p in diagnosis.extended.parameters:
-        value, _, low, high = diagnosis.extended.of(p.name)
-        if p.log and not diagnosis.extended.identified(p.name):
-            out.append(("not identified", f"{p.name}: 95 % interval {low:.4g} … {high:.4g} {p.unit}"))
+        one = diagnosis.parameter(p.name)
+        if p.log and not one.identified:
+            out.append(("not identified", f"{p.name}: 95 % interval {one.low:.4g} … {one.high:.4g} {p.unit}"))
         elif p.name == "delay_s":
-            out.append(("delay", f"{1e6 * value:.2f} µs, 95 % interval {1e6 * low:.2f} … {1e6 * high:.2f} µs"))
+            text = f"{1e6 * one.value:.2f} µs, 95 % interval {1e6 * one.low:.2f} … {1e6 * one.high:.2f} µs"
+            out.append(("delay", text))
     if diagnosis.next_hz:
         out.append(("next frequencies to measure", ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)))
     return out
