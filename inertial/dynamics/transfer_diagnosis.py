@@ -160,11 +160,14 @@ def _next_class(points: Points, best: TransferFit, current: Sequence[str]) -> tu
         return float(min(1.0, len(candidates) * chi2_tail(gain, len(fit.parameters) - len(best.parameters))))
 
     real = sorted((name for name in fits if p_value(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
-    if not real:
+    # what only follows the noise of the fitted points, or their too small uncertainties, predicts no others
+    before = _left_out(points, current)
+    first = next((name for name in real if not _left_out(points, [*current, name]) >= before), None)
+    if first is None:
         return None
-    top = fits[real[0]]
+    top = fits[first]
     scale = max(1.0, top.chi_square / max(top.dof, 1))  # what another effect still leaves blurs the comparison
-    same = tuple(name for name in real if score(fits[name]) - score(top) < CLASS_WIDTH * scale)
+    same = (first, *(n for n in real if n != first and abs(score(fits[n]) - score(top)) < CLASS_WIDTH * scale))
     return EffectClass(same, p_value(top), top.chi_square, top.dof), top
 
 

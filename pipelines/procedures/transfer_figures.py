@@ -119,10 +119,13 @@ def _bandwidth(axis: str, fit: TransferFit, points: Points) -> FigureValue:
 
 def _flatness(part: Any, points: Points) -> FigureValue:
     """Largest departure of the measured magnitude from that of the lowest fifth of the points."""
+    if part.flat_to_hz is None:
+        note = "a flatness belongs to a band; set flat_to_hz in the recipe"
+        return FigureValue.not_determined("sweep_flatness_percent", part.axis, note)
     f, size = points.conditions.frequency, np.abs(points.value)
     low = np.argsort(f)[: max(3, len(f) // 5)]
     rest = float(np.median(size[low]))
-    inside = f <= (part.flat_to_hz or f.max())
+    inside = f <= part.flat_to_hz
     departure = 100.0 * (size[inside] / rest - 1.0)
     k = int(np.argmax(np.abs(departure)))
     scatter = np.median(points.magnitude_error[low]) * np.sqrt(_variance_of_median(len(low)))
