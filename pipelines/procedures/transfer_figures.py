@@ -40,7 +40,7 @@ def figures_of_transfer(
         ]
         return [*lost, _flatness(part, points), _sensitivity(part, fit, static)]
     return [
-        _bandwidth(axis, fit, points),
+        _bandwidth(axis, diagnosis, points),
         _parameter("sweep_natural_hz", "natural_hz", axis, diagnosis),
         _parameter("sweep_damping", "damping", axis, diagnosis),
         _flatness(part, points),
@@ -96,25 +96,34 @@ def _owners(fit: TransferFit) -> Array:
     return np.array([name for name in fit.effects for _ in EFFECTS[name].parameters(plain)])
 
 
-def _bandwidth(axis: str, fit: TransferFit, points: Points) -> FigureValue:
-    """The −3 dB frequency of the model, its uncertainty by the covariance of the parameters."""
+def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> FigureValue:
+    """The −3 dB frequency of the model, and its interval over every model that the points do not exclude."""
     top = float(points.conditions.frequency.max())
-    value = bandwidth_of(fit, fit.values, top)
+    value, error = _bandwidth_with_error(diagnosis.extended, top)
     if not np.isfinite(value):
         note = "the model does not fall by 3 dB; sweep to higher frequencies"
         return FigureValue.not_determined("sweep_bandwidth_hz", axis, note)
+    found = [(value, error), *(_bandwidth_with_error(one, top) for one in diagnosis.rivals)]
+    ends = [(v * np.exp(-1.96 * e / v), v * np.exp(1.96 * min(e / v, 10.0))) for v, e in found if np.isfinite(v)]
+    low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
+    error = max(error, (value - low) / 1.96, (high - value) / 1.96)
+    if error > IDENTIFIED_SHARE * value or value > 2.5 * top or len(ends) < len(found):
+        note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
+        return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, low, high)
+    return FigureValue("sweep_bandwidth_hz", axis, value, error, low, high)
+
+
+def _bandwidth_with_error(fit: TransferFit, top: float) -> tuple[float, float]:
+    """The −3 dB frequency of a fit, and its standard uncertainty by the covariance of the parameters."""
+    value = bandwidth_of(fit, fit.values, top)
     gradient = np.zeros(len(fit.values))
     for k, parameter in enumerate(fit.parameters):
         step = 1e-4 if parameter.log else 1e-4 * max(abs(fit.values[k]), float(fit.errors[k]), 1e-12)
         moved = fit.values.copy()
         moved[k] = moved[k] * np.exp(step) if parameter.log else moved[k] + step
         gradient[k] = (bandwidth_of(fit, moved, top) - value) / step
-    error = float(np.sqrt(max(0.0, np.nan_to_num(gradient) @ fit.covariance[1:, 1:] @ np.nan_to_num(gradient))))
-    low, high = value * np.exp(-1.96 * error / value), value * np.exp(1.96 * min(error / value, 10.0))
-    if error > IDENTIFIED_SHARE * value or value > 2.5 * top:
-        note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
-        return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, float(low), float(high))
-    return FigureValue("sweep_bandwidth_hz", axis, value, error, float(low), float(high))
+    slope = np.nan_to_num(gradient)
+    return value, float(np.sqrt(max(0.0, slope @ fit.covariance[1:, 1:] @ slope)))
 
 
 def _flatness(part: Any, points: Points) -> FigureValue:
