@@ -72,6 +72,7 @@ class TransferDiagnosis:
         sprung mass and low-pass exchanged
     error_percent, extended_percent : rms of the relative complex residual
     left_out : rms weighted residual of left-out points before and after; near 1 for a right model
+    next_hz : frequencies to measure next; highest_hz : of the points
     """
 
     adequate: bool | None
@@ -86,6 +87,7 @@ class TransferDiagnosis:
     extended_percent: float
     left_out: tuple[float, float]
     next_hz: tuple[float, ...]
+    highest_hz: float
 
     @property
     def recommended(self) -> tuple[str, ...]:
@@ -104,9 +106,15 @@ class TransferDiagnosis:
                 low, high = min(low, low_here), max(high, high_here)
                 rival = one
         reach = max(high - value, value - low) / 1.96
+        # beyond the points a frequency, and what else its effect has, is an extrapolation by the form of the model
+        known = known and all(self._reached(one) for one in self.extended.frequencies_of(name))
         if rival is not None and self.extended.logarithmic(name):
             known = known and reach < IDENTIFIED_SHARE * value
         return StatedParameter(value, max(error, reach), low, high, known, rival)
+
+    def _reached(self, name: str) -> bool:
+        """Whether the points reach a frequency in every model that they do not exclude."""
+        return all(fit.of(name)[3] < self.highest_hz for fit in (self.extended, *self.rivals) if fit.has(name))
 
 
 def diagnose_transfer(
@@ -227,6 +235,7 @@ def _verdict(
         _error(points, extended),
         (left[0], left[1] if classes else left[0]),
         _next_frequencies(points, extended, rivals, highest or float(points.conditions.frequency.max())),
+        float(points.conditions.frequency.max()),
     )
 
 
@@ -290,7 +299,8 @@ def _next_frequencies(
         first = int(np.argmax(spread > SEPARATED * error))
         best = int(np.argmax(spread))
         return tuple(dict.fromkeys((float(grid[first]), float(grid[best]))))
-    loose = [p.name for p in extended.parameters if p.log and not extended.identified(p.name)]
+    loose = [p for p in extended.parameters if p.log and not extended.identified(p.name)]
+    loose += [p for p in extended.parameters if p.unit == "Hz" and extended.of(p.name)[3] >= top]
     if loose and highest > top:
         return tuple(float(f) for f in np.geomspace(1.25 * top, highest, 3) if f <= highest)
     return ()

@@ -19,6 +19,8 @@ Complex = NDArray[np.complex128]
 MOST_STARTS = 1200  # combinations whose residual is looked at: it costs less than a step of a search
 SCREENED = 6  # of them that are searched from, those with the least residual
 POLISHED = 2  # of them that are carried to the end
+PLAIN = Conditions(np.ones(2), np.ones(2), np.array([0.0, 1.0]), np.ones(2))
+"""Points at which every effect has its parameters."""
 IDENTIFIED_SHARE = 0.2
 """Largest relative standard uncertainty at which a frequency or damping counts as identified."""
 
@@ -103,6 +105,16 @@ class TransferFit:
     def logarithmic(self, name: str) -> bool:
         """Whether a parameter is positive and fitted by its logarithm."""
         return next(p.log for p in self.parameters if p.name == name)
+
+    def frequencies_of(self, name: str) -> tuple[str, ...]:
+        """The frequencies among the parameters of the effect to which a parameter belongs."""
+        at = 0
+        for effect in self.effects:
+            own = self.parameters[at : at + len(EFFECTS[effect].parameters(PLAIN))]
+            if any(p.name == name for p in own):
+                return tuple(p.name for p in own if p.unit == "Hz")
+            at += len(own)
+        return ()
 
     def has(self, name: str) -> bool:
         """Whether the model has a parameter of this name."""

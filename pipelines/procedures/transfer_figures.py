@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
-from inertial.dynamics.transfer_effects import Conditions
-from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, factor
+from inertial.dynamics.transfer_effects import EFFECTS, Conditions
+from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, TransferFit, factor
 from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import probability
 
@@ -71,8 +71,8 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
         at = np.atleast_1d(np.asarray(f, dtype=np.float64))
         plain = Conditions(at, np.full(at.size, 1e-9), np.zeros(at.size), np.full(at.size, np.nan))
         names = [name for name in fit.effects if name not in {"temperature", "hum", "own_clock", "amplitude"}]
-        keep = np.isin(_owners(fit), names)
-        return np.abs(factor(names, plain, values[keep])) - np.sqrt(0.5)
+        owner = np.repeat(fit.effects, [len(EFFECTS[name].parameters(PLAIN)) for name in fit.effects])
+        return np.abs(factor(names, plain, values[np.isin(owner, names)])) - np.sqrt(0.5)
 
     below = np.flatnonzero(over(grid) < 0.0)
     if below.size == 0 or below[0] == 0:
@@ -85,15 +85,6 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
 
     crossing: Any = brentq(at_one, grid[k - 1], grid[k])
     return float(crossing)
-
-
-def _owners(fit: TransferFit) -> Array:
-    """The effect of each parameter of a fit."""
-    from inertial.dynamics.transfer_effects import EFFECTS
-
-    one = np.ones(2)
-    plain = Conditions(one, one, np.array([0.0, 1.0]), one)
-    return np.array([name for name in fit.effects for _ in EFFECTS[name].parameters(plain)])
 
 
 def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> FigureValue:
