@@ -155,3 +155,8 @@ def relaxation(time: ArrayLike, age: ArrayLike, kick: ArrayLike, tau: float) -> 
     fresh = d * np.exp(-s / tau)
     keep = np.exp(-np.maximum(np.diff(t, axis=-1), 0.0) / tau)
     return recursion(fresh[..., 0], keep, fresh[..., 1:])
+
+
+def approach(time: Array, tau: float) -> Array:
+    """τ·(1 − exp(−t/τ)) at times (...), in the unit of both: what begins at a rate of one and comes to rest after a few τ."""
+    return -tau * np.expm1(-time / tau)

@@ -12,13 +12,15 @@ from inertial.counts import degrees_of_freedom
 from inertial.distributions import chi2_tail
 from inertial.dynamics import goodness
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
-from inertial.dynamics.transfer_model import Points, TransferFit, best_of_exchange, fit_transfer
+from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, fit_transfer
 
 Array = NDArray[np.float64]
 ADDED_P = 1e-3
 """Largest p-value of an added effect of a model that is not adequate, times the number of candidates."""
 CLASS_WIDTH = 9.0
 """Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
+SEPARATED = 10.0
+"""Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""
 MOST_ADDED = 3
 FOLDS = 5
 FEWEST_DOF = 6
@@ -45,19 +47,39 @@ class Failure:
 
 
 @dataclass(frozen=True)
+class StatedParameter:
+    """A parameter over all models that the points do not exclude.
+
+    low, high : 95 % interval that holds in each of them; uncertainty : standard, so that twice of it reaches its farther end
+    identified : whether it is known well enough to be stated; rival : the model that leaves it open, where one does
+    """
+
+    value: float
+    uncertainty: float
+    low: float
+    high: float
+    identified: bool
+    rival: TransferFit | None = None
+
+
+@dataclass(frozen=True)
 class TransferDiagnosis:
     """The verdict on a model of a transfer function.
 
     adequate : None where it cannot be judged, with ``reason``
     fit : of the judged model; extended : with the recommended effects; the same where none is
+    rivals : models that describe the points as well as ``extended``: another effect of a class, a filter that every device has,
+        sprung mass and low-pass exchanged
     error_percent, extended_percent : rms of the relative complex residual
     left_out : rms weighted residual of left-out points before and after; near 1 for a right model
+    next_hz : frequencies to measure next; highest_hz : of the points
     """
 
     adequate: bool | None
     reason: str
     fit: TransferFit
     extended: TransferFit
+    rivals: tuple[TransferFit, ...]
     where: tuple[Failure, ...]
     classes: tuple[EffectClass, ...]
     unexplained: bool
@@ -65,11 +87,34 @@ class TransferDiagnosis:
     extended_percent: float
     left_out: tuple[float, float]
     next_hz: tuple[float, ...]
+    highest_hz: float
 
     @property
     def recommended(self) -> tuple[str, ...]:
         """One effect per class, the best of it."""
         return tuple(one.effects[0] for one in self.classes)
+
+    def parameter(self, name: str) -> StatedParameter:
+        """A parameter of the extended model, as far as every model that the points do not exclude agrees."""
+        value, error, low, high = self.extended.of(name)
+        known, rival = self.extended.identified(name), None
+        for one in self.rivals:
+            if not one.has(name):
+                continue
+            _, _, low_here, high_here = one.of(name)
+            if low_here < low or high_here > high:
+                low, high = min(low, low_here), max(high, high_here)
+                rival = one
+        reach = max(high - value, value - low) / 1.96
+        # beyond the points a frequency, and what else its effect has, is an extrapolation by the form of the model
+        known = known and all(self._reached(one) for one in self.extended.frequencies_of(name))
+        if rival is not None and self.extended.logarithmic(name):
+            known = known and reach < IDENTIFIED_SHARE * value
+        return StatedParameter(value, max(error, reach), low, high, known, rival)
+
+    def _reached(self, name: str) -> bool:
+        """Whether the points reach a frequency in every model that they do not exclude."""
+        return all(fit.of(name)[3] < self.highest_hz for fit in (self.extended, *self.rivals) if fit.has(name))
 
 
 def diagnose_transfer(
@@ -123,12 +168,45 @@ def _next_class(points: Points, best: TransferFit, current: Sequence[str]) -> tu
         return float(min(1.0, len(candidates) * chi2_tail(gain, len(fit.parameters) - len(best.parameters))))
 
     real = sorted((name for name in fits if p_value(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
-    if not real:
+    # what only follows the noise of the fitted points, or their too small uncertainties, predicts no others
+    before = _left_out(points, current)
+    first = next((name for name in real if not _left_out(points, [*current, name]) >= before), None)
+    if first is None:
         return None
-    top = fits[real[0]]
+    top = fits[first]
     scale = max(1.0, top.chi_square / max(top.dof, 1))  # what another effect still leaves blurs the comparison
-    same = tuple(name for name in real if score(fits[name]) - score(top) < CLASS_WIDTH * scale)
+    same = (first, *(n for n in real if n != first and abs(score(fits[n]) - score(top)) < CLASS_WIDTH * scale))
     return EffectClass(same, p_value(top), top.chi_square, top.dof), top
+
+
+def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass]) -> tuple[TransferFit, ...]:
+    """Models that the points do not exclude in place of the extended one.
+
+    A model that describes the points is not the only one: up to 1 kHz a sprung mass of 2.5 kHz with a low-pass of 1.6 kHz looks
+    like one of 1.5 kHz with a delay.
+    """
+    known = {p.name: float(v) for p, v in zip(extended.parameters, extended.values, strict=True)}
+    chosen = [one.effects[0] for one in classes]
+    models = [
+        [other if name == one.effects[0] else name for name in extended.effects]
+        for one in classes
+        for other in one.effects[1:]
+        if other not in chosen
+    ]
+    models += [
+        [*extended.effects, name]
+        for name, one in EFFECTS.items()
+        if one.in_every_device
+        and name not in extended.effects
+        and 2 * len(points.value) > 3 * len(extended.parameters) + 8
+    ]
+    fits = [fit_transfer(points, effects, known, only_near=True) for effects in models]
+    for fit in (extended, *fits):
+        other = best_of_exchange(points, fit)[1] if "second_order" in fit.effects else None
+        if other is not None:
+            fits.append(other)
+    price = CLASS_WIDTH * max(1.0, extended.chi_square / max(extended.dof, 1))
+    return tuple(fit for fit in fits if fit.chi_square < extended.chi_square + price)
 
 
 def _verdict(
@@ -143,18 +221,21 @@ def _verdict(
     highest: float | None,
 ) -> TransferDiagnosis:
     left = (_left_out(points, base.effects), _left_out(points, extended.effects) if classes else np.nan)
+    rivals = () if adequate is None or unexplained else _rivals(points, extended, classes)
     return TransferDiagnosis(
         adequate,
         reason,
         base,
         extended,
+        rivals,
         _where(points, base) if adequate is False else (),
         classes,
         unexplained,
         _error(points, base),
         _error(points, extended),
         (left[0], left[1] if classes else left[0]),
-        _next_frequencies(points, base, classes, highest or float(points.conditions.frequency.max())),
+        _next_frequencies(points, extended, rivals, highest or float(points.conditions.frequency.max())),
+        float(points.conditions.frequency.max()),
     )
 
 
@@ -191,16 +272,16 @@ def _left_out(points: Points, effects: Sequence[str]) -> float:
         seen, unseen = points.picked(~out), points.picked(out)
         if not all(EFFECTS[name].seen(seen.conditions) for name in effects):
             continue
-        ratio = unseen.value / fit_transfer(seen, effects, near).response(unseen.conditions)
+        ratio = unseen.value / fit_transfer(seen, effects, near, only_near=True).response(unseen.conditions)
         squares += float(np.sum((np.log(np.abs(ratio)) / unseen.magnitude_error) ** 2))
         squares += float(np.sum((np.angle(ratio) / unseen.phase_error) ** 2))
     return float(np.sqrt(squares / (2 * n)))
 
 
 def _next_frequencies(
-    points: Points, base: TransferFit, classes: Sequence[EffectClass], highest: float
+    points: Points, extended: TransferFit, rivals: Sequence[TransferFit], highest: float
 ) -> tuple[float, ...]:
-    """Frequencies at which the effects of a class differ most, or where an unidentified parameter shows; Hz, at most three."""
+    """Frequencies at which rival models differ most, or where an unidentified parameter shows; Hz, at most three."""
     c = points.conditions
     low, top = float(c.frequency.min()), float(c.frequency.max())
     grid = np.geomspace(low, max(highest, top), 200)
@@ -210,16 +291,16 @@ def _next_frequencies(
         np.full(200, np.median(c.temperature)),
         np.full(200, np.median(c.record_s)),
     )
-    rivals = next((one.effects for one in classes if len(one.effects) > 1), ())
-    if rivals:
-        chosen = [name for one in classes for name in one.effects[:1] if one.effects[0] != rivals[0]]
-        models = [fit_transfer(points, [*base.effects, *chosen, name]) for name in rivals[:3]]
-        models = [one for one in models if all(EFFECTS[name].parameters(plan) for name in one.effects)]
-        values = np.stack([np.log(np.maximum(np.abs(one.response(plan)), 1e-300)) for one in models])
-        spread = np.ptp(values, axis=0)
+    models = [one for one in (extended, *rivals) if all(EFFECTS[name].parameters(plan) for name in one.effects)]
+    values = np.stack([np.log(np.maximum(np.abs(one.response(plan)), 1e-300)) for one in models])
+    spread = np.ptp(values, axis=0)
+    error = float(np.median(points.magnitude_error))
+    if spread.max() > SEPARATED * error:
+        first = int(np.argmax(spread > SEPARATED * error))
         best = int(np.argmax(spread))
-        return (float(grid[best]),) if spread[best] > 0.0 else ()
-    loose = [p.name for p in base.parameters if p.log and not base.identified(p.name)]
+        return tuple(dict.fromkeys((float(grid[first]), float(grid[best]))))
+    loose = [p for p in extended.parameters if p.log and not extended.identified(p.name)]
+    loose += [p for p in extended.parameters if p.unit == "Hz" and extended.of(p.name)[3] >= top]
     if loose and highest > top:
         return tuple(float(f) for f in np.geomspace(1.25 * top, highest, 3) if f <= highest)
     return ()

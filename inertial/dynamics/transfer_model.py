@@ -16,9 +16,11 @@ from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-MOST_STARTS = 60
-SCREENED = 5  # of the starts that are searched from, those with the least residual
+MOST_STARTS = 1200  # combinations whose residual is looked at: it costs less than a step of a search
+SCREENED = 6  # of them that are searched from, those with the least residual
 POLISHED = 2  # of them that are carried to the end
+PLAIN = Conditions(np.ones(2), np.ones(2), np.array([0.0, 1.0]), np.ones(2))
+"""Points at which every effect has its parameters."""
 IDENTIFIED_SHARE = 0.2
 """Largest relative standard uncertainty at which a frequency or damping counts as identified."""
 
@@ -100,6 +102,20 @@ class TransferFit:
         """The model at some points, output per g."""
         return self.sensitivity * factor(self.effects, conditions, self.values)
 
+    def logarithmic(self, name: str) -> bool:
+        """Whether a parameter is positive and fitted by its logarithm."""
+        return next(p.log for p in self.parameters if p.name == name)
+
+    def frequencies_of(self, name: str) -> tuple[str, ...]:
+        """The frequencies among the parameters of the effect to which a parameter belongs."""
+        at = 0
+        for effect in self.effects:
+            own = self.parameters[at : at + len(EFFECTS[effect].parameters(PLAIN))]
+            if any(p.name == name for p in own):
+                return tuple(p.name for p in own if p.unit == "Hz")
+            at += len(own)
+        return ()
+
     def has(self, name: str) -> bool:
         """Whether the model has a parameter of this name."""
         return any(p.name == name for p in self.parameters)
@@ -115,13 +131,16 @@ def factor(effects: Sequence[str], conditions: Conditions, values: Array) -> Com
     return out
 
 
-def fit_transfer(points: Points, effects: Sequence[str], near: Mapping[str, float] | None = None) -> TransferFit:
+def fit_transfer(
+    points: Points, effects: Sequence[str], near: Mapping[str, float] | None = None, *, only_near: bool = False
+) -> TransferFit:
     """The best fit of a model over several starts.
 
     Parameters
     ----------
     effects : ids of the effects; the sensitivity is always fitted
     near : values of parameters at which the search starts, by name, as those of a smaller model
+    only_near : whether these parameters start there alone: the model describes the points already
 
     Raises
     ------
@@ -138,16 +157,23 @@ def fit_transfer(points: Points, effects: Sequence[str], near: Mapping[str, floa
     log = np.array([p.log for p in parameters], dtype=bool)
     bounds = _bounds(parameters)
 
-    def residual(x: Array) -> Array:
+    error = np.concatenate([points.magnitude_error, points.phase_error])
+
+    def deviation(x: Array) -> Array:
         values = np.where(log, np.exp(np.where(log, x[1:], 0.0)), x[1:]) if len(parameters) else x[1:]
         with np.errstate(all="ignore"):
             ratio = points.value / (sign * np.exp(x[0]) * factor(effects, conditions, values))
-            out = np.concatenate([np.log(np.abs(ratio)) / points.magnitude_error, np.angle(ratio) / points.phase_error])
-        return np.nan_to_num(np.clip(out, -1e6, 1e6), nan=1e6)
+            return np.nan_to_num(
+                np.concatenate([np.log(np.abs(ratio)), np.angle(ratio)]), nan=1e6, posinf=1e6, neginf=-1e6
+            )
+
+    def residual(x: Array) -> Array:
+        return np.clip(deviation(x) / error, -1e6, 1e6)
 
     level = float(np.log(np.median(np.abs(points.value[low_end]))))
-    starts = [np.concatenate([[level], start]) for start in _starts(parameters, near or {}, log)]
-    screened = sorted(starts, key=lambda x: float(np.sum(np.minimum(residual(x) ** 2, 1e4))))[:SCREENED]
+    starts = [np.concatenate([[level], start]) for start in _starts(parameters, near or {}, log, only_near=only_near)]
+    # far from the solution all points are off by many of their uncertainties: starts are compared by the deviation itself
+    screened = sorted(starts, key=lambda x: float(np.sum(deviation(x) ** 2)))[:SCREENED]
     tried = sorted(
         (least_squares(residual, x, bounds=bounds, max_nfev=12, x_scale="jac") for x in screened),
         key=lambda one: one.cost,
@@ -184,7 +210,7 @@ def exchanged(points: Points, fit: TransferFit) -> TransferFit | None:
         return None
     near = {p.name: float(v) for p, v in zip(fit.parameters, fit.values, strict=True)}
     near |= {"natural_hz": near["two_pole_hz"], "two_pole_hz": near["natural_hz"], "damping": float(np.sqrt(0.5))}
-    return fit_transfer(points, fit.effects, near)
+    return fit_transfer(points, fit.effects, near, only_near=True)
 
 
 def best_of_exchange(points: Points, fit: TransferFit) -> tuple[TransferFit, TransferFit | None]:
@@ -202,9 +228,14 @@ def _bounds(parameters: Sequence[Parameter]) -> tuple[Array, Array]:
     return np.array(low), np.array(high)
 
 
-def _starts(parameters: Sequence[Parameter], near: Mapping[str, float], log: NDArray[np.bool_]) -> list[Array]:
-    """Combinations of the parameters' starts, thinned; parameters with a known value start there alone."""
-    choices = [(near[p.name],) if p.name in near else p.starts for p in parameters]
+def _starts(
+    parameters: Sequence[Parameter], near: Mapping[str, float], log: NDArray[np.bool_], *, only_near: bool
+) -> list[Array]:
+    """Combinations of the parameters' starts, thinned."""
+    choices = [
+        ((near[p.name],) if only_near else (near[p.name], *p.starts)) if p.name in near else p.starts
+        for p in parameters
+    ]
     whole = list(product(*choices))
     step = max(1, -(-len(whole) // MOST_STARTS))
     starts: list[Array] = []

@@ -91,10 +91,14 @@ def import_transfer(
     bandwidth = bandwidth_of(fit, fit.values, float(points.conditions.frequency.max()))
     parameters: dict[str, TransferParameter] = {}
     for p in fit.parameters:
-        value, error, low, high = fit.of(p.name)
-        known = fit.identified(p.name)
+        one = diagnosis.parameter(p.name)
         parameters[p.name] = TransferParameter(
-            value=value, uncertainty=error, low=low, high=high, unit=p.unit, identified=known
+            value=one.value,
+            uncertainty=one.uncertainty,
+            low=one.low,
+            high=one.high,
+            unit=p.unit,
+            identified=one.identified,
         )
     text = diagnosis_text(diagnosis)
     run = _keep(points, source, unit, list(effects), text, archive)

@@ -156,7 +156,7 @@ class CentrifugeTest(InG, OnEquipment, Evaluated):
             force = one.record.step.setting["direction"] * radius * rate**2 / 9.80665
             raw = one.own.output[:, INPUT]
             output = raw / scale_of(part, device, one.unit)[INPUT]
-            clipped = bool(np.max(np.abs(raw)) >= device.full_scale)
+            clipped = device.at_end(raw) > 0
             error = float(np.hypot(output.std(ddof=1) / np.sqrt(output.size), 1e-6 * part.point_ppm * abs(force)))
             rows.append(
                 {

@@ -111,7 +111,7 @@ class RandomVibration(InG, OnEquipment, Evaluated):
                 {
                     "unit": one.unit, "axis": part.axis, "series": "shift", "point": one.number, "setting": level,
                     "value": np.nan if silent else MICRO * shift, "uncertainty": MICRO * error,
-                    "clipped": float(np.count_nonzero(np.abs(output) >= device.full_scale)),
+                    "clipped": float(device.at_end(output)),
                     "ordered_g": one.record.step.setting["level_g"],
                 }
             )  # fmt: skip

@@ -106,6 +106,10 @@ def taken(records: Records) -> Iterator[Taken]:
                 yield Taken(number, record, unit, {str(k): v for k, v in reading.items()}, record.samples[unit])
 
 
+END = 1e-4
+"""Share of the full scale within which a sample is at its end: to which a converter of 14 bits or more rounds it."""
+
+
 @dataclass(frozen=True)
 class Device:
     """The units before the procedure: nominal scale from the full scale, and their calibration if there is one.
@@ -120,6 +124,10 @@ class Device:
     full_scale: float
     out_unit: str
     noise: Mapping[tuple[str, str], IdentifiedNoise] = field(default_factory=dict[tuple[str, str], "IdentifiedNoise"])
+
+    def at_end(self, output: Array) -> int:
+        """Number of samples (n,) at the end of the range that the data sheet gives."""
+        return int(np.count_nonzero(np.abs(output) >= (1.0 - END) * self.full_scale))
 
 
 def procedure_record(

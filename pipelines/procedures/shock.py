@@ -15,6 +15,7 @@ from inertial.dynamics.shock_diagnosis import DEFAULT
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.wander import stated_error
 from inertial.errors import NotIdentified
+from inertial.record_faults import clipped as at_extreme
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace
 from pipelines.procedures import shock_waves
 from pipelines.procedures.base import FromWaveforms, InG, NominalScale, OnEquipment, refuse_unknown_effects, scale_of
@@ -139,7 +140,7 @@ class ShockTest(InG, OnEquipment, FromWaveforms):
             direction = one.record.step.setting["direction"]
             noise = shock_waves.noise_before(pair, BEFORE_S)
             of_shock = [
-                *_pulse(one.number, direction, one.own.output[:, axis], pair, device.full_scale),
+                *_pulse(one.number, direction, one.own.output[:, axis], pair, device),
                 *shock_waves.waves(one.number, pair, direction, settings_of(part), noise),
                 *(shock_waves.curves(pair, duration, BEFORE_S) if one.number == first else ()),
             ]
@@ -185,13 +186,13 @@ def settings_of(part: ShockPart) -> shock_waves.WaveSettings:
 
 
 def _pulse(
-    number: int, direction: float, raw: np.ndarray, pair: shock_waves.Pair, limit: float
+    number: int, direction: float, raw: np.ndarray, pair: shock_waves.Pair, device: Device
 ) -> list[dict[str, Any]]:
     """Reference pulse and the unit's ratio to it; no value where a pulse is not found or the unit clips.
 
     Parameters
     ----------
-    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass; limit : of the output
+    raw : (n,), output of the unit as recorded; pair : both channels in g behind their low-pass
     """
     (reference, rate), (unit, unit_rate) = pair
     drive = measured_pulse(reference, rate, before_s=BEFORE_S)
@@ -202,7 +203,8 @@ def _pulse(
         }
     ]  # fmt: skip
     still = np.median(raw[: int(BEFORE_S * unit_rate)])
-    clipped = bool(np.max(np.abs(raw - still)) >= limit or np.max(np.abs(raw)) >= limit)
+    # a rail of the unit itself, below the range of the data sheet, shows as an extreme at which it stands still
+    clipped = device.at_end(raw) + device.at_end(raw - still) + at_extreme(raw)[2] > 0
     ratio = error = under = noise = np.nan
     with suppress(NotIdentified):
         if not clipped:

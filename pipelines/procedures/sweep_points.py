@@ -68,7 +68,7 @@ def response_point(
     magnitude = float(np.sqrt(noise**2 + transverse**2 + (1e-2 * part.repeatability_percent) ** 2))
     phase = float(np.sqrt(noise**2 + transverse**2 + np.radians(part.repeatability_deg) ** 2 + skew**2))
     silent = size < SILENT * tone.amplitude_error[0]
-    clipped = bool(np.max(np.abs(own.output[:, axis])) >= device.full_scale)
+    clipped = device.at_end(own.output[:, axis]) > 0
     power = 0.5 * size**2
     whole = not silent and not clipped and bool(np.isfinite(ratio))
     return {

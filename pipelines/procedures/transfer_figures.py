@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from inertial.counts import degrees_of_freedom
 from inertial.dynamics.spectra import folded_share
 from inertial.dynamics.transfer_diagnosis import TransferDiagnosis
-from inertial.dynamics.transfer_effects import Conditions
-from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, factor
+from inertial.dynamics.transfer_effects import EFFECTS, Conditions
+from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, PLAIN, Points, TransferFit, factor
 from pipelines.procedures.figures import FigureValue
 from pipelines.procedures.wording import probability
 
@@ -39,31 +39,28 @@ def figures_of_transfer(
             for name in ("sweep_bandwidth_hz", "sweep_natural_hz", "sweep_damping")
         ]
         return [*lost, _flatness(part, points), _sensitivity(part, fit, static)]
-    fit, other = best_of_exchange(points, fit)
     return [
-        _bandwidth(axis, fit, points),
-        _parameter("sweep_natural_hz", "natural_hz", axis, fit, other),
-        _parameter("sweep_damping", "damping", axis, fit, other),
+        _bandwidth(axis, diagnosis, points),
+        _parameter("sweep_natural_hz", "natural_hz", axis, diagnosis),
+        _parameter("sweep_damping", "damping", axis, diagnosis),
         _flatness(part, points),
         _sensitivity(part, fit, static),
     ]
 
 
-def _parameter(figure: str, name: str, axis: str, fit: TransferFit, other: TransferFit | None = None) -> FigureValue:
-    if not fit.has(name):
+def _parameter(figure: str, name: str, axis: str, diagnosis: TransferDiagnosis) -> FigureValue:
+    if not diagnosis.extended.has(name):
         return FigureValue.not_determined(figure, axis, f"the model has no {WORD.get(name, name)}")
-    value, error, low, high = fit.of(name)
-    if other is not None:
-        ends = sorted((*fit.of(name)[2:], *other.of(name)[2:]))
-        note = (
-            f"two solutions fit equally well, {value:.4g} and {other.of(name)[0]:.4g}: the sprung mass and the two-pole "
-            "low-pass can be exchanged; state the low-pass, or excite the mass alone"
-        )
-        return FigureValue.not_determined(figure, axis, note, ends[0], ends[-1])
-    if not fit.identified(name):
-        note = f"not identified by this sweep: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
-        return FigureValue.not_determined(figure, axis, note, low, high)
-    return FigureValue(figure, axis, value, error, low, high)
+    one = diagnosis.parameter(name)
+    if one.identified:
+        return FigureValue(figure, axis, one.value, one.uncertainty, one.low, one.high)
+    note = f"not identified by this sweep: 95 % interval {one.low:.4g} … {one.high:.4g}"
+    if one.rival is not None:
+        model, of_rival = " + ".join(one.rival.effects), one.rival.of(name)[0]
+        note += f"; {model}, with {of_rival:.4g}, describes the points as well"
+    where = ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)
+    note += f"; measure at {where}" if where else "; sweep to higher frequencies"
+    return FigureValue.not_determined(figure, axis, note, one.low, one.high)
 
 
 def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
@@ -74,8 +71,8 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
         at = np.atleast_1d(np.asarray(f, dtype=np.float64))
         plain = Conditions(at, np.full(at.size, 1e-9), np.zeros(at.size), np.full(at.size, np.nan))
         names = [name for name in fit.effects if name not in {"temperature", "hum", "own_clock", "amplitude"}]
-        keep = np.isin(_owners(fit), names)
-        return np.abs(factor(names, plain, values[keep])) - np.sqrt(0.5)
+        owner = np.repeat(fit.effects, [len(EFFECTS[name].parameters(PLAIN)) for name in fit.effects])
+        return np.abs(factor(names, plain, values[np.isin(owner, names)])) - np.sqrt(0.5)
 
     below = np.flatnonzero(over(grid) < 0.0)
     if below.size == 0 or below[0] == 0:
@@ -90,42 +87,45 @@ def bandwidth_of(fit: TransferFit, values: Array, top: float) -> float:
     return float(crossing)
 
 
-def _owners(fit: TransferFit) -> Array:
-    """The effect of each parameter of a fit."""
-    from inertial.dynamics.transfer_effects import EFFECTS
-
-    one = np.ones(2)
-    plain = Conditions(one, one, np.array([0.0, 1.0]), one)
-    return np.array([name for name in fit.effects for _ in EFFECTS[name].parameters(plain)])
-
-
-def _bandwidth(axis: str, fit: TransferFit, points: Points) -> FigureValue:
-    """The −3 dB frequency of the model, its uncertainty by the covariance of the parameters."""
+def _bandwidth(axis: str, diagnosis: TransferDiagnosis, points: Points) -> FigureValue:
+    """The −3 dB frequency of the model, and its interval over every model that the points do not exclude."""
     top = float(points.conditions.frequency.max())
-    value = bandwidth_of(fit, fit.values, top)
+    value, error = _bandwidth_with_error(diagnosis.extended, top)
     if not np.isfinite(value):
         note = "the model does not fall by 3 dB; sweep to higher frequencies"
         return FigureValue.not_determined("sweep_bandwidth_hz", axis, note)
+    found = [(value, error), *(_bandwidth_with_error(one, top) for one in diagnosis.rivals)]
+    ends = [(v * np.exp(-1.96 * e / v), v * np.exp(1.96 * min(e / v, 10.0))) for v, e in found if np.isfinite(v)]
+    low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
+    error = max(error, (value - low) / 1.96, (high - value) / 1.96)
+    if error > IDENTIFIED_SHARE * value or value > 2.5 * top or len(ends) < len(found):
+        note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
+        return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, low, high)
+    return FigureValue("sweep_bandwidth_hz", axis, value, error, low, high)
+
+
+def _bandwidth_with_error(fit: TransferFit, top: float) -> tuple[float, float]:
+    """The −3 dB frequency of a fit, and its standard uncertainty by the covariance of the parameters."""
+    value = bandwidth_of(fit, fit.values, top)
     gradient = np.zeros(len(fit.values))
     for k, parameter in enumerate(fit.parameters):
         step = 1e-4 if parameter.log else 1e-4 * max(abs(fit.values[k]), float(fit.errors[k]), 1e-12)
         moved = fit.values.copy()
         moved[k] = moved[k] * np.exp(step) if parameter.log else moved[k] + step
         gradient[k] = (bandwidth_of(fit, moved, top) - value) / step
-    error = float(np.sqrt(max(0.0, np.nan_to_num(gradient) @ fit.covariance[1:, 1:] @ np.nan_to_num(gradient))))
-    low, high = value * np.exp(-1.96 * error / value), value * np.exp(1.96 * min(error / value, 10.0))
-    if error > IDENTIFIED_SHARE * value or value > 2.5 * top:
-        note = f"not identified by this sweep to {top:.4g} Hz: 95 % interval {low:.4g} … {high:.4g}; sweep to higher frequencies"
-        return FigureValue.not_determined("sweep_bandwidth_hz", axis, note, float(low), float(high))
-    return FigureValue("sweep_bandwidth_hz", axis, value, error, float(low), float(high))
+    slope = np.nan_to_num(gradient)
+    return value, float(np.sqrt(max(0.0, slope @ fit.covariance[1:, 1:] @ slope)))
 
 
 def _flatness(part: Any, points: Points) -> FigureValue:
     """Largest departure of the measured magnitude from that of the lowest fifth of the points."""
+    if part.flat_to_hz is None:
+        note = "a flatness belongs to a band; set flat_to_hz in the recipe"
+        return FigureValue.not_determined("sweep_flatness_percent", part.axis, note)
     f, size = points.conditions.frequency, np.abs(points.value)
     low = np.argsort(f)[: max(3, len(f) // 5)]
     rest = float(np.median(size[low]))
-    inside = f <= (part.flat_to_hz or f.max())
+    inside = f <= part.flat_to_hz
     departure = 100.0 * (size[inside] / rest - 1.0)
     k = int(np.argmax(np.abs(departure)))
     scatter = np.median(points.magnitude_error[low]) * np.sqrt(_variance_of_median(len(low)))
@@ -183,11 +183,12 @@ def diagnosis_text(diagnosis: TransferDiagnosis) -> list[tuple[str, str]]:
     if diagnosis.unexplained:
         out.append(("unexplained", "a significant deviation remains that no effect of the catalogue describes"))
     for p in diagnosis.extended.parameters:
-        value, _, low, high = diagnosis.extended.of(p.name)
-        if p.log and not diagnosis.extended.identified(p.name):
-            out.append(("not identified", f"{p.name}: 95 % interval {low:.4g} … {high:.4g} {p.unit}"))
+        one = diagnosis.parameter(p.name)
+        if p.log and not one.identified:
+            out.append(("not identified", f"{p.name}: 95 % interval {one.low:.4g} … {one.high:.4g} {p.unit}"))
         elif p.name == "delay_s":
-            out.append(("delay", f"{1e6 * value:.2f} µs, 95 % interval {1e6 * low:.2f} … {1e6 * high:.2f} µs"))
+            text = f"{1e6 * one.value:.2f} µs, 95 % interval {1e6 * one.low:.2f} … {1e6 * one.high:.2f} µs"
+            out.append(("delay", text))
     if diagnosis.next_hz:
         out.append(("next frequencies to measure", ", ".join(f"{f:.4g} Hz" for f in diagnosis.next_hz)))
     return out

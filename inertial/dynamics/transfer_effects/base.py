@@ -48,12 +48,15 @@ class TransferEffect(ABC):
     """A factor of the transfer function, 1 where it does not act. Every module of this package defines one class.
 
     id : of the module · equation, source : for people · breaker : the measurement that tells it from others
+    in_every_device : a filter that a device has somewhere, if only far beyond the points: what the points say of the sensing
+    element must hold beside it, too
     """
 
     id: ClassVar[str]
     equation: ClassVar[str]
     source: ClassVar[str]
     breaker: ClassVar[str]
+    in_every_device: ClassVar[bool] = False
 
     @abstractmethod
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:

@@ -16,11 +16,13 @@ class MovingAverage(TransferEffect):
     equation: ClassVar[str] = "sinc(fT)·exp(−jπfT)"
     source: ClassVar[str] = "boxcar filter; −3 dB at 0.443/T, delay T/2"
     breaker: ClassVar[str] = "points up to the first null at 1/T"
+    in_every_device: ClassVar[bool] = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         """The parameters."""
         top = float(points.frequency.max())
-        return (Parameter("average_s", "s", 1e-3 / top, 0.98 / top, (0.1 / top, 0.4 / top, 0.8 / top), log=True),)
+        starts = tuple(share / top for share in (0.1, 0.4, 0.8, 1.3, 1.8, 2.6, 3.6))
+        return (Parameter("average_s", "s", 1e-3 / top, 5.0 / top, starts, log=True),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
         """The factor (n,) at the points."""

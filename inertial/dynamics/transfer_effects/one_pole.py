@@ -16,6 +16,7 @@ class OnePole(TransferEffect):
     equation: ClassVar[str] = "1/(1 + jf/f_c)"
     source: ClassVar[str] = "first-order low-pass"
     breaker: ClassVar[str] = "points beyond the corner, or the step response"
+    in_every_device: ClassVar[bool] = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         """The parameters."""

@@ -19,10 +19,11 @@ class SecondOrder(TransferEffect):
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         """The parameters."""
-        top = float(points.frequency.max())
+        low, top = float(points.frequency.min()), float(points.frequency.max())
+        starts = tuple(float(f) for f in np.geomspace(max(low, 0.05 * top), 4.0 * top, 9))
         return (
-            Parameter("natural_hz", "Hz", 0.2 * top, 50.0 * top, (0.7 * top, 1.5 * top, 4.0 * top), log=True),
-            Parameter("damping", "1", 1e-3, 5.0, (0.7, 0.05), log=True),
+            Parameter("natural_hz", "Hz", low, 50.0 * top, starts, log=True),
+            Parameter("damping", "1", 1e-3, 5.0, (0.7, 0.2, 0.03), log=True),
         )
 
     def factor(self, points: Conditions, values: Array) -> Complex:

@@ -16,6 +16,7 @@ class TwoPole(TransferEffect):
     equation: ClassVar[str] = "1/(1 − r² + j√2·r), r = f/f_c"
     source: ClassVar[str] = "Butterworth low-pass of order 2"
     breaker: ClassVar[str] = "points beyond the corner, or the step response"
+    in_every_device: ClassVar[bool] = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
         """The parameters."""

@@ -91,3 +91,37 @@ def test_mass_and_low_pass_are_not_exchanged_and_nothing_else_is_named(seed: int
     natural, spread, *_ = diagnosis.extended.of("natural_hz")
     assert abs(natural - 2215.6) < 5.0 * spread
     assert spread < 10.0
+
+
+def filtered(f: np.ndarray, corner: float) -> np.ndarray:
+    """A mass of 2475 Hz behind which a two-pole low-pass and a delay follow, as in digital sensors."""
+    w = 2.0 * np.pi * f
+    return transfer(f, 2475.0, 0.7) * signal.freqs(*signal.butter(2, 2.0 * np.pi * corner, analog=True), w)[1]
+
+
+def test_a_sweep_to_1_khz_states_no_natural_frequency_of_a_mass_behind_a_low_pass(rng: np.random.Generator) -> None:
+    """Mass with low-pass looks like a mass of 1.5 kHz with a delay: an adequate model is not the only one."""
+    f = 5.0 * 2.0 ** (np.arange(46) / 6.0)
+    diagnosis = diagnose_transfer(points(f, filtered(f, 1581.0), 1e-3, 1e-3, rng), highest_hz=10000.0)
+    natural = diagnosis.parameter("natural_hz")
+    assert diagnosis.adequate is True
+    assert not natural.identified
+    assert natural.low < 2475.0 < natural.high
+    assert natural.rival is not None
+    assert max(diagnosis.next_hz) > 1000.0
+
+
+def test_with_the_frequencies_that_are_proposed_the_natural_frequency_is_stated(rng: np.random.Generator) -> None:
+    f = 5.0 * 2.0 ** (np.arange(64) / 6.0)
+    natural = diagnose_transfer(points(f, filtered(f, 1581.0), 1e-3, 1e-3, rng)).parameter("natural_hz")
+    assert natural.identified
+    assert abs(natural.value - 2475.0) < 2.0 * natural.uncertainty < 100.0
+
+
+@pytest.mark.parametrize(("natural", "damping"), [(900.0, 0.05), (2406.0, 0.08), (1391.0, 0.42)])
+def test_a_resonance_far_below_the_highest_frequency_is_found(natural: float, damping: float) -> None:
+    """The magnitude falls to 1 % there, and every start is off by hundreds of uncertainties."""
+    f = 5.0 * 2.0 ** (np.arange(67) / 6.0)
+    fit = fit_transfer(points(f, transfer(f, natural, damping), 1e-3, 1e-3), ("second_order", "delay"))
+    assert fit.of("natural_hz")[0] == pytest.approx(natural, rel=1e-4)
+    assert fit.of("damping")[0] == pytest.approx(damping, rel=1e-3)

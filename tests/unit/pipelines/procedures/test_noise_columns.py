@@ -120,3 +120,6 @@ def test_flatness_has_the_scatter_of_a_median(rng: np.random.Generator) -> None:
         pulls.append((flatness.value + 1.0) / flatness.uncertainty)
     low, high = np.sqrt(chi2.ppf([0.005, 0.995], 999) / 999)
     assert low < np.std(pulls, ddof=1) < high
+    part.flat_to_hz = None  # without a band the roll-off itself would be the largest departure
+    figures = figures_of_transfer(part, lost, Points(conditions, value, error, error), None)
+    assert not next(one for one in figures if one.figure == "sweep_flatness_percent").identified

@@ -1,0 +1,78 @@
+"""The poses of two successive dwells stand in each other's row."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from inertial.estimation.alternative import Array, Handling, common_force
+from inertial.estimation.lot import Lot
+
+_APART = 0.05
+"""Distance of two forces, g, from which on their poses are different ones."""
+
+_OF_ONE = 1.25
+"""Factor within which the coefficient must be one: a part of the way between two poses is no exchange."""
+
+
+class PosesExchanged(Handling):
+    """Poses of two successive dwells that were written down in the wrong order, for all units: no coefficient but one."""
+
+    id: ClassVar[str] = "poses_exchanged"
+    symbol: ClassVar[str] = "a ↔ b"
+    equation: ClassVar[str] = "f_b − f_a in dwell a, the opposite in dwell b"
+    breaker: ClassVar[str] = "the log of the table, or both poses once more"
+
+    def places(self, lot: "Lot") -> list[dict[str, float]]:
+        """Each dwell whose successor has another pose; none where only the norm of the force is known."""
+        if lot.radial:
+            return []
+        step = np.linalg.norm(np.diff(common_force(lot), axis=-2), axis=-1).max(axis=0)
+        there = np.isfinite(lot.error).all(axis=-1).any(axis=0)
+        return [{"at": float(k)} for k in np.flatnonzero((step > _APART) & there[:-1] & there[1:])]
+
+    def change(self, lot: "Lot", slope: Array | None, **place: float) -> Array:
+        """What each of the two dwells has in place of its own force."""
+        first, force = int(place["at"]), common_force(lot)
+        column = np.zeros((*force.shape, 1))
+        column[:, first, :, 0] = force[:, first + 1] - force[:, first]
+        column[:, first + 1, :, 0] = force[:, first] - force[:, first + 1]
+        return column
+
+    def possible(self, size: Array) -> bool:
+        """Whether the two poses changed places entirely."""
+        return bool(1.0 / _OF_ONE < size[0] < _OF_ONE)
+
+    def describe(self, lot: "Lot", size: Array, **place: float) -> str:
+        """Which poses."""
+        force = common_force(lot)[0]
+        first = int(place["at"])
+        apart = np.degrees(np.arccos(np.clip(float(force[first] @ force[first + 1]), -1.0, 1.0)))
+        return f"the poses of this dwell and the next, {apart:.0f}° apart, were exchanged for all units; they are exchanged back"
+
+    def mended(self, lot: "Lot", size: Array, **place: float) -> "Lot | None":
+        """With the poses exchanged back."""
+        first = int(place["at"])
+        state = lot.state
+        order = np.arange(state.time.shape[1])
+        order[[first, first + 1]] = order[[first + 1, first]]
+
+        def turned(values: Array | None) -> Array | None:
+            return None if values is None else values[..., order]
+
+        return replace(
+            lot,
+            state=replace(
+                state,
+                force=state.force[..., order, :],
+                outer=turned(state.outer),
+                inner=turned(state.inner),
+                heading=turned(state.heading),
+                felt=None if state.felt is None else state.felt[..., order, :],
+                memory={},
+            ),
+        )
+
+    def dwells(self, lot: "Lot", **place: float) -> list[int]:
+        """Both."""
+        return [int(place["at"]), int(place["at"]) + 1]
