@@ -1,9 +1,9 @@
 """Hidden effects, found from the measurements alone: a small suite on every run of the tests, a large one in `make test-slow`."""
 
 import pytest
-from score import Score, score, table, text
-from truth import Run, case
 
+from benchmarks.score import Score, score, table, text
+from benchmarks.truth import Run, case
 from pipelines.diagnosis.diagnose import diagnose
 
 SEED = 5
@@ -12,8 +12,8 @@ SMALL = {
     "invisible": 1, "faults": 2, "bare_model": 1,
 }  # fmt: skip
 LARGE = {
-    "lot8_size2": 70, "lot8_size1": 70, "lot8_size4": 35, "single_size2": 60, "null_white": 60, "null_flicker": 60, "pairs": 35,
-    "triples": 25, "covariate_line": 15, "covariate_curve": 15, "withheld": 21, "invisible": 18, "faults": 32,
+    "lot8_size2": 40, "lot8_size1": 40, "single_size2": 30, "null_white": 30, "null_flicker": 30, "pairs": 20, "triples": 12,
+    "covariate_line": 5, "covariate_curve": 5, "withheld": 7, "invisible": 10, "faults": 16,
 }  # fmt: skip
 
 
@@ -52,8 +52,8 @@ def test_keeps_its_figures_over_hundreds_of_runs():
     assert shares["lots of 8: exact, size 2"] >= 93.0
     assert shares["lots of 8: exact, size 1"] >= 90.0
     assert shares["single units: exact, size 2"] >= 88.0
-    assert shares["null, white: an effect named"] <= 1.7
-    assert shares["null, strong 1/f: an effect named"] <= 1.7
+    assert shares["null, white: an effect named"] <= 3.4  # one of thirty
+    assert shares["null, strong 1/f: an effect named"] <= 3.4
     assert shares["two effects: exact"] >= 80.0
     assert shares["three effects: exact"] >= 60.0
     assert shares["invisible effect named"] == 0.0

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import pandas as pd
 from made_worlds import World, make
-from truth import case
 
 from benchmarks.hand_turned import make as turned_by_hand
 from benchmarks.made_recordings import Recording
 from benchmarks.made_recordings import make as recorded
 from benchmarks.strangers import make as made_by_strangers
+from benchmarks.truth import case
 
 # found by way of the worlds
 from continued_run import Blind, Continued  # isort: skip

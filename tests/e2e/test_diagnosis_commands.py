@@ -12,14 +12,11 @@ from capture_double import small_run
 from in_process import Given, given
 from pydantic import TypeAdapter
 
+from benchmarks.truth import Run, Spec, make_run
 from inertial import effects
 from pipelines.cli.documents.models import DemoDocument
 from pipelines.demo.measure import DemoLot, measure
 from pipelines.demo.scenes import scene
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
-
-from truth import Run, Spec, make_run
 
 KEYS = {
     "adequate",

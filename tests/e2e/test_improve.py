@@ -10,10 +10,7 @@ import pandas as pd
 import pytest
 from in_process import command
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
-
-from truth import Spec, make_run
-
+from benchmarks.truth import Spec, make_run
 from deploy.release import unpack
 from pipelines.cli import terminal
 from pipelines.jobs.model_files import read_model, versions

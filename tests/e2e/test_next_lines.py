@@ -7,7 +7,6 @@ The modules that print such commands are discovered: each has a case here, or it
 import ast
 import contextlib
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -200,8 +199,7 @@ def test_the_lines_after_an_investigation_name_the_judged_model(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_the_lines_after_an_improvement_decide_between_alternatives(tmp_path: Path) -> None:
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
-    from truth import Spec, make_run
+    from benchmarks.truth import Spec, make_run
 
     made = make_run(Spec(effects=("second_order",), sizes=(4.0,), plan="six", soaks="one", repeats=4, units=3), 5)
     made.dwells.to_parquet(tmp_path / "dwells.parquet")

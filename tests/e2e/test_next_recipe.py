@@ -1,17 +1,13 @@
 """`diagnose --next`: the proposed measurement as a recipe that `plan` accepts."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 from in_process import given
 from typer.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
-
-from truth import Spec, make_run
-
+from benchmarks.truth import Spec, make_run
 from pipelines.cli import app
 from pipelines.diagnosis.next_recipe import next_recipe
 from pipelines.jobs.job import Request

@@ -3,15 +3,12 @@
 import json
 import re
 import shlex
-import sys
 from pathlib import Path
 
 import pytest
 from in_process import Given, given
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blind"))
-
-from truth import Run, Spec, make_run
+from benchmarks.truth import Run, Spec, make_run
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,11 @@ RECORDS: list[tuple[Change, tuple[str, ...], str]] = [  # a change of the record
     (lambda t: t.rename(columns={"ax": "acc_x"}), (), "column 'ax' (for x) is not there; "),
     (lambda t: t.assign(ay=t.ay.where(t.index != 7)), (), "row 8 (line 9), column 'ay': found nan"),
     (lambda t: t.assign(az=t.az.where(t.index != 3, np.inf)), (), "row 4 (line 5), column 'az': found inf"),
-    (lambda t: t.assign(ax=t.ax.astype(str).where(t.index != 2, "much")), (), "row 3 (line 4), column 'ax': found much"),
+    (
+        lambda t: t.assign(ax=t.ax.astype(str).where(t.index != 2, "much")),
+        (),
+        "row 3 (line 4), column 'ax': found much",
+    ),
     (lambda t: t.iloc[::-1], (), "time runs back by 0.01 s"),
     (lambda t: t * [1.0, 9.81, 9.81, 9.81], (), "looks like m/s^2"),
 ]
