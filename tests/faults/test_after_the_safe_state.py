@@ -4,6 +4,8 @@ import json
 import os
 import random
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -17,6 +19,8 @@ from small_station import lot_of
 from schemas.errors import LeaseLost, OperatorNeeded, StationTimeout
 from stations.opening import open_station
 from stations.safety import folder
+from stations.safety.lease_parts import addresses
+from stations.safety.leases import Leases, new_holder
 
 QUICK_MOVES = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
 
@@ -96,14 +100,11 @@ def stopped_many_times(times, seed):
     assert not {"left_safe", "not_safe"} & set(kinds)
 
 
-def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes():
-    stopped_many_times(2, 11)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_no_order_comes_after_the_safe_state_in_a_hundred_stops_at_random_moments():
-    stopped_many_times(100, 12)
+@pytest.mark.parametrize(
+    ("times", "seed"), [(2, 11), pytest.param(30, 12, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])]
+)
+def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes(times, seed):
+    stopped_many_times(times, seed)
 
 
 @contextmanager
@@ -169,14 +170,16 @@ def test_what_a_run_finds_at_a_station_that_it_has_lost_is_not_why_it_ends():
         raise OperatorNeeded("inner axis: stands at 3 deg, 115 is needed; check load and brake of the table")
 
 
-def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state):
-    from stations.safety.lease_parts import addresses
-    from stations.safety.leases import Leases, new_holder
+def another(state, station):
+    """Leases of the same station, of another run."""
+    return Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
 
+
+def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state):
     with lost("now belongs to the other"), driven() as (station, plant, _):
         for path in (state / "leases").iterdir():
             path.unlink()
-        other = Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
+        other = another(state, station)
         other.take()
         try:
             with pytest.raises(LeaseLost):
@@ -188,22 +191,15 @@ def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state
 
 
 def test_leases_that_were_cleared_away_and_not_taken_are_held_on_to(state):
-    from stations.safety.lease_parts import addresses
-    from stations.safety.leases import Leases, new_holder
-
     with driven() as (station, _, _):
         for path in (state / "leases").iterdir():
             path.unlink()
         station.table.move(1.0, 1.0)
-        other = Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
         with pytest.raises(OperatorNeeded, match="driven by mine"):
-            other.take()
+            another(state, station).take()
 
 
 def test_what_the_network_could_not_deliver_is_dropped_with_its_connection():
-    import socket
-    import struct
-
     with driven() as (station, _, _):
         station.table.angles()
         connection = station.table.axes["outer"]._registers._link._link._wire._socket

@@ -1,14 +1,13 @@
 """Trouble at the station: reported by name, never passed over, and the rest goes on."""
 
-import socket
 import threading
-from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
 from each import each
 from pydantic import ValidationError
 from root_process import ROOT
+from small_server import answering
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
 from pipelines.capture.capture import capture
@@ -137,36 +136,15 @@ def test_a_write_whose_answer_is_lost_is_sent_once():
         link.close()
 
 
-@contextmanager
-def deaf_server():
-    """A server that takes requests and answers nothing; gives its port and the requests so far."""
-    got = bytearray()
-    with socket.create_server(("127.0.0.1", 0)) as server:
-
-        def listen():
-            with suppress(OSError):
-                while True:
-                    connection, _ = server.accept()
-                    with connection, suppress(ConnectionResetError):  # the client drops what was not delivered
-                        while part := connection.recv(256):
-                            got.extend(part)
-
-        thread = threading.Thread(target=listen, daemon=True)
-        thread.start()
-        yield server.getsockname()[1], got
-        server.shutdown(socket.SHUT_RDWR)
-    thread.join(5.0)
-
-
 def test_a_write_is_sent_once_and_a_read_as_often_as_allowed():
-    with deaf_server() as (port, got):
-        link = ModbusLink("127.0.0.1", port, timeout_s=0.2, read_attempts=2)
+    with answering(lambda _: b"") as (address, heard):
+        link = ModbusLink(*address, timeout_s=0.2, read_attempts=2)
         with pytest.raises(StationTimeout, match="no answer"):
             link.write(3, 2782, [0, 0], "set point")
-        assert got.count(bytes.fromhex("03100ade0002")) == 1
+        assert b"".join(heard).count(bytes.fromhex("03100ade0002")) == 1
         with pytest.raises(StationTimeout, match="no answer"):
             link.read(3, 2782, 2, "set point")
-        assert got.count(bytes.fromhex("03030ade0002")) == 2
+        assert b"".join(heard).count(bytes.fromhex("03030ade0002")) == 2
         link.close()
 
 

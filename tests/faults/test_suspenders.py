@@ -77,13 +77,10 @@ def test_a_chamber_that_loses_its_power_for_a_while_is_settled_anew():
 
 
 def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
-    with pytest.raises(
-        OperatorNeeded,
-        match=r"paused for 3\d\d s: the chamber's door is open, .*; correct it .* no measured record is lost",
-    ) as end:
-        run(
-            {"kind": "door", "at_s": DURING}, sink=(sink := MemorySink()), events=(events := MemoryLog()), limit_s=300.0
-        )
+    sink, events = MemorySink(), MemoryLog()
+    words = r"paused for 3\d\d s: the chamber's door is open, .*; correct it .* no measured record is lost"
+    with pytest.raises(OperatorNeeded, match=words) as end:
+        run({"kind": "door", "at_s": DURING}, sink=sink, events=events, limit_s=300.0)
     assert end.value.exit_status == 3
     assert end.value.condition.endswith("correct it")  # who is asked at the station gives no command
     assert sorted(sink.records) == [0]
