@@ -30,19 +30,11 @@ def answer(number: int) -> bytearray:
     return bytearray(struct.pack(">HHHBBB4H", number, 0, 11, UNIT, 3, 8, *TRUTH))
 
 
-def cut(rng, number):
-    return bytes(answer(number)[: int(rng.integers(19))])
-
-
 def one_field_wrong(rng, number):
     """A field of the envelope, or of the answer before its words, with any other value."""
-    frame, place = answer(number), int(rng.integers(9))
-    frame[place] ^= int(rng.integers(1, 256))
+    frame = answer(number)
+    frame[int(rng.integers(9))] ^= int(rng.integers(1, 256))
     return bytes(frame)
-
-
-def noise(rng, _number):
-    return rng.bytes(int(rng.integers(1, 300)))
 
 
 def another_count(rng, number):
@@ -60,29 +52,25 @@ def anothers_answer(rng, number):
     return struct.pack(">HHHBBB4H", other, 0, 11, UNIT, 3, 8, 1, 2, 3, 4)
 
 
-def a_confirmation(_rng, number):
-    return struct.pack(">HHHBBHH", number, 0, 6, UNIT, 16, ADDRESS, 4)
-
-
-def a_promise(rng, number):
-    """A length that says more, or less."""
-    frame = answer(number)
-    frame[4:6] = int(rng.integers(12, 65536)).to_bytes(2, "big")
-    return bytes(frame)
-
-
-def bytes_in_front(rng, number):
-    return rng.bytes(int(rng.integers(1, 20))) + bytes(answer(number))
-
-
-def a_short_body(rng, number):
-    return bytes(answer(number)[:9]) + rng.bytes(int(rng.integers(0, 8)))
+def noise(rng, _number):
+    return rng.bytes(int(rng.integers(1, 300)))
 
 
 ANSWERS = (
-    cut, one_field_wrong, noise, another_count, an_exception, anothers_answer, a_confirmation, a_promise, bytes_in_front,
-    a_short_body,
-)  # fmt: skip
+    one_field_wrong,
+    another_count,
+    an_exception,
+    anothers_answer,
+    noise,
+    lambda rng, number: bytes(answer(number)[: int(rng.integers(19))]),  # cut
+    lambda rng, number: bytes(answer(number)[:9]) + rng.bytes(int(rng.integers(0, 8))),  # with a short body
+    lambda rng, number: rng.bytes(int(rng.integers(1, 20))) + bytes(answer(number)),  # with bytes in front
+    # a length that says more, or less; the confirmation of a write
+    lambda rng, number: (
+        bytes(answer(number)[:4]) + rng.integers(12, 65536, dtype=">u2").tobytes() + bytes(answer(number)[6:])
+    ),
+    lambda _rng, number: struct.pack(">HHHBBHH", number, 0, 6, UNIT, 16, ADDRESS, 4),
+)
 
 
 @counts
@@ -174,11 +162,6 @@ def write_of(number, unit, address, words, told=None):
     return struct.pack(f">HHHBBHHB{n}H", number, 0, 7 + 2 * n, unit, 16, address, n, told, *words)
 
 
-def a_cut_write(rng, number):
-    whole = write_of(number, UNIT, 2782, [0, 0x41C8])
-    return whole[: int(rng.integers(len(whole)))]
-
-
 def another_function(rng, number):
     function = int(rng.choice([n for n in range(256) if n not in {5, 6, 15, 16, 22, 23}]))
     body = rng.bytes(int(rng.integers(0, 40)))
@@ -190,10 +173,9 @@ def a_write_of_contradictions(rng, number):
     return write_of(number, UNIT, 2782, words, told + (told >= 2 * len(words)))
 
 
-def a_write_that_may_not_be(rng, number):
-    """Half of a value, a read-only one, infinity, no number."""
-    wrong = [(2782, [0x41C8]), (2820, [0, 0x41C8]), (2782, [0, 0x7F80]), (2782, [0, 0x7FC0])]
-    return write_of(number, UNIT, *wrong[int(rng.integers(4))])
+def a_read_by_chance(rng, number):
+    address, count = (int(n) for n in rng.integers(0, 65536, 2))
+    return struct.pack(">HHHBBHH", number, 0, 6, int(rng.choice(UNITS)), int(rng.integers(1, 5)), address, count)
 
 
 def another_protocol(rng, number):
@@ -201,15 +183,17 @@ def another_protocol(rng, number):
     return struct.pack(">HHHBBHH", number, protocol, length, UNIT, 3, 2782, 2)
 
 
-def a_read_by_chance(rng, number):
-    address, count = (int(n) for n in rng.integers(0, 65536, 2))
-    return struct.pack(">HHHBBHH", number, 0, 6, int(rng.choice(UNITS)), int(rng.integers(1, 5)), address, count)
-
-
+# half of a value, a read-only one, infinity, no number
+FORBIDDEN = ((2782, [0x41C8]), (2820, [0, 0x41C8]), (2782, [0, 0x7F80]), (2782, [0, 0x7FC0]))
 REQUESTS = (
-    noise, a_cut_write, another_function, a_write_of_contradictions, a_write_that_may_not_be, another_protocol,
+    noise,
+    another_function,
+    a_write_of_contradictions,
     a_read_by_chance,
-)  # fmt: skip
+    another_protocol,
+    lambda rng, number: write_of(number, UNIT, 2782, [0, 0x41C8])[: int(rng.integers(17))],  # cut
+    lambda rng, number: write_of(number, UNIT, *FORBIDDEN[int(rng.integers(4))]),
+)
 
 
 @counts

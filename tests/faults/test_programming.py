@@ -37,7 +37,6 @@ from schemas.fault import FaultOrder
 from stations.codec import Value
 from stations.devices.memory import UnitMemory
 from stations.opening import serve_plant
-from stations.plant.plant import Plant
 from stations.profile_files import load_profile
 from stations.safety.suspenders import EmergencyStop
 
@@ -67,13 +66,6 @@ def job_of(run: Run) -> Job:
 def copies(run: Run, unit: int = 0) -> list[bytes]:
     plant = plant_of(run, job_of(run))
     return [struct.pack(">192H", *plant.flash[unit].read(copy, plant.now_us)) for copy in (0, 1)]
-
-
-def with_fault(run: Run, kind: str, **figures: float) -> None:
-    def prepare(plant: Plant) -> None:
-        plant.inject(FaultOrder(kind=kind, serial="A1", figures=figures, at_s=0.0))
-
-    keep_state(run, job_of(run), prepare)
 
 
 def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
@@ -328,11 +320,14 @@ def test_the_guide_prints_what_the_command_prints(run: Run, monkeypatch: pytest.
     assert str(LENGTH) in guide
 
 
-def test_nothing_is_written_while_the_emergency_stop_is_pressed(run: Run) -> None:
+@pytest.mark.parametrize(("kind", "refusal"), [("emergency_stop", EmergencyStop), ("door", OperatorNeeded)])
+def test_nothing_is_written_while_the_emergency_stop_is_pressed_or_the_door_open(
+    run: Run, kind: str, refusal: type[OperatorNeeded]
+) -> None:
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
-    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="emergency_stop", at_s=0.0)))
-    with pytest.raises(EmergencyStop):
+    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind=kind, at_s=0.0)))
+    with pytest.raises(refusal):
         programmed(run, ("A1",))
     assert programming(run.archive.root, "A1") == []
     assert ledger.valid_at("A1", today()) is not None
@@ -418,23 +413,13 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
     assert given == {"A1": f"A1/{written.certificate}"}
 
 
-def test_an_open_door_is_refused_before_the_first_write_and_ends_the_verification(run: Run) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
-    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="door", at_s=0.0)))
-    with pytest.raises(OperatorNeeded, match="door is open"):
-        programmed(run, ("A1",))
-    assert programming(run.archive.root, "A1") == []
-    assert ledger.valid_at("A1", today()) is not None
-
-    def later(plant: Plant) -> None:
-        plant.inject(FaultOrder(kind="door", at_s=plant.now + 6.0))
-
-    keep_state(run, job_of(run), later)
+def test_a_door_that_is_opened_ends_the_verification(run: Run) -> None:
+    certify(Ledger(run.archive.root), run, ["A1"])
+    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="door", at_s=plant.now + 6.0)))
     with pytest.raises(OperatorNeeded, match="door is open"):
         programmed(run, ("A1",))
     assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "failed"]
-    assert ledger.valid_at("A1", today()) is None
+    assert Ledger(run.archive.root).valid_at("A1", today()) is None
 
 
 def test_a_failure_that_cannot_be_recorded_hides_neither_its_cause_nor_the_other_units(

@@ -37,8 +37,10 @@ while not os.path.exists(sys.argv[1] + "/reached"):
 open(sys.argv[1] + "/safe", "w").close()
 """
 WORKER = """
-import subprocess, sys, time
+import os, subprocess, sys, time
 subprocess.Popen([sys.executable, "-c", sys.argv[2], sys.argv[1]], start_new_session=True)
+while not os.path.exists(sys.argv[1] + "/watches"):
+    time.sleep(0.01)
 time.sleep(float(sys.argv[3]))
 sys.exit(7)
 """
