@@ -12,15 +12,14 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from driven_station import ROOT, told, with_last_breath
+from driven_station import ROOT, leases_of, told, with_last_breath
+from long_suites import rounds
 from served_station import modbus_station, moves_ordered, served_plant
 from small_station import lot_of
 
 from schemas.errors import LeaseLost, OperatorNeeded, StationTimeout
 from stations.opening import open_station
 from stations.safety import folder
-from stations.safety.lease_parts import addresses
-from stations.safety.leases import Leases, new_holder
 
 QUICK_MOVES = {"speed_deg_s": 90.0, "acceleration_deg_s2": 200.0}
 
@@ -101,7 +100,7 @@ def stopped_many_times(times, seed):
 
 
 @pytest.mark.parametrize(
-    ("times", "seed"), [(2, 11), pytest.param(30, 12, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])]
+    ("times", "seed"), [(2, 11), pytest.param(rounds(30, 100), 12, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
 )
 def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes(times, seed):
     stopped_many_times(times, seed)
@@ -170,16 +169,11 @@ def test_what_a_run_finds_at_a_station_that_it_has_lost_is_not_why_it_ends():
         raise OperatorNeeded("inner axis: stands at 3 deg, 115 is needed; check load and brake of the table")
 
 
-def another(state, station):
-    """Leases of the same station, of another run."""
-    return Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
-
-
 def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state):
     with lost("now belongs to the other"), driven() as (station, plant, _):
         for path in (state / "leases").iterdir():
             path.unlink()
-        other = another(state, station)
+        other = leases_of(station.config, "the other")
         other.take()
         try:
             with pytest.raises(LeaseLost):
@@ -196,7 +190,7 @@ def test_leases_that_were_cleared_away_and_not_taken_are_held_on_to(state):
             path.unlink()
         station.table.move(1.0, 1.0)
         with pytest.raises(OperatorNeeded, match="driven by mine"):
-            another(state, station).take()
+            leases_of(station.config, "the other").take()
 
 
 def test_what_the_network_could_not_deliver_is_dropped_with_its_connection():

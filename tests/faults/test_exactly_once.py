@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from long_suites import rounds
 from other_devices import station_with
 from small_station import lot_of, plant_of
 
@@ -88,7 +89,9 @@ def run_many(drive: str, runs: int, seed: int):
     return tries, spoilt
 
 
-@pytest.mark.parametrize("runs", [3, pytest.param(150, marks=[pytest.mark.slow, pytest.mark.timeout(900)])])
+@pytest.mark.parametrize(
+    "runs", [3, pytest.param(rounds(150, 334), marks=[pytest.mark.slow, pytest.mark.timeout(1800)])]
+)
 @pytest.mark.parametrize("drive", DRIVES)
 def test_nothing_moves_twice_under_a_bad_network(drive, runs):
     tries, spoilt = run_many(drive, runs, seed=3)  # refuses any run in which an axis was not moved exactly once

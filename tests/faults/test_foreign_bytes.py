@@ -9,10 +9,11 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from long_suites import rounds
 
 HERE = Path(__file__).parent
 SEED = 20261122
-FEW, MANY = 150, 4000
+FEW, MANY = 150, rounds(4000, 10_000)
 HANG_S = 120.0  # of wall time without a word from the worker, on a machine that others use as well
 LONGEST_MESSAGE = 1000
 

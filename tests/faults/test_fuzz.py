@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from long_suites import rounds
 from small_station import lot_of, plant_of
 
 from schemas.errors import StationError
@@ -19,7 +20,7 @@ from stations.plant.server import PlantServer
 
 TRUTH = [0x41B8, 0x0000, 0x1234, 0xFFFF]
 UNIT, ADDRESS, UNITS = 3, 2780, (1, 3, 10, 11, 77, 255)
-FEW, MANY = 2000, 30_000
+FEW, MANY = 2000, rounds(30_000, 100_000)
 counts = pytest.mark.parametrize(
     "frames", [FEW, pytest.param(MANY, marks=[pytest.mark.slow, pytest.mark.timeout(1800)])]
 )

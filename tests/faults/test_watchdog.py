@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from driven_station import FAR, HOT, SLOW, SOON_S, driver, look, safe_within, told
+from driven_station import FAR, HOT, SLOW, SOON_S, driver, leases_of, look, safe_within, told
 from served_station import modbus_station, served
 from small_station import lot_of
 
@@ -20,12 +20,7 @@ from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.safety import SAFE_WITHIN_S
 from stations.opening import open_devices, open_station
 from stations.safety import folder
-from stations.safety.lease_parts import addresses
-from stations.safety.leases import Leases, holders, new_holder
-
-
-def leases_of(state, config, run="a", lapse_s=10.0, name="served"):
-    return Leases(state, new_holder(name, run), addresses(config), lapse_s)
+from stations.safety.leases import holders
 
 
 @pytest.fixture(autouse=True)
@@ -88,9 +83,9 @@ def test_a_drive_that_is_asked_again_and_again_goes_on():
             assert outer.moving()
 
 
-def test_a_holder_that_stood_still_is_refused_when_it_wakes(state):
+def test_a_holder_that_stood_still_is_refused_when_it_wakes():
     config = modbus_station(1)
-    leases = leases_of(state, config, lapse_s=0.05)
+    leases = leases_of(config, lapse_s=0.05)
     leases.take()
     leases.require()
     time.sleep(0.1)
@@ -121,14 +116,14 @@ def test_a_station_that_is_driven_is_refused_with_who_drives_it():
             pytest.fail("two drive one station")
 
 
-def test_two_files_that_name_one_device_share_its_lease(state):
+def test_two_files_that_name_one_device_share_its_lease():
     ours = modbus_station(4000, host="127.0.0.1")
     theirs = modbus_station(4001, host="localhost").model_copy(update={"name": "another"})
     chamber = ours.devices.chamber.model_copy(update={"host": "localhost"})
     theirs = theirs.model_copy(update={"devices": theirs.devices.model_copy(update={"chamber": chamber})})
-    first = leases_of(state, ours)
+    first = leases_of(ours)
     first.take()
-    second = leases_of(state, theirs, "b", name="another")
+    second = leases_of(theirs, "b", name="another")
     with pytest.raises(OperatorNeeded, match=r"the chamber at 127\.0\.0\.1:4000/3 is driven by a "):
         second.take()
     assert second.held() == []  # all or none
@@ -137,11 +132,11 @@ def test_two_files_that_name_one_device_share_its_lease(state):
     second.release()
 
 
-def test_devices_that_share_a_place_need_one_lease(state):
+def test_devices_that_share_a_place_need_one_lease():
     config = modbus_station(4000)
     same = config.devices.outer
     both = config.model_copy(update={"devices": config.devices.model_copy(update={"inner": same})})
-    leases = leases_of(state, both)
+    leases = leases_of(both)
     leases.take()
     assert set(leases.held()) == {"outer", "chamber", "reader"}
     leases.release()
@@ -149,7 +144,7 @@ def test_devices_that_share_a_place_need_one_lease(state):
 
 def foreign(state, config, **about):
     """Lease files as another holder, gone or far away, has left them."""
-    leases = leases_of(state, config, "theirs")
+    leases = leases_of(config, "theirs")
     leases.take()
     leases.hand_over()
     for path in (state / "leases").glob("*.json"):
@@ -161,7 +156,7 @@ def test_a_lease_of_a_dead_process_is_free_at_once(state):
     with subprocess.Popen([sys.executable, "-c", ""]) as process:
         process.wait()
     foreign(state, config, pid=process.pid)
-    mine = leases_of(state, config, "mine")
+    mine = leases_of(config, "mine")
     mine.take()
     assert folder.read_log(state)[0]["event"] == "lease_taken_over"
     mine.release()
@@ -170,7 +165,7 @@ def test_a_lease_of_a_dead_process_is_free_at_once(state):
 def test_a_lease_of_another_machine_is_free_when_its_heart_has_stopped_for_a_minute(state):
     config = modbus_station(4000)
     foreign(state, config, host="elsewhere")
-    mine = leases_of(state, config, "mine")
+    mine = leases_of(config, "mine")
     with pytest.raises(OperatorNeeded, match=r"on elsewhere since .* free at the latest 60 s"):
         mine.take()
     for path in (state / "leases").glob("*.json"):
@@ -184,7 +179,7 @@ def test_leases_are_taken_by_one_of_many(state):
     won, lost, start = [], [], threading.Barrier(8)
 
     def compete(number):
-        leases = leases_of(state, config, f"run {number}")
+        leases = leases_of(config, f"run {number}")
         start.wait()
         try:
             leases.take()
@@ -204,7 +199,7 @@ def test_leases_are_taken_by_one_of_many(state):
 
 def test_a_lease_survives_that_somebody_clears_its_folder(state):
     config = modbus_station(4000)
-    leases = leases_of(state, config)
+    leases = leases_of(config)
     leases.take()
     for path in (state / "leases").glob("*.json"):
         path.unlink()
