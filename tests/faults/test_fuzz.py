@@ -53,6 +53,13 @@ def anothers_answer(rng, number):
     return struct.pack(">HHHBBB4H", other, 0, 11, UNIT, 3, 8, 1, 2, 3, 4)
 
 
+def a_promise(rng, number):
+    """A length that says more, or less."""
+    frame = answer(number)
+    frame[4:6] = int(rng.integers(12, 65536)).to_bytes(2, "big")
+    return bytes(frame)
+
+
 def noise(rng, _number):
     return rng.bytes(int(rng.integers(1, 300)))
 
@@ -66,11 +73,8 @@ ANSWERS = (
     lambda rng, number: bytes(answer(number)[: int(rng.integers(19))]),  # cut
     lambda rng, number: bytes(answer(number)[:9]) + rng.bytes(int(rng.integers(0, 8))),  # with a short body
     lambda rng, number: rng.bytes(int(rng.integers(1, 20))) + bytes(answer(number)),  # with bytes in front
-    # a length that says more, or less; the confirmation of a write
-    lambda rng, number: (
-        bytes(answer(number)[:4]) + rng.integers(12, 65536, dtype=">u2").tobytes() + bytes(answer(number)[6:])
-    ),
-    lambda _rng, number: struct.pack(">HHHBBHH", number, 0, 6, UNIT, 16, ADDRESS, 4),
+    a_promise,
+    lambda _rng, number: struct.pack(">HHHBBHH", number, 0, 6, UNIT, 16, ADDRESS, 4),  # the confirmation of a write
 )
 
 
