@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from pysindy import STLSQ
 from scipy.stats import f as f_distribution
 from sklearn.linear_model import LassoCV
-from truth import Run
+
+from benchmarks.truth import Run
 
 Floats = NDArray[np.float64]
 ALPHA = 0.01

@@ -26,11 +26,12 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     )  # before the import of numpy: threads of two processes would compete for two cores
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "blind")]
+sys.path.insert(0, str(ROOT))
 
 import pandas as pd  # noqa: E402
-from score import Score, score, table, text  # noqa: E402
-from truth import SCENARIOS, Run, case  # noqa: E402
+
+from benchmarks.score import Score, score, table, text  # noqa: E402
+from benchmarks.truth import SCENARIOS, Run, case  # noqa: E402
 
 Answer = tuple[dict[str, Any], float | None]  # the document, and the RMS error of the fresh run after extension, µg
 Method = Callable[[Run], Answer]

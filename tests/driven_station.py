@@ -13,6 +13,8 @@ from small_station import lot_of
 
 from stations.opening import open_devices
 from stations.safety import folder
+from stations.safety.lease_parts import addresses
+from stations.safety.leases import Leases, new_holder
 
 ROOT = Path(__file__).resolve().parents[1]
 HOT, FAR = 60.0, 170.0
@@ -52,6 +54,11 @@ def with_last_breath(process):
         process.send_signal(signal.SIGCONT)
         process.kill()
     process.wait(10.0)
+
+
+def leases_of(config, run="a", lapse_s=10.0, name="served", role="run"):
+    """Leases on the devices of a station for a run."""
+    return Leases(folder.state_folder(), new_holder(name, run, role), addresses(config), lapse_s)
 
 
 def look(config):

@@ -85,9 +85,9 @@ def _worlds() -> dict[str, tuple[tuple[str, ...], int]]:
 
 def generators() -> list[Path]:
     """Files that make the truths: where one changes, lots are made anew."""
-    folders = (HERE / "worlds", HERE / "strangers", HERE.parent / "tests" / "blind")
+    folders = (HERE / "worlds", HERE / "strangers", HERE / "truth")
     files = [path for folder in folders for path in sorted(folder.glob("*.py")) if not path.name.startswith("test_")]
-    files = [*files, HERE / "made_recordings.py", HERE / "hand_turned.py", HERE / "shock_and_spin.py"]
+    files += [HERE / name for name in ("score.py", "made_recordings.py", "hand_turned.py", "shock_and_spin.py")]
     for path in files:
         ast.parse(path.read_text("utf-8"))  # a generator that is being edited is no truth
     return files

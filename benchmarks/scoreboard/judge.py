@@ -88,7 +88,7 @@ def worlds(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
 
 
 def blind(product: Path, lots: Path) -> Callable[[str, str, int], Outcome]:
-    """Blind lots of ``tests/blind``."""
+    """Blind lots of ``benchmarks/truth``."""
     module = _loaded(ROOT / "benchmarks" / "blind.py", "blind")
     sys.path.insert(0, str(product))
     make = module.case

@@ -1,9 +1,9 @@
 """Hidden effects, found from the measurements alone: a small suite on every run of the tests, a large one in `make test-slow`."""
 
 import pytest
-from score import Score, score, table, text
-from truth import Run, case
 
+from benchmarks.score import Score, score, table, text
+from benchmarks.truth import Run, case
 from pipelines.diagnosis.diagnose import diagnose
 
 SEED = 5

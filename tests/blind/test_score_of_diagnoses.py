@@ -2,8 +2,9 @@
 
 import pytest
 from each import each
-from score import score, table, text, wilson
-from truth import Fault, Hidden, Spec, Truth
+
+from benchmarks.score import score, table, text, wilson
+from benchmarks.truth import Fault, Hidden, Spec, Truth
 
 
 def hidden(name, scope="sensor", *, visible=True):

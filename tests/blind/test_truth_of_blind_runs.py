@@ -6,18 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from each import each
-from truth import REGISTRY, SCENARIOS, Spec, case, make_run
+from scipy.signal import welch
+from scipy.spatial.transform import Rotation
 
-CATALOGUE = [
-    "second_order", "scale_asymmetry", "fourth_order", "third_order", "odd_quadratic", "bias_asymmetry",
-    "fifth_order", "cross_coupling", "cross_axis_quadratic", "adc_nonlinearity", "dead_zone", "clipping",
-    "bias_temperature", "bias_temperature_quadratic", "bias_temperature_cubic", "scale_temperature",
-    "scale_temperature_quadratic", "misalignment_temperature", "second_order_temperature", "thermal_rate",
-    "thermal_lag", "thermal_hysteresis", "thermal_kink", "warm_up", "aging_linear", "scale_aging", "aging_log",
-    "step_change", "creep_after_move", "pose_hysteresis", "vibration_rectification", "supply_sensitivity",
-    "magnetic", "level_error", "outer_encoder_offset", "encoder_harmonic", "axis_nonorthogonality", "backlash",
-    "slot_rotation", "gravity_value",
-]  # fmt: skip
+from benchmarks.truth import REGISTRY, SCENARIOS, Spec, case, make_run
+from benchmarks.truth.chain import specific_force
+from benchmarks.truth.memory import lag, play, preisach, relaxation
+from benchmarks.truth.noise import flicker_series
+from benchmarks.truth.physics import Table
+from benchmarks.truth.poses import PLANS
+from benchmarks.truth.scenarios import FAULT_NAMES
+from inertial import effects
+
 EXCHANGE = {
     "unit", "dwell", "slot", "time_s", "out_x", "out_y", "out_z", "sd_x", "sd_y", "sd_z", "outer_deg",
     "inner_deg", "n", "duration_s", "unit_C", "chamber_C", "since_move_s", "since_power_s", "supply_V",
@@ -54,23 +54,25 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def test_hides_physics_for_every_effect_of_the_catalogue():
-    assert set(CATALOGUE) == {name for name in REGISTRY if not name.startswith("withheld:")}
+def test_hides_physics_for_forty_effects_of_the_catalogue():
+    hidden = {name for name in REGISTRY if not name.startswith("withheld:")}
+    assert len(hidden) == 40
+    assert hidden <= set(effects.built_in())
 
 
-@pytest.mark.parametrize(
-    "effect", ["cross_coupling", "thermal_hysteresis", "creep_after_move", "backlash", "clipping", "level_error"]
-)
-@pytest.mark.parametrize("size", [0.5, 2.0])
-def test_effect_has_the_size_that_was_asked_for(effect, size):
+@each(["cross_coupling", "thermal_hysteresis", "creep_after_move", "backlash", "clipping", "level_error"])
+def test_effect_has_the_size_that_was_asked_for(effect):
     plain = {"plan": "fibonacci24", "soaks": "nine", "units": 3}
-    run, without = make_run(Spec(effects=(effect,), sizes=(size,), **plain), 4), make_run(Spec(**plain), 4)
-    added = 1e6 * (run.dwells[OUTPUTS].to_numpy() - without.dwells[OUTPUTS].to_numpy())
-    assert rms(residuals(run.dwells, added, thermal=True)) / run.sealed.floor_ug == pytest.approx(size, rel=0.01)
+    without = make_run(Spec(**plain), 4)
+    for size in (0.5, 2.0):
+        run = make_run(Spec(effects=(effect,), sizes=(size,), **plain), 4)
+        added = 1e6 * (run.dwells[OUTPUTS].to_numpy() - without.dwells[OUTPUTS].to_numpy())
+        assert rms(residuals(run.dwells, added, thermal=True)) / run.sealed.floor_ug == pytest.approx(size, rel=0.01)
 
 
-@pytest.mark.parametrize(("flicker", "walk"), [(0.0, 0.0), (2.0, 0.0), (0.5, 1.0)])
-def test_null_run_has_the_noise_it_claims(flicker, walk):
+@each([(0.0, 0.0), (2.0, 0.0), (0.5, 1.0)])
+def test_null_run_has_the_noise_it_claims(row):
+    flicker, walk = row
     run = make_run(Spec(flicker=flicker, walk=walk), 8)
     left = residuals(run.dwells, 1e6 * run.dwells[OUTPUTS].to_numpy(), thermal=True)
     assert rms(left) <= run.sealed.floor_ug
@@ -149,3 +151,65 @@ def test_refuses_a_scenario_it_does_not_know_and_effects_without_sizes():
         case("lots", 0, 0)
     with pytest.raises(ValueError, match="one size per effect"):
         Spec(effects=("third_order",))
+
+
+@each(FAULT_NAMES)
+def test_fault_changes_its_own_unit_only_and_leaves_the_fresh_run_clean(fault):
+    plain = {"plan": "twenty_six", "soaks": "five", "units": 5, "device": "counts"}
+    run, clean = make_run(Spec(faults=(fault,), **plain), 3), make_run(Spec(**plain), 3)
+    (truth,) = run.sealed.faults
+    assert truth.fault == fault
+    assert fault in truth.accepted
+    for unit, rows in clean.dwells.groupby("unit"):
+        of_unit = run.dwells[run.dwells["unit"] == unit].reset_index(drop=True)
+        assert of_unit.equals(rows.reset_index(drop=True)) == (unit not in truth.units)
+    assert run.fresh.equals(clean.fresh)
+    held = run.dwells[(run.dwells["unit"] == truth.units[0]) & run.dwells["dwell"].isin(truth.dwells)]
+    if fault == "stuck_output":
+        assert (held["out_x"].nunique(), set(held["sd_x"])) == (1, {0.0})
+    if fault == "swapped_dwells":
+        gap = (run.dwells[OUTPUTS] - clean.dwells[OUTPUTS]).abs().sum(axis=1)
+        assert np.count_nonzero(gap) == 2
+
+
+# -- operators with memory, geometry and noise ---------------------------------------------------------------------------
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def test_force_follows_the_two_rotations_of_the_table_and_poses_are_of_unit_length():
+    outer, inner = np.radians([[30.0, 75.0, -120.0], [10.0, 200.0, 45.0]])
+    turns = [Rotation.from_euler("x", a) * Rotation.from_euler("z", b) for a, b in zip(outer, inner, strict=True)]
+    assert np.allclose(specific_force(Table(outer, inner, UP), 1)[0], [turn.inv().apply(UP) for turn in turns])
+    for plan in PLANS.values():
+        force = specific_force(Table(*np.radians(plan).T, UP), 1)[0]
+        assert np.allclose(np.linalg.norm(force, axis=1), 1.0)
+
+
+def test_lag_play_and_relays_remember_as_their_physics_says():
+    ramp = np.arange(4000.0) * 5.0
+    assert (ramp - lag(ramp, 120.0, 5.0))[-1] == pytest.approx(120.0, rel=0.03)
+    way = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.3, 50)])
+    assert play(way, 0.1)[[49, -1]] == pytest.approx([0.9, 0.4])
+    up = np.linspace(-1.0, 1.0, 200)
+    out = preisach(np.concatenate([up, up[::-1], up])[None], -0.95, 0.95)[0]
+    assert out[200] == pytest.approx(out[-1])  # the loop closes
+    assert out[300] - out[500] > 0.2  # and has an area
+
+
+def test_relaxation_dies_out_after_the_move():
+    force = np.zeros((1, 2, 3))
+    force[0, :, 0] = 1.0
+    times = (np.array([0.0, 0.0]), np.array([10.0, 10.0]), np.array([60.0, 60.0]), np.array([20.0]))
+    left = relaxation(force, np.zeros((1, 3)), *times)
+    assert left[0, 0, 0] == pytest.approx(2.0 * (1.0 - np.exp(-0.5)))
+    assert left[0, 1, 0] == pytest.approx(left[0, 0, 0] * np.exp(-3.0))
+
+
+@each([True, False])
+def test_flicker_has_a_spectrum_that_falls_as_one_over_f(fractional):
+    series = flicker_series(np.random.default_rng(1), 64, 4096, fractional=fractional)
+    frequency, power = welch(series, nperseg=2048)
+    band = (frequency > 0.004) & (frequency < 0.1)
+    slope = np.polyfit(np.log(frequency[band]), np.log(power.mean(axis=0)[band]), 1)[0]
+    assert slope == pytest.approx(-1.0, abs=0.1)

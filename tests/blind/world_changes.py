@@ -1,17 +1,12 @@
 """What is done to the dwells of rows of the world table, and what is asked of a verdict besides."""
 
-import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from world_row import Check, MadeLot
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "worlds"))
-
-from world import Made
-
-Check = Callable[[dict, Made], bool]
+from benchmarks.hand_turned import EFFECTS
 
 
 def raised(dwells: pd.DataFrame, unit: int, axis: str, size: float, dwells_from: int = 0, until: int = 999) -> None:
@@ -117,7 +112,7 @@ def last_unit_amplifies(dwells: pd.DataFrame) -> pd.DataFrame:
     return dwells
 
 
-def gain_step_is_certain(document: dict, made: Made) -> bool:
+def gain_step_is_certain(document: dict, made: MadeLot) -> bool:
     (group,) = document["classes"]
     alone = group["effects"] == ["gain_step"] and len(made.dwells["unit"].unique()) > 1
     placed = not alone or group["units"] == [made.dwells["unit"].max()]
@@ -127,7 +122,7 @@ def gain_step_is_certain(document: dict, made: Made) -> bool:
 def step_before(dwell: int) -> Check:
     """The step lies in the gap before a dwell, and nothing else stands beside it."""
 
-    def step_in_its_gap(document: dict, made: Made) -> bool:
+    def step_in_its_gap(document: dict, made: MadeLot) -> bool:
         (group,) = document["classes"]
         own = made.dwells[made.dwells["unit"] == made.dwells["unit"].iloc[0]].sort_values("dwell")
         after = own["time_s"] + 0.5 * own["duration_s"] > group["nonlinear"]["instant"]
@@ -137,49 +132,49 @@ def step_before(dwell: int) -> Check:
     return step_in_its_gap
 
 
-def pose_missed_at_the_step(document: dict, _: Made) -> bool:
+def pose_missed_at_the_step(document: dict, _: MadeLot) -> bool:
     return [g["dwells"] for g in document["classes"] if g["effects"] == ["wrong_pose"]] == [[72]]
 
 
-def no_dwell_is_removed(document: dict, _: Made) -> bool:
+def no_dwell_is_removed(document: dict, _: MadeLot) -> bool:
     return document["removed"] is None or document["removed"]["dwells"] == []
 
 
-def left_out_dwells_judge(document: dict, _: Made) -> bool:
+def left_out_dwells_judge(document: dict, _: MadeLot) -> bool:
     groups = document["classes"]
     better = all(g["heldout_after_ug"] < min(g["heldout_before_ug"], 4.0 * g["rms_after_ug"]) for g in groups)
     return better and len(groups) == 2 and groups[1]["effects"] == ["misalignment_temperature"]
 
 
-def walk_is_known(document: dict, _: Made) -> bool:
+def walk_is_known(document: dict, _: MadeLot) -> bool:
     # soaks that only climb hide any hysteresis that is narrower than their steps
     (dark,) = (row for row in document["unseen_in_part"] if row["effect"] == "thermal_hysteresis")
     narrow = dark["parameter"] == "half_width" and abs(dark["from"] - 1.0) < 1e-6 and 15.0 < dark["to"] < 35.0
     return document["error"]["walk_share"] > 100.0 and narrow
 
 
-def small_and_seen(document: dict, _: Made) -> bool:
+def small_and_seen(document: dict, _: MadeLot) -> bool:
     # a fifth of the noise of a dwell about the record's mean, most of which is walk: 20 of 116 µg, p below 1e-10
     return document["classes"][0]["size_ug"] < 0.2 * document["error"]["floor_ug"]
 
 
-def carried_by_the_dwell(document: dict, _: Made) -> bool:
+def carried_by_the_dwell(document: dict, _: MadeLot) -> bool:
     (group,) = document["classes"]
     return document["influence"][0] == {"unit": group["units"][0], "dwell": group["dwells"][0], "share": 1.0}
 
 
-def three_soaks_are_said(document: dict, _: Made) -> bool:
+def three_soaks_are_said(document: dict, _: MadeLot) -> bool:
     # with three soaks an offset of one is, beside linear terms, an offset of another: all three are said
     evidence = document["classes"][0]["evidence"]
     return "0.5" in evidence and evidence.count("K off in soak") == 3
 
 
-def time_constant_is_right(document: dict, _: Made) -> bool:
+def time_constant_is_right(document: dict, _: MadeLot) -> bool:
     tau = float(document["classes"][0]["evidence"].split("time constant of ")[1].split(" s")[0])
     return abs(tau - 300.0) <= 30.0 and document["error"]["rms_ug"] < 1.2 * document["error"]["floor_ug"]
 
 
-def both_faults_stand(document: dict, made: Made) -> bool:
+def both_faults_stand(document: dict, made: MadeLot) -> bool:
     moved, dwell = made.faults
     by_name = {group["effects"][0]: group for group in document["classes"]}
     told, carried = by_name["unit_moved"], {row["unit"] for row in by_name["unit_moved"]["influence"]}
@@ -187,20 +182,20 @@ def both_faults_stand(document: dict, made: Made) -> bool:
     return stands and by_name["bad_dwell"]["dwells"] == list(dwell.dwells)
 
 
-def verdict_is_carried(document: dict, _: Made) -> bool:
+def verdict_is_carried(document: dict, _: MadeLot) -> bool:
     group, shares = document["classes"][0], [row["share"] for row in document["influence"]]
     better = group["heldout_after_ug"] < group["heldout_before_ug"]
     spread = 0 < len(shares) <= 8 and all(0.0 < share < 0.5 for share in shares)
     return better and spread and document["without_influence"]["p_value"] < 1e-6
 
 
-def from_one_dwell(document: dict, made: Made) -> bool:
+def from_one_dwell(document: dict, made: MadeLot) -> bool:
     (group,), (told,) = document["classes"], made.faults
     said = f"{told.units[0]} and {told.units[1]}: exchanged before this dwell"
     return group["dwells"] == [told.dwells[0]] and group["evidence"].startswith(said)
 
 
-def jump_has_place_and_size(document: dict, made: Made) -> bool:
+def jump_has_place_and_size(document: dict, made: MadeLot) -> bool:
     (group,) = document["classes"]
     placed = (group["units"], group["dwells"]) == ([made.dwells["unit"].unique()[-1]], [40])
     if group["effects"][0] != "bias_jump":
@@ -211,7 +206,7 @@ def jump_has_place_and_size(document: dict, made: Made) -> bool:
 def unsteady(*units: str) -> Check:
     """The units whose bias is unsteady are told, each with its sizes from a line over temperature."""
 
-    def check(document: dict, _: Made) -> bool:
+    def check(document: dict, _: MadeLot) -> bool:
         groups = document["classes"]
         told = sorted(group["units"][0] for group in groups if "bias_unsteady" in group["effects"])
         sizes = [abs(float(group["evidence"].split("(")[1].split(" µg")[0].split(", ")[1])) for group in groups]
@@ -220,46 +215,98 @@ def unsteady(*units: str) -> Check:
     return check
 
 
-def some_unsteady(document: dict, _: Made) -> bool:
+def some_unsteady(document: dict, _: MadeLot) -> bool:
     return any({"bias_unsteady", "bias_jump"} & set(group["effects"]) for group in document["classes"])
 
 
-def jumps_are_told(document: dict, _: Made) -> bool:
+def jumps_are_told(document: dict, _: MadeLot) -> bool:
     told = {dwell for group in document["classes"] for dwell in group["dwells"]}
     told |= {row["dwell"] for row in document["removed"]["dwells"]}
     return bool(told & {0, 1}) and told >= {32, 42}
 
 
-def no_reference_step(document: dict, _: Made) -> bool:
+def no_reference_step(document: dict, _: MadeLot) -> bool:
     return not any("reference_step" in group["effects"] for group in document["classes"])
 
 
-def not_exchanged(document: dict, _: Made) -> bool:
+def not_exchanged(document: dict, _: MadeLot) -> bool:
     return not any("units_swapped" in group["effects"] for group in document["classes"])
 
 
-def of_the_pose(document: dict, made: Made) -> bool:
+def of_the_pose(document: dict, made: MadeLot) -> bool:
     rows = made.dwells.loc[same_pose(made.dwells), "dwell"]
     return sorted(dwell for group in document["classes"] for dwell in group["dwells"]) == sorted(rows)
 
 
-def noise_beside_the_dependence(document: dict, made: Made) -> bool:
+def noise_beside_the_dependence(document: dict, made: MadeLot) -> bool:
     # a dwell in which the dependence is largest may stand out by itself
     named = [group["effects"] for group in document["classes"] if group["effects"] != ["bad_dwell"]]
     return named == [] and document["error"]["floor_ug"] < 1.3 * made.floor_ug < document["error"]["rms_ug"]
 
 
-def tails_are_listed(document: dict, _: Made) -> bool:
+def tails_are_listed(document: dict, _: MadeLot) -> bool:
     return document["removed"] is None or document["removed"]["heavy_tails"] is True
 
 
-def reason_names_every_unit(document: dict, _: Made) -> bool:
+def reason_names_every_unit(document: dict, _: MadeLot) -> bool:
     return "every unit (2)" in document["reason"]
 
 
-def noise_of_the_lot(document: dict, made: Made) -> bool:
+def noise_of_the_lot(document: dict, made: MadeLot) -> bool:
     return abs(document["error"]["rms_ug"] - made.floor_ug) <= 0.4 * made.floor_ug
 
 
-def step_with_hysteresis(document: dict, _: Made) -> bool:
+def step_with_hysteresis(document: dict, _: MadeLot) -> bool:
     return any({"thermal_hysteresis", "step_change"} <= set(group["effects"]) for group in document["classes"])
+
+
+def pivot_is_in_the_class(document: dict, _: MadeLot) -> bool:
+    classes = [(set(group["effects"]), group["scope"]) for group in document["classes"]]
+    return classes == [({"bias_asymmetry", "dead_zone"}, "sensor")]
+
+
+def memory_is_judged_on_dwells_left_out(document: dict, _: MadeLot) -> bool:
+    (group,) = document["classes"]
+    near_the_noise = group["heldout_after_ug"] < 1.1 * document["error"]["floor_ug"]
+    return near_the_noise and group["heldout_after_ug"] < 0.6 * group["heldout_before_ug"]
+
+
+def told_with_its_bias_and_without_physics(document: dict, made: MadeLot) -> bool:
+    told = {group["effects"][0]: group for group in document["classes"] if group["scope"] == "data"}
+    (seated,) = made.faults
+    of_the_unit = all(group["units"] == list(seated.units) for group in told.values())
+    # what the devices really have, where the plan has one temperature
+    physics = set(document["recommended"]) - {"bias_temperature", "scale_temperature"}
+    found = set(told) == {"unit_moved", "bias_step"} and of_the_unit and not physics
+    return found and abs(told["bias_step"]["dwells"][0] - min(seated.dwells)) <= 1
+
+
+def linear_coefficients_are_named(document: dict, _: MadeLot) -> bool:
+    return sorted(document["recommended"]) == ["bias_temperature", "scale_temperature"]
+
+
+def may_be_of_the_station(document: dict, _: MadeLot) -> bool:
+    return {group["scope"] for group in document["classes"]} - {"data"} == {"sensor or station"}
+
+
+def right_of(effect: str) -> Check:
+    """The one class has a name that is right for an effect of a unit turned by hand, which is recommended."""
+
+    def right_effect_is_named(document: dict, _: MadeLot) -> bool:
+        right = EFFECTS[effect][3]
+        named = [bool(right & set(group["effects"])) for group in document["classes"]]
+        return named == [True] and bool(right & set(document["recommended"]))
+
+    return right_effect_is_named
+
+
+def one_class_is_named(document: dict, _: MadeLot) -> bool:
+    return len(document["classes"]) == 1
+
+
+def bad_dwell_is_the_spoilt_one(document: dict, made: MadeLot) -> bool:
+    return tuple(document["classes"][0]["dwells"]) == made.faults[0].dwells
+
+
+def pose_is_the_driver(document: dict, _: MadeLot) -> bool:
+    return [one["driver"] for one in document["where"]] == ["pose"]

@@ -1,14 +1,20 @@
-"""A row of the world table: a world, what is done to its dwells, and what has to be said."""
+"""A row of the world table: a world of any generator, what is done to its dwells, and what has to be said."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import pandas as pd
-from world_changes import Check
+from made_worlds import World, make
 
-# found by way of the changes
-from continued_run import Blind  # isort: skip
-from world import World  # isort: skip
+from benchmarks.hand_turned import make as turned_by_hand
+from benchmarks.made_recordings import Recording
+from benchmarks.made_recordings import make as recorded
+from benchmarks.strangers import make as made_by_strangers
+from benchmarks.truth import case
+
+# found by way of the worlds
+from continued_run import Blind, Continued  # isort: skip
+from faults import Told  # isort: skip
 
 
 @dataclass(frozen=True)
@@ -17,6 +23,57 @@ class Case:
 
     scenario: str
     index: int
+
+
+@dataclass(frozen=True)
+class Strange:
+    """A lot of the generator that knows nothing of the judge: its kind, and the size of what is hidden in noises of a dwell."""
+
+    kind: str
+    size: float = 2.0
+
+
+@dataclass(frozen=True)
+class Hand:
+    """One unit turned by hand, with an effect of ten times the noise."""
+
+    effect: str
+
+
+AnyWorld = World | Blind | Case | Strange | Hand | Recording
+
+
+@dataclass(frozen=True)
+class MadeLot:
+    """Dwells of any generator, with what was done to them."""
+
+    dwells: pd.DataFrame
+    history: pd.DataFrame | None = None
+    faults: tuple[Told, ...] = ()
+    floor_ug: float = float("nan")
+
+
+def made(world: AnyWorld, seed: int) -> MadeLot:
+    """The lot of a world."""
+    if isinstance(world, World):
+        lot = make(world, seed)
+        return MadeLot(lot.dwells, lot.history, lot.faults, lot.floor_ug)
+    if isinstance(world, Blind):
+        return MadeLot(*Continued(world, seed).tables())
+    if isinstance(world, Case):
+        run = case(world.scenario, world.index, seed)
+        return MadeLot(run.dwells, run.history if run.sealed.spec.history else None)
+    if isinstance(world, Strange):
+        strange = made_by_strangers(world.kind, seed, size=world.size)
+        told = Told((), tuple(strange.truth.get("units", ())), tuple(strange.truth.get("dwells", ())))
+        return MadeLot(strange.dwells, strange.history, (told,))
+    if isinstance(world, Hand):
+        return MadeLot(turned_by_hand(world.effect, seed))
+    recording = recorded(world, seed)
+    return MadeLot(recording.dwells, None, (Told(("bad_dwell",), (), recording.spoilt),))
+
+
+Check = Callable[[dict, MadeLot], bool]
 
 
 @dataclass(frozen=True)
@@ -30,7 +87,7 @@ class Row:
     unexplained : drivers of which one is told; empty: nothing is unexplained
     """
 
-    world: World | Blind | Case
+    world: AnyWorld
     seed: int
     label: str
     first: tuple[str, ...] | None = None

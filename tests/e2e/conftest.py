@@ -12,8 +12,7 @@ from root_process import ROOT
 from pipelines.archive import Archive
 from pipelines.archive.signatures import VARIABLE
 
-for _folder in ("tests/blind", "benchmarks/worlds"):  # the generators of lots with something hidden in them
-    sys.path.insert(0, str(ROOT / _folder))
+sys.path.insert(0, str(ROOT / "benchmarks/worlds"))  # a generator of lots with something hidden in them
 
 
 @pytest.fixture(scope="package", autouse=True)

@@ -18,7 +18,8 @@ from pipelines.jobs.recipes import load_recipe
 from schemas.errors import RecipeInvalid
 
 from physics import OUTSIDE  # isort: skip
-from truth import Spec, make_run  # isort: skip
+from benchmarks.truth import Spec, make_run
+
 from world import World, make  # isort: skip
 
 PLAIN = "bias,scale,misalignment"

@@ -12,13 +12,12 @@ from each import each
 from in_process import document_of, given, refused, text_of
 from root_process import ROOT
 
+from benchmarks.truth import Spec, make_run
 from deploy.release import unpack
 from pipelines.cli import terminal
 from pipelines.demo.measure import DemoLot, measure
 from pipelines.demo.scenes import scene
 from pipelines.jobs.model_files import read_model, versions
-
-from truth import Spec, make_run  # isort: skip
 
 PLAIN = "bias,scale,misalignment"
 PAGE = "docs/how-to/improve-a-model.md"

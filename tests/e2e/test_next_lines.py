@@ -17,10 +17,9 @@ from in_process import document_of, given, text_of, typed_document
 from root_process import ROOT
 from typed_commands import printed_commands
 
+from benchmarks.truth import Run, Spec, make_run
 from pipelines.archive import Archive
 from pipelines.cli.history import removal
-
-from truth import Run, Spec, make_run  # isort: skip
 
 HERE = "tests/e2e/test_next_lines.py::"
 ELSEWHERE = {

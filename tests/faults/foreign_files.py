@@ -5,7 +5,6 @@
 tells a JSON line per mutation that it begins and one for what came of it, so that whoever waits knows what killed or held it up.
 """
 
-import datetime as dt
 import decimal
 import gzip
 import io
@@ -30,54 +29,12 @@ TABLES = 4  # of the readers: dwells, raw, recording, history
 
 # -- mutations ------------------------------------------------------------------------------------------------------------
 
-WORDS = [
-    b"nan",
-    b"inf",
-    b"-inf",
-    b"1e300",
-    b"-1e300",
-    b"9e302",
-    b"1e-320",
-    b"9" * 5000,
-    b"0x" + b"f" * 6000,
-    b"-1",
-    b"0",
-    b"1e18",
-    b"-400.0",
-    b"true",
-    b"True",
-    b"null",
-    b"..",
-    b" ",
-    b"",
-    b"=cmd|x",
-    "\u0410\u0412\u0421".encode(),
-    b"\x00",
-    b"\xff\xfe",
-    b"\xef\xbb\xbf",
-    b'"',
-    b"'",
-    b"[" * 3000,
-    b"{" * 3000,
-    b"[[" * 2000,
-    b"a." * 3000 + b"b = 1",
-    b"x" * 70000,
-    b"$\\frac{x$",
-    b"\n",
-    b"\r",
-    b",",
-    b";",
-    b"\t",
-    b"\\",
-    b"\xe2\x80\xae",
-    b"2026-01-01T00:00:00",
-    b"99999999999999999999",
-    b"4294967295",
-    b"1,2,3",
-    b"n/a",
-    b"1_000",
-    b"\xd9\xa3",
-]
+PLAIN = b"nan inf -inf 1e300 -1e300 9e302 1e-320 -1 0 1e18 -400.0 true True null .. =cmd|x \x00 \xff\xfe \xef\xbb\xbf"
+PLAIN += (
+    b" \" ' $\\frac{x$ , ; \\ \xe2\x80\xae 2026-01-01T00:00:00 99999999999999999999 4294967295 1,2,3 n/a 1_000 \xd9\xa3"
+)
+LONG = [b"9" * 5000, b"0x" + b"f" * 6000, b"[" * 3000, b"{" * 3000, b"[[" * 2000, b"a." * 3000 + b"b = 1", b"x" * 70000]
+WORDS = [*PLAIN.split(b" "), *LONG, b"", b" ", b"\n", b"\r", b"\t", "\u0410\u0412\u0421".encode()]
 NUMBER = re.compile(rb"-?\d+\.?\d*(?:e-?\d+)?")
 
 
@@ -87,12 +44,10 @@ def _word(rng):
 
 def _place(rng, data):
     """Anywhere; often near the end, where Parquet has its footer, or the beginning."""
-    n = max(len(data), 1)
-    return (
-        int(rng.integers(n))
-        if rng.random() < 0.6
-        else int(min(rng.geometric(1 / 200), n) - 1 if rng.random() < 0.4 else n - min(rng.geometric(1 / 300), n))
-    )
+    n, chance = max(len(data), 1), rng.random()
+    if chance < 0.6:
+        return int(rng.integers(n))
+    return int(min(rng.geometric(1 / 200), n) - 1 if chance < 0.76 else n - min(rng.geometric(1 / 300), n))
 
 
 def flip(rng, data):
@@ -105,11 +60,8 @@ def flip(rng, data):
 
 def other_bytes(rng, data):
     at, n = _place(rng, data), int(rng.choice([1, 2, 4, 8, 16]))
-    return (
-        data[:at]
-        + (rng.bytes(n) if rng.random() < 0.6 else bytes([int(rng.choice([0, 255, 127, 128]))]) * n)
-        + data[at + n :]
-    )
+    new = rng.bytes(n) if rng.random() < 0.6 else bytes([int(rng.choice([0, 255, 127, 128]))]) * n
+    return data[:at] + new + data[at + n :]
 
 
 def cut(rng, data):
@@ -180,42 +132,22 @@ def retyped(rng, ending, data):
     frame = pd.read_parquet(io.BytesIO(data)) if ending == ".parquet" else raw()
     n = len(frame)
     numbers = np.arange(n)
+    stamp, text = pd.Timestamp("2026-01-01"), ["=cmd|x", None, [1.0, 2.0], {"a": 1}, b"\xff", "x" * 70000]
     new = [
-        numbers % 2 == 0,
-        numbers + 0.5j if ending == ".mat" else numbers,
-        pd.Timestamp("2026-01-01") + pd.to_timedelta(numbers, unit="ms"),
-        pd.to_timedelta(numbers, unit="us"),
-        [decimal.Decimal(int(k)) for k in numbers],
-        [str(k) for k in numbers],
-        ["=cmd|x"] * n,
-        [None] * n,
-        [[1.0, 2.0]] * n,
-        [{"a": 1}] * n,
-        [b"\xff"] * n,
-        numbers.astype(np.int8),
-        numbers.astype(np.uint64) + 2**63,
-        numbers * 1e300,
-        np.full(n, np.nan),
-        np.full(n, np.inf),
-        -1.0 * numbers,
+        *(np.full(n, value) for value in (np.nan, np.inf, -400.0, 0.0, 1.8e18)),
+        *(numbers % 2 == 0, -1.0 * numbers, numbers[::-1], numbers * 1e300, numbers.astype(np.int8)),
+        *(numbers + 0.5j if ending == ".mat" else numbers, numbers.astype(np.uint64) + 2**63),
+        *(stamp + pd.to_timedelta(numbers, unit="ms"), pd.to_timedelta(numbers, unit="us")),
+        *([value] * n for value in (*text, stamp.date(), stamp.time())),
+        *([decimal.Decimal(int(k)) for k in numbers], [str(k) for k in numbers], [f"A{k}" * 300 for k in numbers]),
+        *(pd.array([value, None] * n, dtype=kind)[:n] for value, kind in ((1, "Int64"), (True, "boolean"))),
         pd.Categorical([str(k % 3) for k in numbers]),
-        numbers[::-1],
-        [f"A{k}" * 300 for k in numbers],
-        [dt.date(2026, 1, 1)] * n,
-        [dt.time(1, 2, 3)] * n,
-        np.full(n, -400.0),
-        np.zeros(n),
-        ["x" * 70000] * n,
-        pd.array([1, None] * n, dtype="Int64")[:n],
-        pd.array([True, None] * n, dtype="boolean")[:n],
-        np.full(n, 1.8e18),
     ]
     column = str(rng.choice(list(frame.columns)))
     frame = frame.assign(**{column: new[int(rng.integers(len(new)))]}) if rng.random() < 0.85 else frame
     if rng.random() < 0.2:
-        frame = frame.rename(
-            columns={column: str(rng.choice(["", "x" * 300, "a\nb", "__index_level_0__", "record", "unit", "n"]))}
-        )
+        names = ["", "x" * 300, "a\nb", "__index_level_0__", "record", "unit", "n"]
+        frame = frame.rename(columns={column: str(rng.choice(names))})
     if rng.random() < 0.2:
         frame = frame.head(int(rng.integers(0, 3)))
     try:

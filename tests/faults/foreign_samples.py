@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.io import savemat, wavfile
+from root_process import ROOT
+from scipy.io import savemat
 
 from pipelines.archive import files as archive_files
 from pipelines.audit.rules import load_rules
+from pipelines.export.waveforms import WRITERS, Channel, write_waveforms
 from pipelines.importers import exchange, files, inspection, mapping, record
 from pipelines.importers.values import BOUNDS, LARGEST
 from pipelines.jobs.model_files import read_model
@@ -25,7 +27,6 @@ from schemas.serials import is_serial
 from schemas.station import load_station
 from schemas.toml_files import read_text
 
-ROOT = Path(__file__).resolve().parents[2]
 MODEL = """[model]
 name = "line"
 version = 2
@@ -153,77 +154,29 @@ def samples():
 
 
 def recordings_of_others():
-    """A small recording in every format whose library is installed."""
+    """A small recording in every format that is written, as text of other programs, and of R."""
     frame = raw().drop(columns="heat")
     rows = "\n".join(";".join(f"{value:.6f}" for value in row) for row in frame.to_numpy()).replace(".", ",")
-    names = list(frame)
-    lvm = "\n".join("\t".join(f"{value:.6f}" for value in row) for row in frame.to_numpy())
-    head = "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\n***End_of_Header***\nChannels\t3\nDelta_X\t0.1\t0.1\t0.1\n"
+    stamps = (pd.Timestamp("2026-01-01") + pd.to_timedelta(frame["t"], unit="s")).dt.strftime("%d.%m.%Y %H:%M:%S.%f")
     recordings = [
-        (".csv", f"Recorder: R-9\nStarted;12:00\n\n{';'.join(names)}\n{rows}\n".encode()),
+        (".csv", f"Recorder: R-9\nStarted;12:00\n\n{';'.join(frame)}\n{rows}\n".encode()),
         (".csv", "\ufeff0;1;2;3\n".encode("utf-8") + rows.encode()),
-        (".lvm", (head + "***End_of_Header***\nX_Value\tax\tay\taz\tComment\n" + lvm + "\n").encode()),
+        (".csv", csv(frame.assign(t=stamps))),
     ]
-    sink = io.BytesIO()
-    wavfile.write(sink, 10, (20000 * frame[["ax", "ay", "az"]].to_numpy()).astype(np.int16))
-    recordings.append((".wav", sink.getvalue()))
-    stamped = frame.assign(
-        t=(pd.Timestamp("2026-01-01") + pd.to_timedelta(frame["t"], unit="s")).dt.strftime("%d.%m.%Y %H:%M:%S.%f")
-    )
-    recordings.append((".csv", csv(stamped)))
-    for make in (_hdf5, _tdms, _uff, _rdata):
+    channels = [Channel(name, "g", "A1", frame[name].to_numpy(), 0.1, k) for k, name in enumerate(("ax", "ay", "az"))]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.rda"
         with contextlib.suppress(ImportError):
-            recordings.append(make(frame))
+            import rdata
+
+            rdata.write_rda(path, {"imu": frame.astype("float64")}, compression=None)
+            recordings.append((".rda", path.read_bytes()))
+        for form, writer in WRITERS.items():
+            path = path.with_suffix(writer.SUFFIX)
+            with contextlib.suppress(ImportError, TumblelineError):  # its library is not installed
+                write_waveforms(form, channels, path)
+                recordings.append((writer.SUFFIX, path.read_bytes()))
     return recordings
-
-
-def _hdf5(frame):
-    import h5py
-
-    sink = io.BytesIO()
-    with h5py.File(sink, "w") as file:
-        for name in frame:
-            file.create_dataset(
-                f"imu/{name}", data=frame[name].to_numpy(), compression="gzip" if name == "ay" else None
-            )
-    return ".h5", sink.getvalue()
-
-
-def _tdms(frame):
-    import nptdms
-
-    sink = io.BytesIO()
-    with nptdms.TdmsWriter(sink) as writer:
-        writer.write_segment(
-            [
-                nptdms.ChannelObject("log", name, frame[name].to_numpy(), properties={"unit_string": "g"})
-                for name in frame
-            ]
-        )
-    return ".tdms", sink.getvalue()
-
-
-def _uff(frame):
-    import pyuff
-
-    with tempfile.TemporaryDirectory() as folder:
-        file = pyuff.UFF(str(Path(folder) / "a.uff"))
-        for number, name in enumerate(("ax", "ay", "az")):
-            one = {"type": 58, "func_type": 1, "rsp_node": 1, "rsp_dir": number + 1, "ref_node": 0, "ref_dir": 0, "id1": name,
-                   "data": frame[name].to_numpy(), "x": frame["t"].to_numpy(), "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
-                   "abscissa_spacing": 1, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 12,
-                   "ordinate_axis_units_lab": "g", "orddenom_spec_data_type": 0, "abscissa_inc": 0.1, "abscissa_min": 0.0,
-                   "num_pts": len(frame), "ord_data_type": 4, "binary": 0}  # fmt: skip
-            file.write_sets(one, "add" if number else "overwrite")
-        return ".uff", (Path(folder) / "a.uff").read_bytes()
-
-
-def _rdata(frame):
-    import rdata
-
-    with tempfile.TemporaryDirectory() as folder:
-        rdata.write_rda(Path(folder) / "a.rda", {"imu": frame.astype("float64")}, compression=None)
-        return ".rda", (Path(folder) / "a.rda").read_bytes()
 
 
 # -- readers, with the rules that whatever is accepted keeps --------------------------------------------------------------

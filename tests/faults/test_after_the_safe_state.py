@@ -4,13 +4,16 @@ import json
 import os
 import random
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
 
 import pytest
-from driven_station import ROOT, told, with_last_breath
+from driven_station import ROOT, leases_of, told, with_last_breath
+from long_suites import rounds
 from served_station import modbus_station, moves_ordered, served_plant
 from small_station import lot_of
 
@@ -96,14 +99,11 @@ def stopped_many_times(times, seed):
     assert not {"left_safe", "not_safe"} & set(kinds)
 
 
-def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes():
-    stopped_many_times(2, 11)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_no_order_comes_after_the_safe_state_in_a_hundred_stops_at_random_moments():
-    stopped_many_times(100, 12)
+@pytest.mark.parametrize(
+    ("times", "seed"), [(2, 11), pytest.param(rounds(30, 100), 12, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
+)
+def test_no_order_comes_after_the_safe_state_when_a_run_that_stood_still_wakes(times, seed):
+    stopped_many_times(times, seed)
 
 
 @contextmanager
@@ -170,13 +170,10 @@ def test_what_a_run_finds_at_a_station_that_it_has_lost_is_not_why_it_ends():
 
 
 def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state):
-    from stations.safety.lease_parts import addresses
-    from stations.safety.leases import Leases, new_holder
-
     with lost("now belongs to the other"), driven() as (station, plant, _):
         for path in (state / "leases").iterdir():
             path.unlink()
-        other = Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
+        other = leases_of(station.config, "the other")
         other.take()
         try:
             with pytest.raises(LeaseLost):
@@ -188,22 +185,15 @@ def test_a_run_whose_leases_were_cleared_away_and_taken_sends_nothing_more(state
 
 
 def test_leases_that_were_cleared_away_and_not_taken_are_held_on_to(state):
-    from stations.safety.lease_parts import addresses
-    from stations.safety.leases import Leases, new_holder
-
     with driven() as (station, _, _):
         for path in (state / "leases").iterdir():
             path.unlink()
         station.table.move(1.0, 1.0)
-        other = Leases(state, new_holder("served", "the other"), addresses(station.config), 10.0)
         with pytest.raises(OperatorNeeded, match="driven by mine"):
-            other.take()
+            leases_of(station.config, "the other").take()
 
 
 def test_what_the_network_could_not_deliver_is_dropped_with_its_connection():
-    import socket
-    import struct
-
     with driven() as (station, _, _):
         station.table.angles()
         connection = station.table.axes["outer"]._registers._link._link._wire._socket

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from each import each
+from root_process import ROOT
 from stopped_capture import Stopped, Stopping
 
 from pipelines.archive import Archive
@@ -65,11 +67,10 @@ def test_the_units_feel_the_acceleration_of_the_radius_that_was_ordered(machine)
     far = machine.spin(RATE, 1, 1.0, [0, 1], 0.5)
     near = machine.spin(RATE, 1, 1.0, [0, 1], 0.3)
     for slot in (0, 1):
-        output = [one.outputs[slot][:, 2].mean() / 0.007 for one in (far, near)]
+        output = [recording.outputs[slot][:, 2].mean() / 0.007 for recording in (far, near)]
         assert output[0] - output[1] == pytest.approx(20.0 * (0.5 / 0.3 - 1.0), rel=0.02)
-    assert machine.spin(RATE, 1, 1.0, [0, 1]).outputs[0][:, 2].mean() == pytest.approx(
-        near.outputs[0][:, 2].mean(), rel=1e-4
-    )  # where no radius is ordered it stays
+    again = machine.spin(RATE, 1, 1.0, [0, 1])  # where no radius is ordered it stays
+    assert again.outputs[0][:, 2].mean() == pytest.approx(near.outputs[0][:, 2].mean(), rel=1e-4)
 
 
 def test_a_mounting_that_is_not_confirmed_asks_for_the_operator_and_goes_on_afterwards(
@@ -85,10 +86,15 @@ def test_a_mounting_that_is_not_confirmed_asks_for_the_operator_and_goes_on_afte
     assert np.mean(recording.outputs[0][:, 2]) < 0.0
 
 
+def without_radius(monkeypatch: pytest.MonkeyPatch, of: type) -> None:
+    """A machine that cannot be told the radius."""
+    has = of.has
+    monkeypatch.setattr(of, "has", lambda self, name: name != "radius" and has(self, name))
+
+
 def test_a_device_without_a_command_for_the_radius_is_not_told(machine, monkeypatch: pytest.MonkeyPatch) -> None:
     heard = orders(monkeypatch)
-    has = type(machine.values).has
-    monkeypatch.setattr(type(machine.values), "has", lambda self, name: name != "radius" and has(self, name))
+    without_radius(monkeypatch, type(machine.values))
     machine.spin(400.0, 1, 0.5, [0, 1], 0.3)
     assert not any("radius" in line for line, _ in heard)
 
@@ -172,34 +178,28 @@ def test_a_capture_at_two_radii_that_stops_goes_on_bit_for_bit(tmp_path: Path) -
     assert taken(tmp_path / "broken", more)[1].hash() == whole.hash()
 
 
-@pytest.mark.parametrize(
-    ("more", "text"),
+@each(
     [
         ("radii_m = [0.5, 0.3]\nradius_m = 0.5\n", "one of them is needed"),
         ("radii_m = [0.5, 0.501]\n", "closer than 2 %"),
         ("radii_m = [0.5]\n", "radii_m"),
         ("radii_m = [0.5, 0.3]\nradius_um = 0.0\n", "state radius_um"),
-    ],
+    ]
 )
-def test_radii_that_separate_nothing_are_refused(more: str, text: str, tmp_path: Path) -> None:
+def test_radii_that_separate_nothing_are_refused(row: tuple[str, str], tmp_path: Path) -> None:
+    more, text = row
     with pytest.raises(RecipeInvalid, match=text):
         parts_of(recipe_of(tmp_path, more))
 
 
-def test_two_radii_need_a_centrifuge_that_can_be_told_the_radius(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_sample_of_two_radii_can_be_performed_by_a_centrifuge_that_can_be_told_the_radius(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    recipe = recipe_of(tmp_path, "radii_m = [0.5, 0.3]\n")
-    refuse_unusable(recipe, load_station())
-    has = Profile.has
-    monkeypatch.setattr(Profile, "has", lambda self, name: name != "radius" and has(self, name))
-    with pytest.raises(RecipeInvalid, match="no command 'radius'"):
-        refuse_unusable(recipe, load_station())
-
-
-def test_the_sample_of_two_radii_can_be_performed_and_its_limits_are_of_its_figures() -> None:
-    path = Path(__file__).resolve().parents[2] / "deploy" / "recipes" / "procedures" / "centrifuge_two_radii.toml"
+    path = ROOT / "deploy" / "recipes" / "procedures" / "centrifuge_two_radii.toml"
     recipe = load_recipe(str(path))
     refuse_unusable(recipe, load_station())
     assert parts_of(recipe)[0].radii == (0.5, 0.3)
     assert set(load_limits(recipe, path.parent).figures) <= set(figures_of_recipe(recipe))
+    without_radius(monkeypatch, Profile)
+    with pytest.raises(RecipeInvalid, match="no command 'radius'"):
+        refuse_unusable(recipe, load_station())

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from pipelines.archive import Archive
+from pipelines.archive import Archive, Run
 from pipelines.capture.capture import capture
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Job
@@ -34,13 +34,22 @@ PARTS = {
 }  # fmt: skip
 
 
-def recipe_of(folder: Path, name: str):
+def recipe_of(folder: Path, name: str, more: str = ""):
     path = folder / "recipe.toml"
     path.write_text(
         'name = "trouble"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n'
-        f'soak_min_s = 1.0\nallow_short_soak = true\n[[procedures]]\nkind = "{name}"\n{PARTS[name]}\n'
+        f'soak_min_s = 1.0\nallow_short_soak = true\n[[procedures]]\nkind = "{name}"\n{PARTS[name]}\n{more}'
     )
     return load_recipe(str(path))
+
+
+def graded(folder: Path, recipe, figure: str, limit: float, *faults: FaultOrder) -> Run:
+    """A run of the recipe with one limit, up to its grades."""
+    limits = limits_of({"name": "one", "figures": {figure: {"max": limit, "unit": UNITS[figure]}}}, UNITS)
+    runner = Runner(Job(recipe, limits, lot(), with_faults(load_station(), list(faults))), Archive(folder / "archive"))
+    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "budget", "procedures", "grade"):
+        runner.stage(stage)
+    return runner.run
 
 
 def lot() -> Lot:
@@ -52,8 +61,7 @@ def take(folder: Path, name: str, faults: list[FaultOrder], archive: str):
     recipe = recipe_of(folder, name)
     with open_station(with_faults(load_station(), faults), lot(), roles=roles_of(recipe)) as station:
         capture(station, recipe, lot(), records, progress=silent, events=records.events)
-        after = station.equipment
-    assert after
+        assert station.equipment
     return records
 
 
@@ -120,49 +128,37 @@ def test_trouble_that_stays_ends_the_run_for_a_person(name: str, kind: str, text
         take(tmp_path, name, [FaultOrder(kind=kind)], "bad")
 
 
-@pytest.mark.parametrize("name", ["sweep", "shock", "centrifuge", "step_response", "transverse", "random_vibration"])
-def test_a_unit_whose_cable_is_off_has_no_figure(name: str, tmp_path: Path) -> None:
-    recipe = recipe_of(tmp_path, name)
-    figure = {
-        "sweep": "sweep_bandwidth_hz",
-        "shock": "shock_sensitivity_percent",
-        "centrifuge": "centrifuge_linearity_percent",
-        "step_response": "step_settling_ms",
-        "transverse": "transverse_sensitivity_percent",
-        "random_vibration": "vibration_rectification_ug_g2",
-    }
-    limits = limits_of({"name": "one", "figures": {figure[name]: {"max": 1e9, "unit": UNITS[figure[name]]}}}, UNITS)
-    station = with_faults(load_station(), [FaultOrder(kind="cable_off", serial="F2")])
-    runner = Runner(Job(recipe, limits, lot(), station), Archive(tmp_path / "archive"))
-    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "budget", "procedures", "grade"):
-        runner.stage(stage)
-    figures = runner.run.table("procedure_figures")
-    own = figures[figures["figure"] == figure[name]].set_index("unit")
-    assert bool(own.loc["F1", "identified"]) or name == "sweep"
-    assert not own.loc["F2", "identified"]
-    assert np.isnan(own.loc["F2", "value"])
-    assert runner.run.table("grades").set_index("unit").loc["F2", "outcome"] == "fail"
+@pytest.mark.parametrize(
+    ("name", "figure"),
+    [
+        ("sweep", "sweep_bandwidth_hz"),
+        ("shock", "shock_sensitivity_percent"),
+        ("centrifuge", "centrifuge_linearity_percent"),
+        ("step_response", "step_settling_ms"),
+        ("transverse", "transverse_sensitivity_percent"),
+        ("random_vibration", "vibration_rectification_ug_g2"),
+    ],
+)
+def test_a_unit_whose_cable_is_off_has_no_figure(name: str, figure: str, tmp_path: Path) -> None:
+    run = graded(tmp_path, recipe_of(tmp_path, name), figure, 1e9, FaultOrder(kind="cable_off", serial="F2"))
+    figures = run.table("procedure_figures")
+    of_units = figures[figures["figure"] == figure].set_index("unit")
+    assert bool(of_units.loc["F1", "identified"]) or name == "sweep"
+    assert not of_units.loc["F2", "identified"]
+    assert np.isnan(of_units.loc["F2", "value"])
+    assert run.table("grades").set_index("unit").loc["F2", "outcome"] == "fail"
 
 
 def test_a_shock_beyond_the_sheets_limit_changes_the_unit_for_good(tmp_path: Path) -> None:
-    PARTS["hard"] = PARTS["shock"] + "\npeak_g = 14000.0\nduration_ms = 0.5"
-    path = tmp_path / "recipe.toml"
-    path.write_text(
-        'name = "trouble"\ndevice = "SF1500"\nlocal_gravity_m_s2 = 9.80665\ntemperatures_C = [25.0]\n'
-        f'soak_min_s = 1.0\nallow_short_soak = true\n[[procedures]]\nkind = "shock"\n{PARTS.pop("hard")}\n'
-    )
-    recipe = load_recipe(str(path))
-    limits = limits_of({"name": "one", "figures": {"shock_bias_shift_ug": {"max": 5000.0, "unit": "µg"}}}, UNITS)
-    runner = Runner(Job(recipe, limits, lot(), load_station()), Archive(tmp_path / "archive"))
-    for stage in ("capture", "validate", "reduce", "fit", "verify", "noise", "budget", "procedures", "grade"):
-        runner.stage(stage)
-    figures = runner.run.table("procedure_figures").set_index(["unit", "figure"])
+    recipe = recipe_of(tmp_path, "shock", "peak_g = 14000.0\nduration_ms = 0.5\n")
+    run = graded(tmp_path, recipe, "shock_bias_shift_ug", 5000.0)
+    figures = run.table("procedure_figures").set_index(["unit", "figure"])
     assert abs(figures.loc[("F1", "shock_bias_shift_ug"), "value"]) == pytest.approx(250_000.0, rel=0.05)
     assert not figures.loc[("F1", "shock_sensitivity_percent"), "identified"]  # the pulse is beyond the range: it clips
-    assert set(runner.run.table("grades")["outcome"]) == {"fail"}
+    assert set(run.table("grades")["outcome"]) == {"fail"}
 
 
-def test_a_centrifuge_that_is_left_alone_stops(tmp_path: Path) -> None:
+def test_a_centrifuge_that_is_left_alone_and_one_that_is_made_safe_stop(tmp_path: Path) -> None:
     recipe = recipe_of(tmp_path, "centrifuge")
     with open_station(load_station(), lot(), roles=roles_of(recipe)) as station:
         machine = station.equipment["centrifuge"]
@@ -172,13 +168,7 @@ def test_a_centrifuge_that_is_left_alone_stops(tmp_path: Path) -> None:
         machine.values.text("fault")
         station.clock.sleep(30.0)
         assert machine.values.number("rate_read") == 0.0
-
-
-def test_the_safe_state_stops_the_equipment(tmp_path: Path) -> None:
-    recipe = recipe_of(tmp_path, "centrifuge")
-    with open_station(load_station(), lot(), roles=roles_of(recipe)) as station:
-        station.equipment["centrifuge"].spin(200.0, 1, 0.5, [0, 1])
-        reached = station.make_safe()
-        assert "centrifuge stopped" in reached.done
+        machine.spin(200.0, 1, 0.5, [0, 1])
+        assert "centrifuge stopped" in station.make_safe().done
         station.clock.sleep(30.0)
-        assert station.equipment["centrifuge"].values.number("rate_read") == 0.0
+        assert machine.values.number("rate_read") == 0.0

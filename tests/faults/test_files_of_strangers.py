@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from each import each
+from root_process import ROOT
 
 from pipelines.importers import files, limited
 from pipelines.importers.limited import MIB, ReadingLimits, in_reader
 from schemas.errors import DataRejected, WrongUse
 
-ROOT = Path(__file__).resolve().parents[2]
 FEW = ReadingLimits(256 * MIB, 1, 20)
 
 
@@ -53,18 +54,18 @@ def foreign_ide(shared_data: Path) -> bytes:
     return (shared_data / "dynamic-files" / "enDAQ-test.ide").read_bytes()
 
 
-@pytest.mark.parametrize("text", [b"9**99**99", b"math.e**9", b"__import_", b"1/2/3/4/5", b"1.0/0.000"])
+PROGRAM = (
+    "import sys; from pathlib import Path; from pipelines.importers.files import *; content_here(Path(sys.argv[1]))"
+)
+
+
+@each([b"9**99**99", b"math.e**9", b"__import_", b"1/2/3/4/5", b"1.0/0.000"])
 def test_a_string_of_an_ide_recording_that_is_no_number_is_refused_and_not_evaluated(
-    tmp_path: Path, foreign_ide: bytes, text: bytes
+    text: bytes, tmp_path: Path, foreign_ide: bytes
 ) -> None:
-    path = tmp_path / "bomb.ide"
-    path.write_bytes(foreign_ide.replace(b"1.0/32768", text))
-    program = (
-        "import sys; from pathlib import Path; from pipelines.importers.files import *; content_here(Path(sys.argv[1]))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(path)], cwd=ROOT, capture_output=True, text=True, timeout=30, check=False
-    )
+    (tmp_path / "bomb.ide").write_bytes(foreign_ide.replace(b"1.0/32768", text))
+    command = [sys.executable, "-c", PROGRAM, str(tmp_path / "bomb.ide")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=30, check=False)
     assert "DataRejected: bomb.ide: an IDE recording with the rate or time scale" in done.stderr
 
 
@@ -133,8 +134,8 @@ def test_a_pipe_is_read_by_the_process_that_has_it(tmp_path: Path) -> None:
         files.read(tmp_path / "missing.csv")
 
 
-@pytest.mark.parametrize("line", [b"\n", b",\n", b"1,\n", b",,,,,,,,\n", b"1 1 1 1\n", b"1\n"])
-def test_92_kb_of_gzip_with_millions_of_cells_are_refused_before_they_are_a_table(tmp_path: Path, line: bytes) -> None:
+@each([b"\n", b",\n", b"1,\n", b",,,,,,,,\n", b"1 1 1 1\n", b"1\n"])
+def test_92_kb_of_gzip_with_millions_of_cells_are_refused_before_they_are_a_table(line: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.csv.gz"
     path.write_bytes(gzip.compress(line * (60 * MIB // len(line)), 9))
     with pytest.raises(DataRejected, match=r"a\.csv\.gz: \d+ bytes hold about \d+ cells, at most \d+ are read"):
@@ -159,7 +160,7 @@ def test_a_killed_command_leaves_neither_its_reader_nor_a_copy(tmp_path: Path, h
         "import test_files_of_strangers as tests\n"
         f"tests.in_tests(tests.copies_to, {str(tmp_path)!r}, limits=tests.ReadingLimits(2**28, 9, 60))\n"
     )
-    environment = os.environ | {"TMPDIR": str(tmp_path / "copies"), "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"TMPDIR": str(tmp_path / "copies"), "PYTHONPATH": f"{ROOT}:{ROOT / 'tests'}"}
     with subprocess.Popen([sys.executable, "-c", program], env=environment, stderr=subprocess.DEVNULL) as command:
         while not (tmp_path / "began").is_file():
             assert command.poll() is None

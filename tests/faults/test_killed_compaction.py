@@ -100,9 +100,8 @@ def test_killed_at_any_step_leaves_every_file(made: Path, tmp_path: Path) -> Non
 def test_killed_while_merging_leaves_every_file(archive: Archive, tmp_path: Path) -> None:
     compact(archive)
     run = archive.run("latest").id
-    later(
-        archive, f"runs/{run}/more.json", bytes((archive.root / packs.FOLDER / packed_zips(archive)[0]).stat().st_size)
-    )
+    size = (archive.root / packs.FOLDER / packed_zips(archive)[0]).stat().st_size
+    later(archive, f"runs/{run}/more.json", bytes(size))
     expected, killed, ended_well = logical(archive), 0, 0
     for step in range(0, 60, 2):
         root = tmp_path / f"archive-{step}"

@@ -1,11 +1,12 @@
 """A device that is spoken to in lines, when it is slow, says nothing, says too much, or hangs up."""
 
 import socket
-import threading
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
+from each import each
+from small_server import answering
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.links import lines
@@ -18,35 +19,10 @@ SILENCE_S = 1.0
 
 
 @contextmanager
-def speaker(*answers: bytes | None):
-    """A device that gives these answers in turn, a connection after the other; None hangs up. Gives address and what it heard."""
-    listener, heard, left = socket.create_server(("127.0.0.1", 0)), [], list(answers)
-
-    def serve():
-        with suppress(OSError):
-            while True:
-                connection, _ = listener.accept()
-                with connection, suppress(OSError):
-                    while data := connection.recv(256):
-                        heard.append(data)
-                        answer = left.pop(0) if left else b""
-                        if answer is None:
-                            break
-                        connection.sendall(answer)
-
-    thread = threading.Thread(target=serve, daemon=True)
-    thread.start()
-    try:
-        yield listener.getsockname(), heard
-    finally:
-        listener.shutdown(socket.SHUT_RDWR)
-        listener.close()
-        thread.join(5.0)
-
-
-@contextmanager
 def linked(*answers: bytes | None, attempts: int = 2, timeout_s: float = PATIENCE_S):
-    with speaker(*answers) as (address, heard):
+    """A link to a device that gives these answers in turn, None hangs up; and what the device hears."""
+    left = list(answers)
+    with answering(lambda _: left.pop(0) if left else b"") as (address, heard):
         link = LineLink(*address, timeout_s=timeout_s, read_attempts=attempts)
         try:
             yield link, heard
@@ -69,7 +45,7 @@ def test_refusals_are_told_by_name():
         link.tell("TEMP, S999.0", "set point")
 
 
-@pytest.mark.parametrize("answer", [None, b"23.0\r\n40.0\r\n", b"\xff\xfe\r\n", b"x" * 3000])
+@each([None, b"23.0\r\n40.0\r\n", b"\xff\xfe\r\n", b"x" * 3000])
 def test_what_is_not_one_line_is_no_answer(answer):
     with linked(answer, attempts=1) as (link, _), pytest.raises(LinkLost, match="connection lost at air 'TEMP\\?'"):
         link.ask("TEMP?", "air")

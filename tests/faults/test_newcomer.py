@@ -6,121 +6,109 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from capture_double import CaptureDouble, PulledPlug, recipe_file, small_job
+from each import each
+from in_process import given
+from ledger_events import event
 from lots import lot
+from root_process import ROOT
 
 from pipelines.archive import Archive, files
+from pipelines.certificates import Ledger
 from pipelines.chain.runner import Runner
-from pipelines.cli import main
-from pipelines.importers import exchange
+from pipelines.cli import COMMANDS
+from pipelines.diagnosis.sentences import verdict
 from pipelines.jobs.job import Request
 from pipelines.jobs.model_files import chosen_effects
-from schemas.errors import ArchiveUnusable, DataRejected, RecipeInvalid, WrongUse, did_you_mean
+from schemas.errors import ArchiveUnusable, RecipeInvalid, WrongUse, did_you_mean
 
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    """Status, output and message of a command."""
-    monkeypatch.setattr("sys.argv", ["tumbleline", *arguments])
-    with pytest.raises(SystemExit) as left:
-        main()
-    captured = capsys.readouterr()
-    return int(left.value.code or 0), captured.out, captured.err
-
-
-@pytest.fixture
-def stopped(tmp_path: Path) -> Archive:
-    """An archive with one run whose capture was cut off after seven records."""
-    archive = Archive(tmp_path / "archive")
-    with pytest.raises(PulledPlug):
-        list(Runner(small_job(tmp_path), archive, measure=CaptureDouble(stop_after=7)).all())
-    return archive
-
-
-def dwells(n: int = 4) -> pd.DataFrame:
-    frame = pd.DataFrame({"unit": "A1", "dwell": range(n), "time_s": np.arange(n) * 10.0})
-    return frame.assign(out_x=0.1, out_y=0.2, out_z=0.97)
+NO_FILE = "x" * 5000
+MAPPED = ("--map", "time=t,x=ax,y=ay,z=az", "--units", "output=g", "--unit", "A1")
+SLIPS: list[tuple[tuple[str, ...], str]] = [  # words of a command, and what is told; {} is a folder with a.csv
+    (("diagnos", "x"), "tumbleline: no command is called 'diagnos'; did you mean diagnose?\n"),
+    (("run", "nosuch"), "no recipe is called 'nosuch'"),
+    (("run", "production", "--units", "A,A"), "serial A is there twice"),
+    (("run", "production", "--units", ","), "serial '' is"),
+    (("run", "--units", "{}/lot.csv"), "give the path of a slot map file in CSV or TOML"),
+    (("run", "production", "--station", "none.toml"), "none.toml cannot be read"),
+    (("show", "nosuch"), "there is no run yet"),
+    (("show", NO_FILE), ""),
+    (("plan", NO_FILE), ""),
+    (("plan", "optimize", "nosuch.toml"), "'nosuch.toml'"),
+    (("diagnose", NO_FILE + ".csv"), ""),
+    (("import", NO_FILE, *MAPPED), ""),
+    (("import", "{}/nosuch.csv"), "nosuch.csv: cannot be read (No such file or directory)"),
+    (("import", "{}/a.csv"), "no column of a.csv is mapped, x, y and z are needed at least (its columns: t, ax,"),
+    (("import", "{}/a.csv", "--map", "x=ax,y=ay,z=az"), "one of g, mg, m/s^2, V, mV, LSB is needed; add --units output=…"),
+    (("export", "nosuch"), "there is no run yet"),
+    (("export", "--format", "hex"), "no format is called 'hex'"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda t: t.assign(n=[100, 100, 0, 100]), r"row 2, column n: found 0, a mean of 1 or more samples"),
-        (lambda t: t.assign(out_unit="parsec"), r"column out_unit: found 'parsec', one of V, LSB, g, m/s\^2 is needed"),
-        (lambda t: t.assign(time_s=5.0), r"column time_s: all 4 dwells of unit A1 at 5 s"),
-    ],
-)
-def test_dwells_that_cannot_be_are_refused(change, words: str) -> None:
-    with pytest.raises(DataRejected, match=words):
-        exchange.checked(change(dwells()), where="f.csv")
+@each(SLIPS, lambda row: " ".join(row[0])[:60])
+def test_a_slip_is_one_message_and_status_2(row: tuple[tuple[str, ...], str], tmp_path: Path) -> None:
+    words, told = row
+    (tmp_path / "a.csv").write_text("t,ax,ay,az\n0,1,2,3\n", encoding="utf-8")
+    archive = () if words[0] in {"plan", "diagnos"} else ("--archive", tmp_path / "archive")
+    status, out, message = given(*(word.replace("{}", str(tmp_path)) for word in words), *archive)
+    assert (status, out) == (2, "")
+    assert told in message
+    assert len(message.strip().splitlines()) == 1
+    assert len(message) < 400 + len(str(tmp_path))
 
 
-def test_one_dwell_of_a_unit_needs_no_second_time() -> None:
-    assert len(exchange.checked(dwells(1), where="f.csv")) == 1
+def test_version_and_help_put_commands_under_what_they_are_for() -> None:
+    assert given("--version")[:2] == (0, f"tumbleline {version('tumbleline')}\n")
+    text = given("--help")[1]
+    assert all(command.part in text for command in COMMANDS.values())
+    assert " Commands " not in text
 
 
 @pytest.mark.parametrize("command", ["diagnose", "compare"])
 def test_a_model_with_as_many_coefficients_as_dwells_is_not_called_adequate(
-    tmp_path: Path,
-    rng: np.random.Generator,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    command: str,
+    tmp_path: Path, rng: np.random.Generator, command: str
 ) -> None:
-    table = lot(rng, units=2, temperatures=(25.0,)).query("dwell < 4")
-    table.to_csv(tmp_path / "few.csv", index=False)
-    model = ("--effects", "bias,scale,misalignment")
-    status, out, message = told(monkeypatch, capsys, command, str(tmp_path / "few.csv"), *model)
+    lot(rng, units=2, temperatures=(25.0,)).query("dwell < 4").to_csv(tmp_path / "few.csv", index=False)
+    status, out, message = given(command, tmp_path / "few.csv", "--effects", "bias,scale,misalignment")
     assert (status, out) == (2, "")
     assert "4 dwells a unit leave no degree of freedom to judge the model" in message
 
 
-def test_a_kind_of_device_with_a_slip_is_refused_before_anything_moves(tmp_path: Path) -> None:
-    recipe = recipe_file(tmp_path, ('device = "adxl355"', 'device = "adxl356"'))
-    with pytest.raises(RecipeInvalid, match="no preset 'adxl356'; did you mean ADXL355"):
-        Request(recipe=recipe).job()
-
-
-def test_close_matches_do_not_care_for_capitals() -> None:
+def test_close_matches_do_not_care_for_capitals_and_an_empty_list_names_no_effect(tmp_path: Path) -> None:
     assert did_you_mean("adxl356", ["ADXL355", "QA700"]) == "did you mean ADXL355?"
     assert did_you_mean("Third_Ordr", ["third_order", "bias"]) == "did you mean third_order?"
-
-
-def test_a_command_with_a_slip_is_told_with_close_matches(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, out, message = told(monkeypatch, capsys, "diagnos", "x")
-    assert (status, out) == (2, "")
-    assert message == "tumbleline: no command is called 'diagnos'; did you mean diagnose?\n"
-
-
-def test_a_list_of_effects_with_nothing_in_it_is_refused() -> None:
+    with pytest.raises(RecipeInvalid, match="no preset 'adxl356'; did you mean ADXL355"):
+        Request(recipe=recipe_file(tmp_path, ('device = "adxl355"', 'device = "adxl356"'))).job()
     with pytest.raises(WrongUse, match="--effects ',' names no effect"):
         chosen_effects(",", None, "diagnose")
     assert chosen_effects("", None, "diagnose") is None
 
 
-@pytest.mark.parametrize("command", ["report", "diagnose", "export"])
-def test_a_run_that_was_stopped_is_refused_with_the_way_on(
-    stopped: Archive, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    status, out, message = told(monkeypatch, capsys, command, "latest", "--archive", str(stopped.root))
-    assert (status, out) == (2, "")
-    assert re.search(r"repeat its 'tumbleline run'|give (its|the) .*again|again (to continue|and it goes on)", message)
+def test_a_serial_number_alone_shows_what_holds_today(tmp_path: Path) -> None:
+    for serial, end in (("A1", "2099-01-01"), ("B1", "2021-01-01")):
+        Ledger(Archive(tmp_path)).add(event(serial, "2020-01-01", end))
+    for serial, ended, words in (("A1", 0, "certificate A1/1 is valid on"), ("B1", 1, "no calibration is valid on")):
+        status, out, _ = given("show", serial, "--archive", tmp_path)
+        assert (status, words in out) == (ended, True)
 
 
-def test_a_run_that_was_stopped_is_shown_as_such(
-    stopped: Archive, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, out, _ = told(monkeypatch, capsys, "show", "latest", "--archive", str(stopped.root))
-    assert status == 0
-    assert "is not finished (7 records stored)" in out
+def test_a_run_that_was_stopped_is_refused_with_the_way_on_and_shown_as_such(tmp_path: Path) -> None:
+    archive = Archive(tmp_path / "archive")
+    with pytest.raises(PulledPlug):
+        list(Runner(small_job(tmp_path), archive, measure=CaptureDouble(stop_after=7)).all())
+    for command in ("report", "diagnose", "export"):
+        status, out, message = given(command, "latest", "--archive", archive.root)
+        assert (status, out) == (2, "")
+        assert re.search(
+            r"repeat its 'tumbleline run'|give (its|the) .*again|again (to continue|and it goes on)", message
+        )
+    status, out, _ = given("show", "latest", "--archive", archive.root)
+    assert (status, "is not finished (7 records stored)" in out) == (0, True)
 
 
 def test_what_lies_outside_the_archive_is_not_told_as_the_archive(tmp_path: Path) -> None:
@@ -129,6 +117,8 @@ def test_what_lies_outside_the_archive_is_not_told_as_the_archive(tmp_path: Path
         files.publish(tmp_path / "file" / "r.html", b"", "report", files.ELSEWHERE)
     with pytest.raises(ArchiveUnusable, match=r"^archive: .*--archive DIR"):
         files.publish(tmp_path / "file" / "r.html", b"")
+    _, _, message = given("run", "--direct", "--archive", tmp_path / "file")
+    assert "cannot be written" in message
 
 
 @pytest.mark.slow
@@ -137,13 +127,7 @@ def test_ctrl_c_in_a_capture_says_that_it_goes_on_and_it_does(tmp_path: Path) ->
     # a shell that runs the tests in the background has Ctrl-C ignored for all its children
     program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from pipelines.cli import main; main()"
     command = [sys.executable, "-c", program, "run", "--direct", "--archive", str(archive)]
-    process = subprocess.Popen(
-        command,
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while process.poll() is None and len(list(archive.glob("captures/*/0*"))) < 3:
         time.sleep(0.02)  # another process is waited for
     os.kill(process.pid, signal.SIGINT)
@@ -152,3 +136,77 @@ def test_ctrl_c_in_a_capture_says_that_it_goes_on_and_it_does(tmp_path: Path) ->
     assert "give the command again to continue the run" in message
     assert "Traceback" not in message
     assert list(archive.rglob(".tmp-*")) == []
+
+
+# -- what a verdict says -------------------------------------------------------------------------------------------------
+
+
+def said(error: dict[str, float], group: dict, *units: str) -> str:
+    return verdict(
+        {
+            "adequate": False,
+            "error": error,
+            "blocked_by": [],
+            "units": [*units],
+            "unexplained": None,
+            "classes": [group],
+        }
+    )
+
+
+@each([(432.0, True), (441.0, True), (882.0, False)])
+def test_an_error_below_the_noise_that_is_no_noise_is_said_to_be_small(row: tuple[float, bool]) -> None:
+    rms, told_so = row
+    group = {"effects": ["scale_temperature_quadratic"], "scope": "sensor"}
+    text = said({"rms_ug": rms, "floor_ug": 441.0, "p_value": 4e-190}, group, "U1")
+    assert text.startswith("NOT ADEQUATE")
+    assert ("the misfit is smaller than the noise" in text) == told_so
+
+
+def test_a_model_that_fits_beside_faulty_dwells_has_no_misfit() -> None:
+    group = {"effects": ["gain_step"], "scope": "data", "units": ["SN-2"], "dwells": [19]}
+    text = said({"rms_ug": 24.6, "floor_ug": 28.9, "p_value": 0.74}, group, "SN-1", "SN-2")
+    assert "misfit" not in text
+    assert "the run has faults of the data: gain_step (SN-2, dwell 19); without them the model is adequate:" in text
+
+
+# -- a defect of the product ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def broken(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A product with a defect; the folder of its states."""
+
+    def defect(*_: object) -> None:
+        raise KeyError("x")
+
+    monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
+    monkeypatch.setattr("pipelines.importers.files.read_content", defect)
+    return tmp_path / "state"
+
+
+def test_an_unexpected_exception_is_one_line_and_a_report_with_status_70(broken: Path) -> None:
+    broken.mkdir()
+    for day in range(30):
+        (broken / f"unexpected-202501{day:02d}T000000-1.txt").write_text("")
+    status, out, message = given("import", "s3://me:secret@host/a.csv", *MAPPED)
+    assert (status, out, message.count("\n")) == (70, "", 1)
+    reports = sorted(broken.glob("unexpected-*.txt"))
+    assert len(reports) == 20  # the oldest are taken away
+    assert message.startswith("tumbleline: unexpected KeyError in ")
+    assert str(reports[-1]) in message
+    text = reports[-1].read_text()
+    assert "Traceback (most recent call last)" in text
+    assert "secret" not in text
+    assert reports[-1].stat().st_mode & 0o077 == 0
+
+
+def test_a_variable_shows_the_traceback_and_a_folder_that_takes_nothing_still_leaves_a_line(
+    monkeypatch: pytest.MonkeyPatch, broken: Path
+) -> None:
+    broken.write_text("a file where the folder should be")
+    status, _, message = given("import", "a.csv", *MAPPED)
+    assert (status, message.count("\n")) == (70, 1)
+    monkeypatch.setenv("TUMBLELINE_DEBUG", "1")
+    status, _, message = given("import", "a.csv", *MAPPED)
+    assert (status, "Traceback (most recent call last)" in message) == (70, True)

@@ -1,6 +1,5 @@
 """Coefficients in the memory of devices: they are proved, or the unit is not certified and its valid copy is untouched."""
 
-import json
 import os
 import re
 import shlex
@@ -15,8 +14,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from capture_double import small_job, small_run
 from programmed_lot import keep_state, lot_run, plant_of, programmed
-from pydantic import TypeAdapter
+from root_process import ROOT
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, Run
@@ -30,17 +30,17 @@ from pipelines.export import UnitCalibration
 from pipelines.export.device_block import HEAD, LENGTH, Form, block_of, pack, unpack
 from pipelines.integrity import verify
 from pipelines.jobs.job import Job
-from pipelines.programming.documents import ProgramDocument
-from pipelines.programming.job import REASON, _held, chosen_units, document
-from pipelines.tables.json_values import json_value
+from pipelines.programming import job, process
+from pipelines.programming.job import REASON, _held, chosen_units
 from schemas.errors import ArchiveUnusable, OperatorNeeded, StationRefused, StationTimeout, WrongUse
 from schemas.fault import FaultOrder
 from stations.codec import Value
 from stations.devices.memory import UnitMemory
-from stations.plant.plant import Plant
+from stations.opening import serve_plant
+from stations.profile_files import load_profile
 from stations.safety.suspenders import EmergencyStop
 
-ROOT = Path(__file__).resolve().parents[2]
+COMMAND = next(r for r in load_profile("tumbleline_slot").registers if r.name == "memory_command").address
 
 
 @pytest.fixture(scope="module")
@@ -60,8 +60,6 @@ def run(measured: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
 
 
 def job_of(run: Run) -> Job:
-    from capture_double import small_job
-
     return small_job(Path(str(run.archive.root)).parent)
 
 
@@ -70,26 +68,17 @@ def copies(run: Run, unit: int = 0) -> list[bytes]:
     return [struct.pack(">192H", *plant.flash[unit].read(copy, plant.now_us)) for copy in (0, 1)]
 
 
-def with_fault(run: Run, kind: str, **figures: float) -> None:
-    def prepare(plant: Plant) -> None:
-        plant.inject(FaultOrder(kind=kind, serial="A1", figures=figures, at_s=0.0))
-
-    keep_state(run, job_of(run), prepare)
-
-
 def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
     ledger, day = Ledger(run.archive.root), today()
     first = certify(ledger, run, ["A1", "A2"]).events
     done, given = programmed(run)
     assert {one.outcome for one in done.values()} == {"proved"}, [one.reason for one in done.values()]
     held = ledger.valid_at("A1", day)
-    assert held is not None
     assert held.certificate == given["A1"] == "A1/3"  # certified, ended, certified again
     assert held.until == first[0].until
     assert set(given) == {"A1", "A2"}  # A3 was not certified, and is not by this
     assert ledger.valid_at("A3", day) is None
     block = unpack(copies(run)[0])
-    assert block is not None
     assert (block.unit, block.sequence, block.certificate) == ("A1", 1, 3)
     for one in done.values():
         assert len(one.poses) == 2
@@ -98,10 +87,7 @@ def test_a_lot_is_written_proved_and_certified_again(run: Run) -> None:
     events = programming(run.archive.root, "A1")
     assert [entry["event"] for entry in events] == ["begun", "proved"]
     assert events[0]["before"]["copies"]["A"] == "ff" * 384
-    printed = json.dumps(json_value(document(run, list(done.values()), given)))
-    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")
-    findings = verify(Archive(run.archive.root), [], keys={}).checked.findings
-    assert findings == []
+    assert verify(Archive(run.archive.root), [], keys={}).checked.findings == []
 
 
 def test_the_older_copy_is_written_and_the_other_is_kept(run: Run) -> None:
@@ -111,22 +97,22 @@ def test_the_older_copy_is_written_and_the_other_is_kept(run: Run) -> None:
     now = copies(run)
     assert now[0] == kept
     second = unpack(now[1])
-    assert second is not None
     assert (done["A1"].copy, second.sequence, second.form) == ("b", 2, "q24")
     third, _ = programmed(run, ("A1",))
     assert third["A1"].copy == "a"
     assert programming(run.archive.root, "A1")[4]["before"]["copies"]["B"] == now[1].hex()
 
 
+DIFFERS = "differs from what was written"
+
+
 @pytest.mark.parametrize(
     ("kind", "figures", "step", "reason"),
     [
-        ("memory_bad_block", {"copy": 1, "word": 40}, "read back", "differs from what was written from byte 80"),
+        ("memory_bad_block", {"copy": 1, "word": 40}, "read back", f"{DIFFERS} from byte 80"),
         ("memory_worn", {}, "archive the memory", "worn out"),
-        ("memory_power_lost", {"after_s": 0.45}, "read back", "differs from what was written"),
-        pytest.param(
-            "memory_power_lost", {"after_s": 0.1}, "read back", "differs from what was written", marks=pytest.mark.slow
-        ),
+        ("memory_power_lost", {"after_s": 0.45}, "read back", DIFFERS),
+        pytest.param("memory_power_lost", {"after_s": 0.1}, "read back", DIFFERS, marks=pytest.mark.slow),
     ],
 )
 def test_a_fault_leaves_the_valid_copy_and_no_certificate(
@@ -141,8 +127,6 @@ def test_a_fault_leaves_the_valid_copy_and_no_certificate(
     done, given = programmed(run)
     one = done["A1"]
     assert (one.outcome, one.step) == ("failed", step), one.reason
-    printed = json.dumps(json_value(document(run, list(done.values()), given)))
-    TypeAdapter(ProgramDocument).validate_json(printed, strict=True, extra="forbid")
     assert reason in one.reason
     newest = [block for content in copies(run) if (block := unpack(content)) is not None]
     assert [block.sequence for block in newest] == [1]  # never half written: the copy of the first time counts
@@ -169,7 +153,6 @@ def test_offset_registers_move_the_output_and_are_written_after_each_power_on(ru
     done, _ = programmed(run, ("A1",), with_offsets=True)
     one = done["A1"]
     assert one.outcome == "proved", one.reason
-    assert one.block is not None
     bias_ug = one.unit.bias[0] / 256000.0 * 1e6
     left = bias_ug + np.array(one.block.offsets) * 62.5
     assert np.max(np.abs(left)) <= 31.3  # half a step of 62.5 µg
@@ -211,23 +194,21 @@ def test_a_calibration_that_was_revoked_is_not_written(run: Run) -> None:
     assert programming(run.archive.root, "A1") == []
 
 
+def packed(form: Form) -> bytes:
+    return pack(block_of(calibration(), form, sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0))
+
+
 @pytest.mark.parametrize("form", ["float32", "q24"])
 def test_a_block_corrects_as_the_calibration(form: Form) -> None:
-    unit = calibration()
-    block = unpack(
-        pack(block_of(unit, form, sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0)) + b"\xff" * 76
-    )
-    assert block is not None
+    unit, block = calibration(), unpack(packed(form) + b"\xff" * 76)
     output = np.array([[250000.0, -3000.0, 120000.0]])
     for t in (-10.0, 25.0, 60.0):
         np.testing.assert_allclose(block.correct(output, t), unit.correct(output, t), atol=5e-7)
 
 
 def test_an_erased_a_zero_and_a_damaged_memory_hold_no_block() -> None:
-    content = pack(block_of(calibration(), "float32", sequence=1, certificate=0, date=0, offsets=(0, 0, 0), step=0))
-    assert unpack(b"\xff" * 384) is None
-    assert unpack(b"\0" * 384) is None
-    assert unpack(content[:200]) is None
+    content = packed("float32")
+    assert [unpack(data) for data in (b"\xff" * 384, b"\0" * 384, content[:200])] == [None] * 3
     for place in (5, 20, 90, 150, 305):
         spoilt = bytearray(content)
         spoilt[place] ^= 0x10
@@ -235,12 +216,9 @@ def test_an_erased_a_zero_and_a_damaged_memory_hold_no_block() -> None:
 
 
 def test_a_lost_answer_is_decided_by_the_counter_and_the_command_is_sent_once(run: Run) -> None:
-    from stations.opening import serve_plant
-
-    job = job_of(run)
-    plant = plant_of(run, job)
-    command = next(r for r in _slot_profile().registers if r.name == "memory_command").address
-    with serve_plant(job.station, job.lot, plant) as station:
+    small = job_of(run)
+    plant = plant_of(run, small)
+    with serve_plant(small.station, small.lot, plant) as station:
         memory = station.reader.slots[0].memory(station.clock)
         registers = memory._registers
         plain = registers.write
@@ -255,24 +233,16 @@ def test_a_lost_answer_is_decided_by_the_counter_and_the_command_is_sent_once(ru
         registers.write = lambda name, value: (_ for _ in ()).throw(StationTimeout("slot 0: no answer"))
         with pytest.raises(StationTimeout):
             UnitMemory(registers, station.clock).program("a", b"\x12\x34" * 100)
-    orders = [e for e in plant.journal.events() if getattr(e, "address", -1) == command]
+    orders = [e for e in plant.journal.events() if getattr(e, "address", -1) == COMMAND]
     assert len(orders) == 1
     assert plant.flash[0].erases == [1, 0]
     assert plant.flash[0].read(0, plant.now_us)[0] == 0x1234
 
 
-def _slot_profile():
-    from stations.profile_files import load_profile
-
-    return load_profile("tumbleline_slot")
-
-
 def test_a_memory_that_samples_or_has_no_power_refuses(run: Run) -> None:
-    from stations.opening import serve_plant
-
-    job = job_of(run)
-    plant = plant_of(run, job)
-    with serve_plant(job.station, job.lot, plant) as station:
+    small = job_of(run)
+    plant = plant_of(run, small)
+    with serve_plant(small.station, small.lot, plant) as station:
         memory = station.reader.slots[0].memory(station.clock)
         station.reader.start(100.0)
         with pytest.raises((StationRefused, StationTimeout)):
@@ -299,20 +269,16 @@ program_run(run, chosen_units(run, ["A1"]), station_of(run), Choice(), report)
 """
 
 
-@pytest.mark.parametrize(
-    "step",
-    [
-        "A1: write",
-        *(pytest.param(s, marks=pytest.mark.slow) for s in ("A1: read back", "power cycle", "verify in pose")),
-    ],
-)
+LATER = ("A1: read back", "power cycle", "verify in pose")
+
+
+@pytest.mark.parametrize("step", ["A1: write", *(pytest.param(step, marks=pytest.mark.slow) for step in LATER)])
 def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_written_again(run: Run, step: str) -> None:
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     words = [sys.executable, "-c", KILLED, str(run.archive.root), step]
-    done = subprocess.run(
-        words, cwd=ROOT, check=False, capture_output=True, text=True, env={**os.environ, VARIABLE: ""}
-    )
+    environment = {**os.environ, VARIABLE: ""}
+    done = subprocess.run(words, cwd=ROOT, check=False, capture_output=True, text=True, env=environment)
     assert done.returncode == -signal.SIGKILL, done.stderr
     assert ledger.valid_at("A1", today()) is None
     assert "has no end" in unproved(run.archive.root, "A1")
@@ -321,10 +287,8 @@ def test_a_process_that_is_killed_leaves_the_unit_not_certified_until_it_is_writ
     again, given = programmed(run, ("A1",))
     assert again["A1"].outcome == "proved", again["A1"].reason
     held = ledger.valid_at("A1", today())
-    assert held is not None
     assert held.certificate == given["A1"] == "A1/3"
     written = again["A1"].block
-    assert written is not None
     assert written.certificate == 3
     assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "begun", "proved"]
 
@@ -351,21 +315,19 @@ def test_the_guide_prints_what_the_command_prints(run: Run, monkeypatch: pytest.
     certify(Ledger(run.archive.root), run, ["A1"])
     done = CliRunner().invoke(app, shlex.split(command)[1:])
     assert done.exit_code == 0, done.exception
-    wanted = re.escape(words_of(printed)).replace("…", ".*?")
-    assert re.fullmatch(wanted, words_of(done.stdout)), done.stdout
+    wanted, shown = (re.sub(r"[─\s]+", " ", text).strip() for text in (printed, done.stdout))
+    assert re.fullmatch(re.escape(wanted).replace("…", ".*?"), shown), done.stdout
     assert str(LENGTH) in guide
 
 
-def words_of(text: str) -> str:
-    """The text with every run of blanks and of table lines as one blank."""
-    return " ".join(re.sub(r"[─\s]+", " ", text).split())
-
-
-def test_nothing_is_written_while_the_emergency_stop_is_pressed(run: Run) -> None:
+@pytest.mark.parametrize(("kind", "refusal"), [("emergency_stop", EmergencyStop), ("door", OperatorNeeded)])
+def test_nothing_is_written_while_the_emergency_stop_is_pressed_or_the_door_open(
+    run: Run, kind: str, refusal: type[OperatorNeeded]
+) -> None:
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
-    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="emergency_stop", at_s=0.0)))
-    with pytest.raises(EmergencyStop):
+    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind=kind, at_s=0.0)))
+    with pytest.raises(refusal):
         programmed(run, ("A1",))
     assert programming(run.archive.root, "A1") == []
     assert ledger.valid_at("A1", today()) is not None
@@ -391,18 +353,7 @@ def test_a_calibration_that_ended_for_another_reason_does_not_come_back() -> Non
 
     assert _held(Held("superseded"), "A1", "r", "2026-06-01") is None
     interrupted = _held(Held(REASON), "A1", "r", "2026-06-01")
-    assert interrupted is not None
     assert interrupted.number == 2
-
-
-def newer(run: Run, change: tuple[str, str]) -> Run:
-    """Another run of the same units, made after it and certified for A1."""
-    from capture_double import small_run
-
-    folder = Path(str(run.archive.root)).parent
-    other = small_run(folder, None, change)
-    certify(Ledger(run.archive.root), other, ["A1"])
-    return other
 
 
 @pytest.mark.parametrize(
@@ -414,13 +365,12 @@ def test_an_older_run_is_not_written_over_a_newer_certified_one(run: Run, change
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     ledger.revoke("A1", REASON, day=today())  # a writing of this run began once and was not completed
-    other = newer(run, change)
-    with pytest.raises(
-        WrongUse, match=rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
-    ):
+    other = small_run(Path(str(run.archive.root)).parent, None, change)
+    certify(ledger, other, ["A1"])
+    words = rf"certificate A1/3 is of run {re.escape(other.id)}.*not after it; write that run"
+    with pytest.raises(WrongUse, match=words):
         programmed(run, ("A1",))
     held = ledger.valid_at("A1", today())
-    assert held is not None
     assert held.run == other.id
     assert programming(run.archive.root, "A1") == []
     programmed(run, ("A2",))  # the other units are not concerned
@@ -430,8 +380,6 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another process certifies the unit between the begin of the lock and the first write, and between proof and renewal."""
-    from pipelines.programming import job
-
     ledger = Ledger(run.archive.root)
     certify(ledger, run, ["A1"])
     real = job._station
@@ -445,7 +393,6 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
         patch.setattr(job, "_station", meanwhile)
         done, given = programmed(run, ("A1",))
     block = done["A1"].block
-    assert block is not None
     assert given == {"A1": f"A1/{block.certificate}"} == {"A1": "A1/5"}
 
     real_certify = job.certify
@@ -462,35 +409,22 @@ def test_a_certificate_that_comes_in_between_does_not_leave_a_number_that_the_de
     assert ledger.valid_at("A1", today()) is None
     again, given = programmed(run, ("A1",))
     written = again["A1"].block
-    assert written is not None
     assert again["A1"].outcome == "proved"
     assert given == {"A1": f"A1/{written.certificate}"}
 
 
-def test_an_open_door_is_refused_before_the_first_write_and_ends_the_verification(run: Run) -> None:
-    ledger = Ledger(run.archive.root)
-    certify(ledger, run, ["A1"])
-    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="door", at_s=0.0)))
-    with pytest.raises(OperatorNeeded, match="door is open"):
-        programmed(run, ("A1",))
-    assert programming(run.archive.root, "A1") == []
-    assert ledger.valid_at("A1", today()) is not None
-
-    def later(plant: Plant) -> None:
-        plant.inject(FaultOrder(kind="door", at_s=plant.now + 6.0))
-
-    keep_state(run, job_of(run), later)
+def test_a_door_that_is_opened_ends_the_verification(run: Run) -> None:
+    certify(Ledger(run.archive.root), run, ["A1"])
+    keep_state(run, job_of(run), lambda plant: plant.inject(FaultOrder(kind="door", at_s=plant.now + 6.0)))
     with pytest.raises(OperatorNeeded, match="door is open"):
         programmed(run, ("A1",))
     assert [entry["event"] for entry in programming(run.archive.root, "A1")] == ["begun", "failed"]
-    assert ledger.valid_at("A1", today()) is None
+    assert Ledger(run.archive.root).valid_at("A1", today()) is None
 
 
 def test_a_failure_that_cannot_be_recorded_hides_neither_its_cause_nor_the_other_units(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipelines.programming import process
-
     def off(_self: object) -> None:
         raise KeyboardInterrupt
 

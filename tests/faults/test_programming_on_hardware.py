@@ -5,11 +5,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from driven_station import told
 from programmed_lot import lot_run
+from root_process import ROOT
 from served_station import modbus_station, served_plant, station_file
 
 from pipelines.archive import Archive, Run
@@ -21,8 +22,6 @@ from pipelines.chain.certify import certify
 from pipelines.export.device_block import unpack
 from schemas.lot import Lot
 from stations.profile_files import load_profile
-
-ROOT = Path(__file__).resolve().parents[2]
 
 CLIENT = """
 import os, signal, sys
@@ -73,10 +72,7 @@ def test_killed_while_it_writes_the_watchdog_makes_the_station_safe_and_the_next
         assert killed.returncode == -signal.SIGKILL, killed.stderr
         assert ledger.valid_at("A1", today()) is None
         assert "has no end" in unproved(run.archive.root, "A1")
-        end = time.monotonic() + 60.0
-        while "watchdog_safe" not in _log(tmp_path / "state"):
-            assert time.monotonic() < end, _log(tmp_path / "state")
-            time.sleep(0.2)
+        told("watchdog_safe")
         again = client("never")
         assert again.returncode == 0, again.stderr
         with plant.lock:
@@ -88,7 +84,3 @@ def test_killed_while_it_writes_the_watchdog_makes_the_station_safe_and_the_next
     assert sorted(block.sequence for block in held if block is not None) in ([1], [1, 2])
     assert len(orders) == 2  # once for each writing
     assert unproved(run.archive.root, "A1") == ""
-
-
-def _log(folder: Path) -> str:
-    return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in folder.rglob("*") if path.is_file())

@@ -1,10 +1,11 @@
 """The bad network does to frames what it is told, and nothing else."""
 
 import socket
-import threading
 from contextlib import contextmanager, suppress
 
 import pytest
+from each import each
+from small_server import answering
 
 from stations.plant.faults.proxy import ChaosProxy, WireAction, split
 
@@ -20,31 +21,9 @@ def frame(number: int, body: bytes = b"\x01\x03\x04\x11\x11\x22\x22") -> bytes:
 
 
 @contextmanager
-def echo():
-    """A server that answers every frame with itself."""
-    listener = socket.create_server(("127.0.0.1", 0))
-
-    def serve(connection):
-        with connection, suppress(OSError):
-            while data := connection.recv(4096):
-                connection.sendall(data)
-
-    def accept():
-        with suppress(OSError):
-            while True:
-                threading.Thread(target=serve, args=(listener.accept()[0],), daemon=True).start()
-
-    thread = threading.Thread(target=accept, daemon=True)
-    thread.start()
-    yield listener.getsockname()
-    listener.shutdown(socket.SHUT_RDWR)
-    listener.close()
-    thread.join(5.0)
-
-
-@contextmanager
 def through(*actions: WireAction):
-    with echo() as address, ChaosProxy(*address) as proxy:
+    """A proxy, and a client that speaks through it to a server that answers every frame with itself."""
+    with answering(lambda frame: frame) as (address, _), ChaosProxy(*address) as proxy:
         proxy.once(*actions)
         with socket.create_connection((proxy.host, proxy.port), timeout=PATIENCE_S) as client:
             yield proxy, client
@@ -69,8 +48,7 @@ def test_frames_pass_as_they_are():
     assert proxy.frames == {"request": 2, "reply": 2}
 
 
-@pytest.mark.parametrize(
-    ("action", "arrives"),
+@each(
     [
         (WireAction("drop"), b""),
         (WireAction("drop", "request"), b""),
@@ -81,9 +59,10 @@ def test_frames_pass_as_they_are():
         (WireAction("late"), b""),
         (WireAction("retag"), frame(2)),
         (WireAction("swap"), frame(1, b"\x01\x03\x04\x22\x22\x11\x11")),
-    ],
+    ]
 )
-def test_the_next_frame_is_spoilt_as_asked(action, arrives):
+def test_the_next_frame_is_spoilt_as_asked(row):
+    action, arrives = row
     with through(action) as (proxy, client):
         client.sendall(frame(1))
         assert received(client, len(arrives)) == arrives

@@ -1,6 +1,7 @@
 """Samples on their way: lost answers, changed bytes, counters that contradict each other."""
 
 import pytest
+from each import each
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe
 
 from pipelines.capture.capture import capture
@@ -9,7 +10,7 @@ from schemas.event import MemoryLog
 from schemas.fault import FaultOrder
 from schemas.station import load_station
 from stations.opening import make_plant, serve_plant
-from stations.plant.faults import wire
+from stations.plant.faults import proxy, wire
 from stations.plant.faults.proxy import HEADER, WireAction
 
 WRITE, READ = 16, 3
@@ -57,52 +58,21 @@ def test_samples_that_change_on_their_way_are_measured_again(monkeypatch, byte: 
 
     def script(way, frame):
         samples = way == "reply" and frame[HEADER - 1] == SLOT_1 and frame[HEADER] == READ and len(frame) > 240
-        if samples and not changed:
-            changed.append(frame)
-            spoilt = bytearray(frame)
-            spoilt[byte] ^= bit
-            raise Changed(bytes(spoilt))
+        return WireAction("duplicate") if samples and not changed else None
 
-    sink, events = captured(monkeypatch, changing(script))
+    def spoilt(frame, _action, _of):
+        """One bit of the frame is another, in place of its duplicate."""
+        changed.append(frame)
+        other = bytearray(frame)
+        other[byte] ^= bit
+        return [bytes(other)]
+
+    monkeypatch.setattr(proxy, "replaced", spoilt)
+    sink, events = captured(monkeypatch, script)
     assert changed
-    reasons = [event.reason for event in events.recorded() if event.kind == "spoilt"]
-    assert len(reasons) == 1
-    assert "slot 1: sample" in reasons[0]
+    [reason] = [event.reason for event in events.recorded() if event.kind == "spoilt"]
+    assert "slot 1: sample" in reason
     assert (sink.all(1)["status"] == "ok").all()
-
-
-class Changed(Exception):
-    """The frame that is delivered instead."""
-
-
-def changing(script):
-    """A script that may raise what is to be delivered: a duplicate whose first copy is that."""
-    from stations.plant.faults import proxy
-
-    usual = proxy.replaced
-    instead: list[bytes] = []
-
-    def asked(way, frame):
-        try:
-            return script(way, frame)
-        except Changed as one:
-            instead.append(one.args[0])
-            return WireAction("duplicate")
-
-    def replaced(frame, action, of):
-        return [instead.pop()] if instead else usual(frame, action, of)
-
-    proxy.replaced = replaced
-    return asked
-
-
-@pytest.fixture(autouse=True)
-def _as_it_was():
-    from stations.plant.faults import proxy
-
-    usual = proxy.replaced
-    yield
-    proxy.replaced = usual
 
 
 def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
@@ -119,17 +89,17 @@ def test_a_slot_that_forgets_what_was_taken_is_refused() -> None:
             slot.take()
 
 
-def test_words_in_the_wrong_order_are_no_identity() -> None:
+@each(
+    [
+        (FaultOrder(kind="swapped_words", serial="U000"), lambda reader: reader.slots[0].identity(), "word order"),
+        (FaultOrder(kind="exceptions_off", device="reader"), lambda reader: reader.start(100.0), "sampling is stopped"),
+    ],
+    lambda row: row[2],
+)
+def test_words_in_the_wrong_order_are_no_identity_and_a_reader_that_does_not_start_is_refused(row) -> None:
+    fault, asked, words = row
     config, lot = load_station(), lot_of(1)
     plant = make_plant(config, lot)
-    plant.inject(FaultOrder(kind="swapped_words", serial="U000"))
-    with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match="word order"):
-        station.reader.slots[0].identity()
-
-
-def test_a_reader_that_does_not_start_is_refused() -> None:
-    config, lot = load_station(), lot_of(1)
-    plant = make_plant(config, lot)
-    plant.inject(FaultOrder(kind="exceptions_off", device="reader"))
-    with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match="sampling is stopped"):
-        station.reader.start(100.0)
+    plant.inject(fault)
+    with serve_plant(config, lot, plant) as station, pytest.raises(StationRefused, match=words):
+        asked(station.reader)

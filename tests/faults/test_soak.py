@@ -9,6 +9,7 @@ import os
 import random
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -99,7 +100,6 @@ class Server:
         self.line.until(self._answers, "the server answers", 300.0)
 
     def kill(self) -> None:
-        assert self.process is not None
         self.process.send_signal(signal.SIGKILL)
         self.process.wait(30)
 
@@ -114,12 +114,8 @@ class Server:
 def small_disk(place: Path) -> Generator[bool]:
     """A folder on a file system of its own of 256 MB; whether it is one (only root may mount)."""
     place.mkdir()
-    mounted = (
-        os.geteuid() == 0
-        and not subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", "size=256m", "tmpfs", str(place)], capture_output=True, check=False
-        ).returncode
-    )
+    command = ["mount", "-t", "tmpfs", "-o", "size=256m", "tmpfs", str(place)]
+    mounted = os.geteuid() == 0 and subprocess.run(command, capture_output=True, check=False).returncode == 0
     try:
         yield mounted
     finally:
@@ -181,7 +177,6 @@ class Soak:
 
     def clock_jumps(self, chance: random.Random) -> None:
         """The clock of a station is an hour wrong while it measures, then right again."""
-        assert self.clocks is not None
         name = chance.choice(STATIONS)
         self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
         self.clocks.set(name, chance.choice((-OFF_S, OFF_S)))
@@ -209,7 +204,6 @@ class Soak:
     def database_dies(self, chance: random.Random) -> None:
         """The database is killed while stations measure, and comes back after some seconds."""
         database, name = self.server.database, chance.choice(STATIONS)
-        assert database is not None
         self.line.until(lambda: self.sampling(name), f"{name} measures", SHIFT_S)
         database.kill()
         time.sleep(chance.uniform(1.0, DATABASE_OFF_S))
@@ -240,9 +234,7 @@ class Soak:
         for name in STATIONS:
             self.order(name, number)
         time.sleep(chance.uniform(5.0, 25.0))
-        fault = (
-            list(self.faults)[number % len(self.faults)] if number < len(self.faults) else chance.choice([*self.faults])
-        )
+        fault = [*self.faults][number] if number < len(self.faults) else chance.choice([*self.faults])
         self.faults[fault](chance)
         self.happened[fault] += 1
         end = time.monotonic() + SHIFT_S
@@ -274,7 +266,6 @@ class Soak:
 
     def size(self) -> dict[str, tuple[float, int]]:
         """Memory, MB, and open files of the server and of the first process of each worker."""
-        assert self.server.process is not None
         pids = {"server": self.server.process.pid} | {name: p.pid for name, (_, p) in self.workers.items()}
         out = {}
         for name, pid in pids.items():
@@ -301,9 +292,7 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
         archive = Archive(tmp_path / "disk" / "archive")
         infos = archive.runs()
         assert Counter(info.station for info in infos if info.finished) == dict.fromkeys(STATIONS, SHIFTS)
-        assert len(infos) == SHIFTS * len(STATIONS), (
-            "an order has one run in the archive, however often it was interrupted"
-        )
+        assert len(infos) == SHIFTS * len(STATIONS), "an order has one run, however often it was interrupted"
         records = [path.parent for path in (archive.root / "captures").glob("*/*/record.json")]
         per_capture = Counter(path.parent.name for path in records)
         assert len(per_capture) == len(infos)
@@ -321,8 +310,6 @@ def test_shifts_with_faults_lose_nothing_measure_nothing_twice_and_leave_every_s
 
 
 def free_port() -> int:
-    import socket
-
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

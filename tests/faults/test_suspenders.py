@@ -5,7 +5,7 @@ import pytest
 from small_station import QUIET, MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
 from pipelines.capture.capture import capture
-from schemas.errors import OperatorNeeded, StationTimeout
+from schemas.errors import OperatorNeeded
 from schemas.event import MemoryLog
 from stations.opening import make_plant, open_station, serve_plant
 
@@ -77,13 +77,10 @@ def test_a_chamber_that_loses_its_power_for_a_while_is_settled_anew():
 
 
 def test_a_door_that_stays_open_ends_the_run_with_its_finished_records():
-    with pytest.raises(
-        OperatorNeeded,
-        match=r"paused for 3\d\d s: the chamber's door is open, .*; correct it .* no measured record is lost",
-    ) as end:
-        run(
-            {"kind": "door", "at_s": DURING}, sink=(sink := MemorySink()), events=(events := MemoryLog()), limit_s=300.0
-        )
+    sink, events = MemorySink(), MemoryLog()
+    words = r"paused for 3\d\d s: the chamber's door is open, .*; correct it .* no measured record is lost"
+    with pytest.raises(OperatorNeeded, match=words) as end:
+        run({"kind": "door", "at_s": DURING}, sink=sink, events=events, limit_s=300.0)
     assert end.value.exit_status == 3
     assert end.value.condition.endswith("correct it")  # who is asked at the station gives no command
     assert sorted(sink.records) == [0]
@@ -113,13 +110,6 @@ def test_the_emergency_stop_waits_for_nothing_and_leaves_the_station_safe():
     assert plant.now < DURING + 15.0
 
 
-def test_an_emergency_stop_in_the_middle_of_a_move_is_told_by_its_name():
-    lot = lot_of()
-    config = station_of(faults=[{"kind": "emergency_stop", "at_s": 900.5}])
-    with pytest.raises(OperatorNeeded, match="emergency stop is pressed"):
-        run(config=config, lot=lot, recipe=short_recipe(poses=2).model_copy(update={"poses": RECIPE.poses[2:]}))
-
-
 def test_one_supply_that_stays_low_costs_its_unit_and_nobody_else():
     sink, events = run({"kind": "supply_sag", "at_s": DURING, "serial": "U001"}, limit_s=120.0)
     readings = sink.all(1)
@@ -143,24 +133,10 @@ def test_soaks_tell_how_far_they_went_beyond():
     assert 0.0 <= soaks[1]["device_overshoot_K"] < soaks[1]["air_overshoot_K"]
 
 
-def test_a_device_that_alone_never_settles_is_refused_and_the_others_go_on():
-    config = station_of(faults=[{"kind": "frozen_temperature", "at_s": 300.0, "serial": "U002"}])
-    config = config.model_copy(update={"soak": config.soak.model_copy(update={"limit_s": 1800.0})})
-    sink, _ = run(config=config, recipe=short_recipe(poses=1, temperatures=(40.0,)))
-    readings = sink.all(1)
-    assert set(readings.query("unit == 'U002'")["status"]) == {"slot 2: does not settle at 40 °C"}
-    assert (readings.query("unit != 'U002'")["status"] == "ok").all()
-
-
 def test_a_device_of_the_station_that_is_silent_for_a_moment_costs_no_run():
     sink, events = run({"kind": "silent", "at_s": DURING, "for_s": 8.0, "device": "chamber"})
     assert len(sink.records) == 4
     assert kinds(events) == ["suspended"]
-
-
-def test_a_device_of_the_station_that_stays_silent_is_named():
-    with pytest.raises(StationTimeout, match="chamber"):
-        run({"kind": "silent", "at_s": DURING, "device": "chamber"})
 
 
 @pytest.mark.parametrize("records", [1, 2])

@@ -7,30 +7,21 @@ import numpy as np
 import pandas as pd
 import pytest
 from capture_double import CaptureDouble, PulledPlug, small_job, small_run
-from typer.testing import CliRunner
+from each import each
 
 from pipelines.archive import Archive, Run
+from pipelines.archive.cleaning import clean
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from pipelines.cli import app
 from pipelines.cli.summary import exit_status, summary
 from pipelines.export import unit_calibrations
 from pipelines.report import render
 from schemas.errors import DataRejected, WrongUse
 
 TABLES_OF_RESULTS = (
-    "dwells",
-    "coefficients",
-    "covariance",
-    "residuals",
-    "predictions",
-    "wander",
-    "verification",
-    "verification_poses",
-    "allan",
-    "noise",
-    "figures",
-)
+    "dwells", "coefficients", "covariance", "residuals", "predictions", "wander", "verification", "verification_poses",
+    "allan", "noise", "figures",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +40,7 @@ def test_a_unit_that_falls_silent_is_reported_and_the_others_go_on(spoilt: Run) 
     grades = spoilt.table("grades").set_index("unit")
     assert grades["outcome"].to_dict() == {"A1": "pass", "A2": "refused", "A3": "pass"}
     assert "stopped answering at record 3" in grades.loc["A2", "reasons"]
+    assert grades.loc["A2", "grade"] == "none"
 
 
 def test_the_others_get_what_they_would_have_got(spoilt: Run, sound: Run) -> None:
@@ -60,14 +52,9 @@ def test_the_others_get_what_they_would_have_got(spoilt: Run, sound: Run) -> Non
     assert (coefficients["standard_error"] / wanted["standard_error"]).between(0.9, 1.1).all()
 
 
-@pytest.mark.parametrize("table", TABLES_OF_RESULTS)
-def test_refused_data_never_have_a_result(spoilt: Run, table: str) -> None:
+@each(TABLES_OF_RESULTS)
+def test_refused_data_never_have_a_result(table: str, spoilt: Run) -> None:
     assert "A2" not in set(spoilt.table(table)["unit"])
-
-
-def test_refused_data_never_have_a_grade(spoilt: Run) -> None:
-    grades = spoilt.table("grades").set_index("unit")
-    assert grades.loc["A2", "grade"] == "none"
 
 
 def test_refused_data_are_never_exported(spoilt: Run) -> None:
@@ -80,8 +67,6 @@ def test_the_report_names_the_refused_unit_and_gives_it_no_number(spoilt: Run) -
     page = render(spoilt)
     row = re.search(r'<tr><td class="n">1</td><td><a href="#A2">.*?</tr>\s*<tr>.*?</tr>', page, flags=re.DOTALL)
     section = re.search(r'<details class="unit" id="A2" open>.*?</details>', page, flags=re.DOTALL)
-    assert row is not None
-    assert section is not None
     reasons = r'<ul class="reasons">.*?stopped answering at record 3.*?</ul>'
     for part in (row[0], section[0]):
         bare, count = re.subn(reasons, "", part, flags=re.DOTALL)
@@ -92,7 +77,6 @@ def test_the_report_names_the_refused_unit_and_gives_it_no_number(spoilt: Run) -
         assert "none" in words  # the grade
     assert not re.search(r"\bA2\b", page.replace(row[0], "").replace(section[0], ""))
     sound_section = re.search(r'<details class="unit" id="A1">.*?</details>', page, flags=re.DOTALL)
-    assert sound_section is not None
     assert page.index(section[0]) < page.index(sound_section[0])
     assert "<svg" in sound_section[0]
 
@@ -121,11 +105,11 @@ def test_a_station_that_delivers_no_time_is_refused(tmp_path: Path) -> None:
     assert records.finished() == set()
 
 
-@pytest.mark.parametrize("stop_after", [7, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 1, 22))])
-def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, sound: Run, stop_after: int) -> None:
-    archive, job = Archive(tmp_path / "archive"), small_job(tmp_path)
+def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, sound: Run) -> None:
+    archive, job, stop_after = Archive(tmp_path / "archive"), small_job(tmp_path), 7
     with pytest.raises(PulledPlug):
         list(Runner(job, archive, measure=CaptureDouble(stop_after=stop_after)).all())
+    assert clean(archive).removed == []
     second = CaptureDouble()
     runner = Runner(job, archive, measure=second)
     for stage in ORDER[:-1]:
@@ -133,42 +117,3 @@ def test_a_capture_that_was_cut_off_goes_on_and_ends_the_same(tmp_path: Path, so
     assert len(second.measured) == job.recipe.planned_records - stop_after
     for name in sound.tables():
         assert (runner.run.path / f"{name}.parquet").read_bytes() == (sound.path / f"{name}.parquet").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words", "status"),
-    [
-        (["run", "nosuch"], "no recipe is called 'nosuch'", 2),
-        (["run", "production", "--units", "A,A"], "serial A is there twice", 2),
-        (["run", "production", "--units", ","], "serial '' is", 2),
-        (["run", "production", "--station", "none.toml"], "none.toml cannot be read", 2),
-        (["show", "nosuch"], "there is no run yet", 2),
-        (["export", "nosuch"], "there is no run yet", 2),
-        (["export", "--format", "hex"], "no format is called 'hex'", 2),
-    ],
-)
-def test_wrong_use_is_one_message_and_status_2(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    words: str,
-    status: int,
-) -> None:
-    from pipelines.cli import main
-
-    monkeypatch.setattr("sys.argv", ["tumbleline", *arguments, "--archive", str(tmp_path / "archive")])
-    with pytest.raises(SystemExit) as left:
-        main()
-    told = capsys.readouterr()
-    assert left.value.code == status
-    assert told.out == ""
-    assert words in told.err
-    assert "Traceback" not in told.err
-    assert len(told.err.strip().splitlines()) == 1
-
-
-def test_an_archive_that_cannot_be_written_is_told_before_anything_is_measured(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    result = CliRunner().invoke(app, ["run", "--direct", "--archive", str(tmp_path / "file")])
-    assert "cannot be written" in str(result.exception)

@@ -6,6 +6,7 @@ import struct
 import subprocess
 import sys
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,35 +14,24 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from each import each
+from root_process import ROOT
 from scipy.io import savemat
 
 from pipelines.importers import exchange, files
 from pipelines.tables.dwell_table import covariates
 from schemas.errors import DataRejected
 
-ROOT = Path(__file__).resolve().parents[2]
-RECIPE = ROOT / "schemas" / "samples" / "production.toml"
+DWELLS = pd.DataFrame({"unit": "A1", "dwell": range(4), "time_s": np.arange(4) * 10.0}).assign(
+    out_x=0.1, out_y=0.2, out_z=1.0
+)
 
 
-def record(n: int = 400) -> pd.DataFrame:
-    frame = pd.DataFrame(np.tile([0.0, 0.6, 0.8], (n, 1)), columns=["ax", "ay", "az"])
-    frame.insert(0, "t", np.arange(n) / 100.0)
-    return frame
-
-
-def dwells(n: int = 4) -> pd.DataFrame:
-    frame = pd.DataFrame({"unit": "A1", "dwell": range(n), "time_s": np.arange(n) * 10.0})
-    return frame.assign(out_x=0.1, out_y=0.2, out_z=0.97)
-
-
-def test_broken_notes_of_pandas_in_a_parquet_file_do_not_matter(tmp_path: Path) -> None:
-    table = pa.Table.from_pandas(dwells()).replace_schema_metadata({b"pandas": b'{"index_columns": [{"kind": 7'})
+def test_broken_notes_of_pandas_and_an_index_without_a_name_in_a_parquet_file_do_not_matter(tmp_path: Path) -> None:
+    table = pa.Table.from_pandas(DWELLS).replace_schema_metadata({b"pandas": b'{"index_columns": [{"kind": 7'})
     pq.write_table(table, tmp_path / "d.parquet")
     assert len(exchange.read_dwells(tmp_path / "d.parquet")) == 4
-
-
-def test_an_index_without_a_name_is_no_column(tmp_path: Path) -> None:
-    dwells().set_index(pd.Index([5, 6, 7, 9])).to_parquet(tmp_path / "d.parquet")
+    DWELLS.set_index(pd.Index([5, 6, 7, 9])).to_parquet(tmp_path / "d.parquet")
     assert covariates(exchange.read_dwells(tmp_path / "d.parquet")) == []
 
 
@@ -83,30 +73,25 @@ def test_a_variable_of_a_class_that_is_not_read_is_left_out(tmp_path: Path) -> N
     assert list(files.read(tmp_path / "a.mat")[0].columns) == ["b"]
 
 
-def nested(depth: int) -> dict:
-    content: dict = {"x": np.arange(3.0)}
-    for _ in range(depth):
-        content = {"s": content}
-    return content
-
-
 def test_structures_of_matlab_are_read_to_a_depth(tmp_path: Path) -> None:
-    savemat(tmp_path / "a.mat", nested(5))
+    content: dict = {"x": np.arange(3.0)}
+    for depth in range(1, 41):
+        content = {"s": content}
+        if depth in {5, 40}:
+            savemat(tmp_path / f"{'a' if depth == 5 else 'b'}.mat", content)
     assert list(files.read(tmp_path / "a.mat")[0].columns) == ["s.s.s.s.s.x"]
-    savemat(tmp_path / "b.mat", nested(40))
     with pytest.raises(DataRejected, match="more than 16 structures in one another"):
         files.read(tmp_path / "b.mat")
 
 
-def bomb_gzip() -> bytes:
+def bomb_gzip(form: int = 31) -> bytes:
     """256 MiB of zeros in a quarter of one."""
-    packer, piece = zlib.compressobj(6, zlib.DEFLATED, 31), bytes(2**24)
+    packer, piece = zlib.compressobj(6, zlib.DEFLATED, form), bytes(2**24)
     return b"".join([*(packer.compress(piece) for _ in range(16)), packer.flush()])
 
 
 def bomb_matlab() -> bytes:
-    packer, piece = zlib.compressobj(6), bytes(2**24)
-    body = b"".join([*(packer.compress(piece) for _ in range(16)), packer.flush()])
+    body = bomb_gzip(zlib.MAX_WBITS)
     return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(body)) + body
 
 
@@ -125,8 +110,8 @@ def bomb_texts() -> bytes:
     return sink.getvalue()
 
 
-@pytest.mark.parametrize("bomb", [bomb_gzip, bomb_matlab, bomb_parquet, bomb_texts])
-def test_a_file_that_unpacks_to_too_much_is_refused_in_little_memory(tmp_path: Path, bomb) -> None:
+@each([bomb_gzip, bomb_matlab, bomb_parquet, bomb_texts], lambda bomb: bomb.__name__)
+def test_a_file_that_unpacks_to_too_much_is_refused_in_little_memory(bomb: Callable[[], bytes], tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(bomb())
     program = (
@@ -136,16 +121,15 @@ def test_a_file_that_unpacks_to_too_much_is_refused_in_little_memory(tmp_path: P
         "except DataRejected as problem: print(problem)\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=True, cwd=RECIPE.parents[2]
-    )
+    command = [sys.executable, "-c", program, str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     message, grown = done.stdout.splitlines()
     assert "unpack to" in message
     assert int(grown) < 500_000  # kB
 
 
 def test_a_gzip_file_cut_or_changed_is_refused(tmp_path: Path) -> None:
-    whole = gzip.compress(record().to_csv(index=False).encode(), mtime=0)
+    whole = gzip.compress(b"t,ax,ay,az\n" + b"0.01,0.0,0.6,0.8\n" * 400, mtime=0)
     for data in (whole[:-20], whole[:5], whole[:40] + b"\x00" * 9 + whole[49:], whole + b"\x1f\x8brest"):
         (tmp_path / "a.csv.gz").write_bytes(data)
         with pytest.raises(DataRejected, match=r"gzip file of .* that does not unpack"):

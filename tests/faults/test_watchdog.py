@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from driven_station import FAR, HOT, SLOW, SOON_S, driver, look, safe_within, told
+from driven_station import FAR, HOT, SLOW, SOON_S, driver, leases_of, look, safe_within, told
 from served_station import modbus_station, served
 from small_station import lot_of
 
@@ -20,17 +20,15 @@ from schemas.errors import LeaseLost, OperatorNeeded
 from schemas.safety import SAFE_WITHIN_S
 from stations.opening import open_devices, open_station
 from stations.safety import folder
-from stations.safety.lease_parts import addresses
-from stations.safety.leases import Leases, holders, new_holder
+from stations.safety.leases import holders
 
 
 @pytest.fixture(autouse=True)
 def state(tmp_path, monkeypatch):
     monkeypatch.setenv("TUMBLELINE_STATE", str(tmp_path / "state"))
     yield tmp_path / "state"
-    for process in Path("/proc").glob(
-        "[0-9]*"
-    ):  # a watchdog goes on trying to reach a station that is gone with its test
+    # a watchdog goes on trying to reach a station that is gone with its test
+    for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             if f"TUMBLELINE_STATE={tmp_path / 'state'}".encode() in (process / "environ").read_bytes().split(b"\0"):
                 os.kill(int(process.name), signal.SIGKILL)
@@ -42,9 +40,7 @@ def test_a_killed_run_leaves_its_station_safe_and_free():
         with driver(config) as process:
             assert look(config)[1:] == (True, HOT, "running")
             end = time.monotonic() + SOON_S
-            while (
-                look(config)[0] <= 0.0 and time.monotonic() < end
-            ):  # until the encoder shows that the axis is on its way
+            while look(config)[0] <= 0.0 and time.monotonic() < end:  # until the encoder shows that it is on its way
                 time.sleep(0.05)
             process.kill()
             process.wait()
@@ -87,9 +83,9 @@ def test_a_drive_that_is_asked_again_and_again_goes_on():
             assert outer.moving()
 
 
-def test_a_holder_that_stood_still_is_refused_when_it_wakes(state):
+def test_a_holder_that_stood_still_is_refused_when_it_wakes():
     config = modbus_station(1)
-    leases = Leases(state, new_holder("served", "a"), addresses(config), lapse_s=0.05)
+    leases = leases_of(config, lapse_s=0.05)
     leases.take()
     leases.require()
     time.sleep(0.1)
@@ -120,14 +116,14 @@ def test_a_station_that_is_driven_is_refused_with_who_drives_it():
             pytest.fail("two drive one station")
 
 
-def test_two_files_that_name_one_device_share_its_lease(state):
+def test_two_files_that_name_one_device_share_its_lease():
     ours = modbus_station(4000, host="127.0.0.1")
     theirs = modbus_station(4001, host="localhost").model_copy(update={"name": "another"})
     chamber = ours.devices.chamber.model_copy(update={"host": "localhost"})
     theirs = theirs.model_copy(update={"devices": theirs.devices.model_copy(update={"chamber": chamber})})
-    first = Leases(state, new_holder("served", "a"), addresses(ours), 10.0)
+    first = leases_of(ours)
     first.take()
-    second = Leases(state, new_holder("another", "b"), addresses(theirs), 10.0)
+    second = leases_of(theirs, "b", name="another")
     with pytest.raises(OperatorNeeded, match=r"the chamber at 127\.0\.0\.1:4000/3 is driven by a "):
         second.take()
     assert second.held() == []  # all or none
@@ -136,11 +132,11 @@ def test_two_files_that_name_one_device_share_its_lease(state):
     second.release()
 
 
-def test_devices_that_share_a_place_need_one_lease(state):
+def test_devices_that_share_a_place_need_one_lease():
     config = modbus_station(4000)
     same = config.devices.outer
     both = config.model_copy(update={"devices": config.devices.model_copy(update={"inner": same})})
-    leases = Leases(state, new_holder("served", "a"), addresses(both), 10.0)
+    leases = leases_of(both)
     leases.take()
     assert set(leases.held()) == {"outer", "chamber", "reader"}
     leases.release()
@@ -148,7 +144,7 @@ def test_devices_that_share_a_place_need_one_lease(state):
 
 def foreign(state, config, **about):
     """Lease files as another holder, gone or far away, has left them."""
-    leases = Leases(state, new_holder("served", "theirs"), addresses(config), 10.0)
+    leases = leases_of(config, "theirs")
     leases.take()
     leases.hand_over()
     for path in (state / "leases").glob("*.json"):
@@ -160,7 +156,7 @@ def test_a_lease_of_a_dead_process_is_free_at_once(state):
     with subprocess.Popen([sys.executable, "-c", ""]) as process:
         process.wait()
     foreign(state, config, pid=process.pid)
-    mine = Leases(state, new_holder("served", "mine"), addresses(config), 10.0)
+    mine = leases_of(config, "mine")
     mine.take()
     assert folder.read_log(state)[0]["event"] == "lease_taken_over"
     mine.release()
@@ -169,7 +165,7 @@ def test_a_lease_of_a_dead_process_is_free_at_once(state):
 def test_a_lease_of_another_machine_is_free_when_its_heart_has_stopped_for_a_minute(state):
     config = modbus_station(4000)
     foreign(state, config, host="elsewhere")
-    mine = Leases(state, new_holder("served", "mine"), addresses(config), 10.0)
+    mine = leases_of(config, "mine")
     with pytest.raises(OperatorNeeded, match=r"on elsewhere since .* free at the latest 60 s"):
         mine.take()
     for path in (state / "leases").glob("*.json"):
@@ -183,7 +179,7 @@ def test_leases_are_taken_by_one_of_many(state):
     won, lost, start = [], [], threading.Barrier(8)
 
     def compete(number):
-        leases = Leases(state, new_holder("served", f"run {number}"), addresses(config), 10.0)
+        leases = leases_of(config, f"run {number}")
         start.wait()
         try:
             leases.take()
@@ -203,7 +199,7 @@ def test_leases_are_taken_by_one_of_many(state):
 
 def test_a_lease_survives_that_somebody_clears_its_folder(state):
     config = modbus_station(4000)
-    leases = Leases(state, new_holder("served", "a"), addresses(config), 10.0)
+    leases = leases_of(config)
     leases.take()
     for path in (state / "leases").glob("*.json"):
         path.unlink()

@@ -9,21 +9,21 @@ import time
 from pathlib import Path
 
 import pytest
-from capture_double import CaptureDouble, PulledPlug, small_job, small_run
+from capture_double import CaptureDouble, small_job, small_run
 from ledger_events import day, event
+from root_process import ROOT
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive, files, hash_chain, parquet
 from pipelines.archive.cleaning import clean
 from pipelines.archive.locks import alone
 from pipelines.certificates import Ledger
-from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
 from pipelines.cli import app
 from pipelines.integrity import verify
 from schemas.errors import ArchiveUnusable
 
-TESTS = Path(__file__).resolve().parents[1]
+TESTS = ROOT / "tests"
 WRITERS = 8
 MANIFESTS = ("runs/*/*.json", "captures/*/[0-9]*/record.json", "calibrations/*/*/[0-9]*.json", "chain/*/[0-9]*.json")
 
@@ -64,12 +64,8 @@ while True:
 """
 
 
-def script(text: str) -> str:
-    return text.format(tests=str(TESTS), root=str(TESTS.parent))
-
-
 def start(text: str, *arguments: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", script(text), *map(str, arguments)]
+    command = [sys.executable, "-c", text.format(tests=str(TESTS), root=str(ROOT)), *map(str, arguments)]
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "TUMBLELINE_SIGNING_KEY": ""}
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
 
@@ -131,7 +127,6 @@ def test_a_writer_killed_in_a_publish_leaves_only_what_clean_takes_away(tmp_path
     left: list[Path] = []
     for _ in range(20):
         writer = start(FLOOD, folder)
-        assert writer.stdout is not None
         assert writer.stdout.readline() == "ready\n"
         end = time.monotonic() + 20.0
         while not list(folder.glob(f"{files.TEMPORARY}*")) and time.monotonic() < end:
@@ -152,26 +147,25 @@ def test_a_writer_killed_in_a_publish_leaves_only_what_clean_takes_away(tmp_path
     assert not list(root.rglob(f"{files.TEMPORARY}*"))
 
 
-def test_clean_takes_nothing_that_is_being_written_now(tmp_path: Path) -> None:
+def test_clean_takes_nothing_that_is_being_written_or_measured_now(tmp_path: Path) -> None:
     Archive(tmp_path).prepare()
-    folder = tmp_path / "chain" / "000000"
+    folder, capture = tmp_path / "chain" / "000000", tmp_path / "captures" / "c"
     folder.mkdir(parents=True)
     with files._aside(folder) as aside:
         aside.write_bytes(b"half")
         done = clean(Archive(tmp_path))
         assert (done.removed, done.busy) == ([], [str(folder)])
         assert aside.read_bytes() == b"half"
-    (folder / f"{files.TEMPORARY}dead").write_bytes(b"half")
-    assert clean(Archive(tmp_path)).removed == [str(folder / f"{files.TEMPORARY}dead")]
-
-
-def test_clean_leaves_a_capture_alone_that_is_being_measured(tmp_path: Path) -> None:
-    Archive(tmp_path).prepare()
-    capture = tmp_path / "captures" / "c"
     with alone(capture):
         (capture / f"{files.TEMPORARY}ahead-00003").mkdir()
         assert clean(Archive(tmp_path)).removed == []
-    assert clean(Archive(tmp_path)).removed == [str(capture / f"{files.TEMPORARY}ahead-00003")]
+    left = [folder / f"{files.TEMPORARY}dead", capture / f"{files.TEMPORARY}ahead-00003"]
+    left[0].write_bytes(b"12345")
+    for words, removed in (("found", ["--dry-run"]), ("removed", [])):
+        told = CliRunner().invoke(app, ["archive", "clean", *removed, "--archive", str(tmp_path)])
+        assert f"2 leftovers of killed writers {words} (5 bytes)" in told.stdout
+        assert told.exit_code == 0
+    assert not any(path.exists() for path in left)
 
 
 def test_clean_finds_what_a_killed_writer_left_out_of_the_chain(tmp_path: Path) -> None:
@@ -193,22 +187,3 @@ def test_a_run_that_is_finished_again_is_sealed(tmp_path: Path) -> None:
     runner = Runner(job, archive, measure=CaptureDouble(stop_after=0))
     assert all(done.reused for done in runner.all())
     assert mark.is_file()
-
-
-def test_the_command_says_what_it_took_away(tmp_path: Path) -> None:
-    Archive(tmp_path).prepare()
-    (tmp_path / f"{files.TEMPORARY}dead").write_bytes(b"12345")
-    told = CliRunner().invoke(app, ["archive", "clean", "--dry-run", "--archive", str(tmp_path)])
-    assert "1 leftover of killed writers found (5 bytes)" in told.stdout
-    told = CliRunner().invoke(app, ["archive", "clean", "--archive", str(tmp_path)])
-    assert "1 leftover of killed writers removed (5 bytes)" in told.stdout
-    assert told.exit_code == 0
-
-
-def test_a_capture_cut_off_leaves_nothing_that_hinders_the_next(tmp_path: Path) -> None:
-    archive, job = Archive(tmp_path / "archive"), small_job(tmp_path)
-    with pytest.raises(PulledPlug):
-        list(Runner(job, archive, measure=CaptureDouble(stop_after=3)).all())
-    assert clean(archive).removed == []
-    runner = Runner(job, archive, measure=CaptureDouble())
-    assert [runner.stage(name).reused for name in ORDER[:-1]] == [False] * (len(ORDER) - 1)

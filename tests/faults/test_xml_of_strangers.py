@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 from asgi_client import AsgiClient
 from capture_double import finished_run
+from each import each
+from in_process import given
 from typer.testing import CliRunner
 
 from pipelines.archive import Archive
 from pipelines.archive.backup import copy_archive
 from pipelines.certificates.document.signature_check import SignatureBroken, canonical, parsed
-from pipelines.cli import app, main
+from pipelines.cli import app
 from pipelines.workbench.application import create_app
 from pipelines.workbench.settings import WorkbenchSettings
 from schemas.errors import ArchiveUnusable
@@ -45,42 +47,32 @@ SLOW = {
 }
 
 
-@pytest.mark.parametrize("name", SLOW)
-def test_300_kb_of_xml_keep_verify_busy_for_seconds_at_most(name: str, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
+@each(SLOW)
+def test_300_kb_of_xml_keep_verify_busy_for_seconds_at_most(name: str, tmp_path: Path) -> None:
     (tmp_path / "a.xml").write_bytes(SLOW[name])
     before = time.process_time()
-    done = CliRunner().invoke(app, ["verify", "a.xml", "--json"])
+    status, out, _ = given("verify", tmp_path / "a.xml", "--json")
     assert time.process_time() - before < 6.0
-    assert done.exit_code == 1, done.output
-    assert not json.loads(done.stdout)["accepted"]
+    assert (status, json.loads(out)["accepted"]) == (1, False)
 
 
-def test_a_damaged_namespace_is_a_sentence_and_a_verdict(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    damaged = document("", ' xmlns:n="relative"')
-    with pytest.raises(
-        SignatureBroken, match=r"it has no canonical form .* a namespace in it is not an absolute address"
-    ):
+def test_a_damaged_namespace_is_a_sentence_and_a_verdict(tmp_path: Path) -> None:
+    damaged, words = document("", ' xmlns:n="relative"'), "it has no canonical form"
+    with pytest.raises(SignatureBroken, match=f"{words} .* a namespace in it is not an absolute address"):
         canonical(parsed(damaged))
     (tmp_path / "a.xml").write_bytes(damaged)
-    done = CliRunner().invoke(app, ["verify", "a.xml"])
-    assert done.exit_code == 1
-    assert "no canonical form" in done.stdout
+    status, out, _ = given("verify", tmp_path / "a.xml")
+    assert (status, "no canonical form" in out) == (1, True)
 
 
-def test_too_little_memory_is_no_verdict(tmp_path: Path, monkeypatch, capsys) -> None:
+def test_too_little_memory_is_no_verdict(tmp_path: Path, monkeypatch) -> None:
     def full(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "a.pdf").write_bytes(b"%PDF-1.7")
     monkeypatch.setattr("pyhanko.pdf_utils.reader.PdfFileReader", full)
-    monkeypatch.setattr("sys.argv", ["tumbleline", "verify", "a.pdf"])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert left.value.code == 2
-    assert "needs more memory than is available" in capsys.readouterr().err
+    status, _, message = given("verify", tmp_path / "a.pdf")
+    assert (status, "needs more memory than is available" in message) == (2, True)
 
 
 @pytest.fixture
@@ -130,15 +122,17 @@ def test_a_backup_copies_nothing_behind_a_link_and_tells_it(archive: Archive, se
     assert f"runs/{run}/grades.parquet" in copied  # all other files
 
 
-@pytest.mark.parametrize("place", ["grades.parquet", "grades.json", "run.json", ""])
-def test_every_reader_of_an_archive_refuses_what_is_behind_a_link(archive: Archive, tmp_path: Path, place: str) -> None:
+def test_every_reader_of_an_archive_refuses_what_is_behind_a_link(archive: Archive, tmp_path: Path) -> None:
     run = archive.run("latest")
-    path = Path(run.path) / place if place else Path(run.path)
-    path.rename(tmp_path / "elsewhere")
-    path.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(ArchiveUnusable, match=r"symbolic link|there is no run|not a file"):
-        run.about if place == "run.json" or not place else run.table("grades")
-    for words in (["audit"], ["verify", run.id]):
-        done = CliRunner().invoke(app, [*words, "--archive", str(archive.root)])
-        assert done.exit_code != 0
-        assert "link" in done.output or "link" in str(done.exception)
+    for place in ("grades.parquet", "grades.json", "run.json", "."):
+        path = Path(run.path) / place
+        path.rename(tmp_path / "elsewhere")
+        path.symlink_to(tmp_path / "elsewhere")
+        with pytest.raises(ArchiveUnusable, match=r"symbolic link|there is no run|not a file"):
+            run.about if place in {"run.json", "."} else run.table("grades")
+        for words in (("audit",), ("verify", run.id)):
+            status, out, message = given(*words, "--archive", archive.root)
+            assert status != 0
+            assert "link" in out + message
+        path.unlink()
+        (tmp_path / "elsewhere").rename(path)

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from scipy.stats import binomtest
-from truth import Truth
+
+from benchmarks.truth import Truth
 
 Document = Mapping[str, Any]
 FRESH_LIMIT = 1.05

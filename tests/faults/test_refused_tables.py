@@ -1,0 +1,296 @@
+"""What import and the exchange format refuse: one message that names place, value and remedy."""
+
+import gzip
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from each import each
+from in_process import given
+from lots import lot
+from scipy.io import savemat
+
+from pipelines.drawing import Chart, Plot, PlotAxis, Trace, svg_text
+from pipelines.importers import exchange, files
+from pipelines.importers.faces import six_faces
+from pipelines.importers.mapping import Mapping, build, pairs
+from pipelines.importers.record import imported
+from pipelines.jobs.recipes import load_recipe, lot_of
+from pipelines.tables.dwell_table import covariates
+from schemas.errors import DataRejected, RecipeInvalid, WrongUse
+
+Change = Callable[[pd.DataFrame], pd.DataFrame]
+CONTENT: dict[str, Any] = {
+    "columns": {"time": "t", "x": "ax", "y": "ay", "z": "az"}, "units": {"output": "g"}, "unit": "A1"
+}  # fmt: skip
+FACES = ["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+def how(**more: object) -> Mapping:
+    return build({**CONTENT, **more}, "test")
+
+
+def record(n: int = 400) -> pd.DataFrame:
+    output = np.random.default_rng(1).normal([0.0, 0.6, 0.8], 0.002, size=(n, 3))
+    frame = pd.DataFrame(output, columns=["ax", "ay", "az"])
+    frame.insert(0, "t", np.arange(n) / 100.0)
+    return frame
+
+
+def dwells(n: int = 4) -> pd.DataFrame:
+    frame = pd.DataFrame({"unit": "A1", "dwell": range(n), "time_s": np.arange(n) * 10.0})
+    return frame.assign(out_x=0.1, out_y=0.2, out_z=0.97, hum=np.arange(n) + 40.0)
+
+
+RECORDS: list[tuple[Change, tuple[str, ...], str]] = [  # a change of the record, more options, what is told
+    (lambda t: t.head(1), (), "1 sample, a record of two at least"),
+    (lambda t: t.assign(t=3.0), (), "400 samples, all at 3 s"),
+    (lambda t: t, ("--rate", "inf"), "rate_hz: found inf"),
+    (lambda t: t, ("--rate", "0"), "rate_hz: found 0"),
+    (lambda t: t, ("--blocks", "1e-300"), "block_s: found 1e-300"),
+    (lambda t: t, ("--units", "output=LSB"), "not whole numbers"),
+    (lambda t: t.assign(ax=t.ax > -1.0), (), "column 'ax' holds true and false"),
+    (lambda t: t.assign(t=t.t * 1e300), (), "column t: found 1e+298"),
+    (lambda t: t.assign(t=t.t * 1e12), ("--units", "output=g,time=s"), "-1e+11 to 1e+11 s is needed"),
+    (lambda t: t.assign(az=1e200), (), "column az: found 1e+200"),
+    (lambda t: t.rename(columns={"ax": "acc_x"}), (), "column 'ax' (for x) is not there; "),
+    (lambda t: t.assign(ay=t.ay.where(t.index != 7)), (), "row 8 (line 9), column 'ay': found nan"),
+    (lambda t: t.assign(az=t.az.where(t.index != 3, np.inf)), (), "row 4 (line 5), column 'az': found inf"),
+    (
+        lambda t: t.assign(ax=t.ax.astype(str).where(t.index != 2, "much")),
+        (),
+        "row 3 (line 4), column 'ax': found much",
+    ),
+    (lambda t: t.iloc[::-1], (), "time runs back by 0.01 s"),
+    (lambda t: t * [1.0, 9.81, 9.81, 9.81], (), "looks like m/s^2"),
+]
+
+
+@each(RECORDS, lambda row: row[2])
+def test_records_that_cannot_be_are_refused_and_leave_nothing(row: tuple[Change, tuple, str], tmp_path: Path) -> None:
+    change, more, words = row
+    change(record()).to_csv(tmp_path / "a.csv", index=False)
+    options = {"--map": "time=t,x=ax,y=ay,z=az", "--units": "output=g", "--unit": "A1"}
+    options |= dict(zip(more[::2], more[1::2], strict=True))
+    options["--archive"] = str(tmp_path / "b")
+    status, out, message = given("import", tmp_path / "a.csv", *(word for pair in options.items() for word in pair))
+    assert (status, out) == (2, "")
+    assert words in message
+    assert not (tmp_path / "b").exists()
+
+
+SERIALS = ("..", "=cmd|x", "АВС1", "A/1", "x" * 65)
+DWELLS: list[tuple[Change, str]] = [
+    (lambda t: t.drop(columns="time_s"), "column time_s is missing"),
+    (lambda t: t.assign(out_x=[0.1, np.nan, 0.1, 0.1]), r"row 1 \(unit A1\), column out_x: found nan"),
+    (lambda t: t.assign(hum=[1.0, 2.0, np.inf, 3.0]), "row 2 .*column hum: found inf"),
+    (lambda t: t.assign(dwell=[0, 1, 1, 2]), "is there twice"),
+    (lambda t: t.assign(dwell=[0, 1, 1.5, 2]), "found 1.5, a whole number"),
+    (lambda t: t.assign(unit=["A1", "", "A1", "A1"]), "row 1, column unit: empty"),
+    (lambda t: t.assign(unit=" "), "column unit: empty"),
+    *((lambda t, serial=serial: t.assign(unit=serial), "column unit: serial") for serial in SERIALS),
+    (lambda t: t.assign(outer_deg=0.0), "outer_deg without inner_deg"),
+    (lambda t: t.assign(force_x=0.0, force_y=0.0, force_z=9.81), "give force_x, force_y, force_z in g"),
+    (lambda t: t.assign(sd_x=-1.0, sd_y=1.0, sd_z=1.0), "column sd_x: found -1, 0 or more"),
+    (lambda t: t.assign(duration_s=-5.0), "column duration_s: found -5, 0 s or more is needed"),
+    (lambda t: t.assign(unit_C=-400.0), "column unit_C: found -400, -273.15 to 2000 °C is needed"),
+    (lambda t: t.assign(time_s=t.time_s * 1e300), r"column time_s: found 1e\+301"),
+    (lambda t: t.assign(out_x=t.out_x > 0.0), "column 'out_x' holds true and false"),
+    (lambda t: t.assign(hum=1e200), r"column hum: found 1e\+200"),
+    (lambda t: t.assign(n=[100, 100, 0, 100]), "row 2, column n: found 0, a mean of 1 or more samples"),
+    (lambda t: t.assign(out_unit="parsec"), r"column out_unit: found 'parsec', one of V, LSB, g, m/s\^2 is needed"),
+    (lambda t: t.assign(time_s=5.0), "column time_s: all 4 dwells of unit A1 at 5 s"),
+]
+
+
+@each(DWELLS, lambda row: row[1])
+def test_dwells_that_cannot_be_are_refused(row: tuple[Change, str], tmp_path: Path) -> None:
+    change, words = row
+    change(dwells()).to_csv(tmp_path / "dwells.csv", index=False)
+    with pytest.raises(DataRejected, match=words):
+        exchange.read_dwells(tmp_path / "dwells.csv")
+
+
+@each(
+    [
+        (b"", "no rows of data"),
+        (b"a,b,c\n", "no rows of data"),
+        (b"a,b\n1,2\n3,4,5\n", "do not have the 2 columns"),
+        (b"a,b\n1,2\n3,4,5,6\n", "do not have the 2 columns"),
+        (b"a,a\n1,2\n", "column 'a' is there twice"),
+        (b"\x00\xff\xfe\x01", "neither text"),
+        (b"\x89HDF\r\n\x1a\n", "MATLAB 7.3"),
+    ]
+)
+def test_files_that_are_no_tables_are_refused(row: tuple[bytes, str], tmp_path: Path) -> None:
+    content, words = row
+    (tmp_path / "file.csv").write_bytes(content)
+    with pytest.raises(DataRejected, match=words):
+        files.read(tmp_path / "file.csv")
+
+
+@each(
+    [
+        ({"units": {"output": "G"}}, "known unit of the output is needed: g, mg"),
+        ({"units": {"output": "g", "tme": "s"}}, "not known; did you mean time"),
+        ({"columns": {"x": "a", "y": "b"}}, "z not mapped"),
+        ({"axes": ["x", "x", "z"]}, "every axis is needed once"),
+        ({"poses": {"up": "z"}}, r"found 'z', one of \+x"),
+        ({"local_gravity_m_s2": 1.0}, "local_gravity_m_s2"),
+        ({"unitt": "A"}, "not known; did you mean unit"),
+        *(
+            ({"columns": {**CONTENT["columns"], name: "t"}}, f"'{name}' is the name of a column that an import writes")
+            for name in ("record", "slot", "time_s", "out_x", "unit_C", "kind")
+        ),
+    ]
+)
+def test_mappings_with_a_slip_are_refused(row: tuple[dict, str]) -> None:
+    content, words = row
+    with pytest.raises(RecipeInvalid, match=words):
+        how(**content)
+
+
+def test_a_covariate_may_have_any_name_and_a_likely_slip_is_remarked() -> None:
+    columns = {"x": "a", "y": "b", "z": "c", "temprature": "d", "hum": "e"}
+    assert how(columns=columns).likely_slips == {"temprature": ("temperature",)}
+
+
+def test_refusals_of_a_record_of_nobody_of_pairs_without_a_sign_and_of_dates_elsewhere() -> None:
+    with pytest.raises(WrongUse, match="no unit is mapped"):
+        imported(record(), how(unit=""), "f")
+    with pytest.raises(WrongUse, match="--map: found 'x', name=value"):
+        pairs("time=1,x", "--map")
+    with pytest.raises(DataRejected, match="column 'ax' holds dates or times"):
+        imported(record().assign(ax=pd.Timestamp("2026-01-01")), how(), "a.parquet")
+    with pytest.raises(WrongUse, match=r"'АВ' has 'А' \(U\+0410\), which only looks like a plain letter"):
+        lot_of(load_recipe(), ["АВ"])
+
+
+def test_says_so_when_there_is_neither_file_nor_run(tmp_path: Path) -> None:
+    with pytest.raises(WrongUse, match="neither a file nor a run"):
+        exchange.read_dwells("lot-7", archive=tmp_path)
+    with pytest.raises(WrongUse, match="cannot be read"):
+        exchange.read_dwells(tmp_path / "missing.csv")
+
+
+def test_history_needs_a_temperature_and_each_time_once(tmp_path: Path) -> None:
+    path = tmp_path / "history.csv"
+    for times, name, words in (([2.0, 1.0], "unit_C", ""), ([1.0, 1.0], "unit_C", "is there twice"),
+                               ([1.0, 2.0], "temp", "neither unit_C nor chamber_C")):  # fmt: skip
+        pd.DataFrame({"time_s": times, name: [20.0, 21.0]}).to_csv(path, index=False)
+        if not words:
+            assert exchange.read_history(path)["time_s"].tolist() == [1.0, 2.0]
+            continue
+        with pytest.raises(DataRejected, match=words):
+            exchange.read_history(path)
+
+
+# -- what is right is taken ---------------------------------------------------------------------------------------------
+
+
+def test_axes_signs_and_units_are_applied() -> None:
+    raw = record().assign(heat=300.15)
+    units = {"output": "mg", "temperature": "K"}
+    mapping = how(
+        columns={**CONTENT["columns"], "temperature": "heat"}, units=units, axes=["y", "x", "z"], signs=["-", "+", "+"]
+    )
+    recording = imported(raw.assign(ax=raw.ax * 1e3, ay=raw.ay * 1e3, az=raw.az * 1e3), mapping, "f")
+    assert recording.samples is not None
+    assert recording.dwells is not None
+    assert len(recording.samples) == 400
+    row = recording.dwells.iloc[0]
+    assert [row["out_x"], row["out_y"], row["unit_C"]] == pytest.approx([-0.6, 0.0, 27.0], abs=1e-3)
+
+
+def test_text_with_a_comment_and_structures_and_matrices_of_matlab_are_read(tmp_path: Path) -> None:
+    (tmp_path / "c.txt").write_text("# made by hand\nt ax\n0  1\n0.5  2\n", encoding="utf-8")
+    assert files.read(tmp_path / "c.txt")[0].to_numpy().tolist() == [[0.0, 1.0], [0.5, 2.0]]
+    savemat(tmp_path / "e.mat", {"imu": {"acc": np.arange(12.0).reshape(4, 3)}, "fs": 100.0})
+    assert list(files.read(tmp_path / "e.mat")[0].columns) == ["imu.acc_1", "imu.acc_2", "imu.acc_3"]
+    (tmp_path / "f.csv.gz").write_bytes(gzip.compress(b"t,ax\n0,1\n"))
+    assert len(files.read(tmp_path / "f.csv.gz")[0]) == 1
+
+
+@each(["ns", "us", "ms", "s"])
+def test_time_stamps_of_parquet_become_seconds_whatever_their_unit(unit: str, tmp_path: Path) -> None:
+    stamps = (pd.Timestamp("2026-01-01") + pd.to_timedelta(np.arange(400), unit="s")).astype(f"datetime64[{unit}]")
+    record().assign(t=stamps).to_parquet(tmp_path / "a.parquet")
+    dwells().assign(time_s=stamps[:4]).to_parquet(tmp_path / "d.parquet")
+    samples = imported(files.read(tmp_path / "a.parquet")[0], how(), "a.parquet").samples
+    assert samples is not None
+    assert samples["time_s"].tolist() == np.arange(400.0).tolist()
+    assert exchange.read_dwells(tmp_path / "d.parquet")["time_s"].tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("alternating", [False, True])
+def test_units_one_after_another_or_in_turn_may_each_begin_their_own_time(*, alternating: bool) -> None:
+    frame = pd.DataFrame({"t": [0.0, 10.0, 20.0] * 2, "sn": ["A"] * 3 + ["B"] * 3, "ax": 0.0, "ay": 0.6, "az": 0.8})
+    frame = frame.sort_values("t") if alternating else frame
+    mapping = how(columns={**CONTENT["columns"], "unit": "sn"}, unit="", rows="dwells")
+    dwell_table = imported(frame.reset_index(drop=True), mapping, "f").dwells
+    assert dwell_table is not None
+    assert dwell_table["unit"].tolist() == ["A"] * 3 + ["B"] * 3
+    back = frame.assign(t=[0.0, 10.0, 5.0] * 2).sort_values("sn", kind="stable").reset_index(drop=True)
+    with pytest.raises(DataRejected, match="runs back" if alternating else "row 3: time runs back by 5 s within A"):
+        imported(back, mapping, "f")
+
+
+def test_serials_of_digits_stay_text_and_dwells_keep_their_order_and_covariates(tmp_path: Path) -> None:
+    dwells().iloc[::-1].assign(unit=17).to_csv(tmp_path / "d.csv", index=False)
+    frame = exchange.read_dwells(str(tmp_path / "d.csv"))
+    assert frame["unit"].tolist() == ["17"] * 4
+    assert frame["dwell"].tolist() == [0, 1, 2, 3]
+    assert covariates(frame) == ["hum"]
+    assert len(exchange.checked(dwells(1), where="f.csv")) == 1  # one dwell of a unit needs no second time
+
+
+def faces(offset: float) -> pd.DataFrame:
+    """A sample for each face, without noise."""
+    force = np.array([[s * (k == a) for k in range(3)] for a in range(3) for s in (1.0, -1.0)]) + offset
+    return pd.DataFrame(force, columns=["ax", "ay", "az"]).assign(label=FACES)
+
+
+def test_six_faces_without_noise_cannot_be_judged_and_wrong_labels_are_seen_without_it(tmp_path: Path) -> None:
+    content = {
+        "columns": {"x": "ax", "y": "ay", "z": "az", "dwell": "label"},
+        "rows": "dwells",
+        "local_gravity_m_s2": 9.80665,
+    }
+    poses = {face: face for face in FACES}
+    right, turned = (how(**content, poses=poses | more) for more in ({}, {"+x": "-x", "-x": "+y", "+y": "+x"}))
+    judged = six_faces(imported(faces(1e-3), right, "f"), right)
+    assert judged.adequate is None
+    assert "cannot be judged" in judged.document["reason"]
+    assert six_faces(imported(faces(1e-3), turned, "f"), turned).adequate is False
+    faces(0.0).to_csv(tmp_path / "a.csv", index=False)
+    words = ("--map", "x=ax,y=ay,z=az,dwell=label", "--units", "output=g", "--unit", "A", "--rows", "dwells")
+    fit = ("--local-g", "9.81", "--fit", "faces", "--poses", ",".join(f"{face}={face}" for face in FACES))
+    status, out, _ = given("import", tmp_path / "a.csv", *words, *fit, "--archive", tmp_path / "archive")
+    assert (status, "CANNOT BE JUDGED" in out) == (1, True)
+
+
+# -- names that could be a formula or markup ----------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_column_called_like_a_formula_is_written_as_it_is(tmp_path: Path, rng: np.random.Generator) -> None:
+    name = "$\\frac{x$"
+    frame = lot(rng, units=1, temperatures=(25.0, 60.0))
+    frame[name] = rng.normal(size=len(frame))
+    frame["温度"] = rng.normal(size=len(frame))
+    frame["out_x"] += 1e-3 * frame[name]
+    frame.to_csv(tmp_path / "d.csv", index=False)
+    page = tmp_path / "page.html"
+    status, _, message = given("diagnose", tmp_path / "d.csv", "--report", page)
+    assert status == 1, message
+    assert page.read_text().count(name) > 1
+
+
+def test_no_text_of_a_picture_is_a_formula_or_markup() -> None:
+    nothing = Trace("<b>a</b>", np.zeros(1), np.zeros(1))
+    drawn = svg_text(Chart("a", (Plot("$a$ 温度", PlotAxis("$\\frac{x$"), PlotAxis("<i>y"), (nothing,)),)))
+    assert all(text in drawn for text in ("$\\frac{x$", "$a$ 温度"))
+    assert not any(tag in drawn for tag in ("<i>", "<b>"))
