@@ -8,30 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.counts import degrees_of_freedom
-from inertial.distributions import chi2_tail
-from inertial.dynamics import goodness
+from inertial.dynamics.missing_effects import FOLDS, EffectClass, Judged, judge
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points, TransferFit, best_of_exchange, fit_transfer
 
 Array = NDArray[np.float64]
-ADDED_P = 1e-3
-"""Largest p-value of an added effect of a model that is not adequate, times the number of candidates."""
-CLASS_WIDTH = 9.0
-"""Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
-MOST_ADDED = 3
-FOLDS = 5
-FEWEST_DOF = 6
-
-
-@dataclass(frozen=True)
-class EffectClass:
-    """Effects that these points do not separate, the best first; ``chi_square`` and ``dof`` of the best one's fit."""
-
-    effects: tuple[str, ...]
-    p_value: float
-    chi_square: float
-    dof: int
 
 
 @dataclass(frozen=True)
@@ -45,31 +26,18 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class TransferDiagnosis:
+class TransferDiagnosis(Judged[TransferFit]):
     """The verdict on a model of a transfer function.
 
-    adequate : None where it cannot be judged, with ``reason``
-    fit : of the judged model; extended : with the recommended effects; the same where none is
+    where : parts of the frequency range with more than their share of χ²; empty for an adequate model
     error_percent, extended_percent : rms of the relative complex residual
-    left_out : rms weighted residual of left-out points before and after; near 1 for a right model
+    next_hz : the frequencies to measure next
     """
 
-    adequate: bool | None
-    reason: str
-    fit: TransferFit
-    extended: TransferFit
     where: tuple[Failure, ...]
-    classes: tuple[EffectClass, ...]
-    unexplained: bool
     error_percent: float
     extended_percent: float
-    left_out: tuple[float, float]
     next_hz: tuple[float, ...]
-
-    @property
-    def recommended(self) -> tuple[str, ...]:
-        """One effect per class, the best of it."""
-        return tuple(one.effects[0] for one in self.classes)
 
 
 def diagnose_transfer(
@@ -82,79 +50,30 @@ def diagnose_transfer(
     effects : of the model to judge
     highest_hz : to which the exciter reaches, for the next frequencies; the points' highest where None
     """
+
+    def extended_fit(names: list[str], best: TransferFit) -> TransferFit:
+        known = {p.name: float(v) for p, v in zip(best.parameters, best.values, strict=True)}
+        fit = fit_transfer(points, names, known)
+        # mass and low-pass exchanged are another minimum, which breeds further effects
+        return best_of_exchange(points, fit)[0] if names[-1] in {"two_pole", "second_order"} else fit
+
     base = fit_transfer(points, effects)
-    if base.dof < FEWEST_DOF:
-        reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; sweep more frequencies"
-        return _verdict(points, base, base, None, reason, (), unexplained=False, highest=highest_hz)
-    if goodness.adequate(base):
-        return _verdict(points, base, base, True, "", (), unexplained=False, highest=highest_hz)
-    classes: list[EffectClass] = []
-    best, current = base, list(effects)
-    while len(classes) < MOST_ADDED and goodness.adequate(best) is False:
-        next_class = _next_class(points, best, current)
-        if next_class is None:
-            break
-        one, best = next_class
-        classes.append(one)
-        current.append(one.effects[0])
-    unexplained = goodness.adequate(best) is False
-    return _verdict(points, base, best, False, "", tuple(classes), unexplained=unexplained, highest=highest_hz)
-
-
-def _next_class(points: Points, best: TransferFit, current: Sequence[str]) -> tuple[EffectClass, TransferFit] | None:
-    """The effects that reduce the residual most, and the fit with the best of them; None where none is significant."""
-    candidates = [name for name, one in EFFECTS.items() if name not in current and one.seen(points.conditions)]
-    known = {p.name: float(v) for p, v in zip(best.parameters, best.values, strict=True)}
-    fits: dict[str, TransferFit] = {}
-    for name in candidates:
-        fits[name] = fit_transfer(points, [*current, name], known)
-        if name in {
-            "two_pole",
-            "second_order",
-        }:  # mass and low-pass exchanged are another minimum, which breeds further effects
-            fits[name] = best_of_exchange(points, fits[name])[0]
-    price = np.log(len(best.residual))
-
-    def score(fit: TransferFit) -> float:
-        return fit.chi_square + price * len(fit.parameters)
-
-    def p_value(fit: TransferFit) -> float:
-        gain = max(0.0, best.chi_square - fit.chi_square)
-        return float(min(1.0, len(candidates) * chi2_tail(gain, len(fit.parameters) - len(best.parameters))))
-
-    real = sorted((name for name in fits if p_value(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
-    if not real:
-        return None
-    top = fits[real[0]]
-    scale = max(1.0, top.chi_square / max(top.dof, 1))  # what another effect still leaves blurs the comparison
-    same = tuple(name for name in real if score(fits[name]) - score(top) < CLASS_WIDTH * scale)
-    return EffectClass(same, p_value(top), top.chi_square, top.dof), top
-
-
-def _verdict(
-    points: Points,
-    base: TransferFit,
-    extended: TransferFit,
-    adequate: bool | None,  # noqa: FBT001 - a verdict, not a switch
-    reason: str,
-    classes: tuple[EffectClass, ...],
-    *,
-    unexplained: bool,
-    highest: float | None,
-) -> TransferDiagnosis:
-    left = (_left_out(points, base.effects), _left_out(points, extended.effects) if classes else np.nan)
-    return TransferDiagnosis(
-        adequate,
-        reason,
+    judged = judge(
         base,
-        extended,
-        _where(points, base) if adequate is False else (),
-        classes,
-        unexplained,
-        _error(points, base),
-        _error(points, extended),
-        (left[0], left[1] if classes else left[0]),
-        _next_frequencies(points, base, classes, highest or float(points.conditions.frequency.max())),
+        effects,
+        [name for name, one in EFFECTS.items() if one.seen(points.conditions)],
+        extended_fit,
+        lambda fit: _left_out(points, fit.effects),
+        remedy="sweep more frequencies",
+        residuals=len(base.residual),
+    )
+    highest = highest_hz or float(points.conditions.frequency.max())
+    return TransferDiagnosis(
+        **vars(judged),
+        where=_where(points, base) if judged.adequate is False else (),
+        error_percent=_error(points, base),
+        extended_percent=_error(points, judged.extended),
+        next_hz=_next_frequencies(points, base, judged.classes, highest),
     )
 
 

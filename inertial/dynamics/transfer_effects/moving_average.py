@@ -1,7 +1,3 @@
-"""A moving average of length T, as of a decimating filter: linear phase."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,11 +14,9 @@ class MovingAverage(TransferEffect):
     breaker: ClassVar[str] = "points up to the first null at 1/T"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(points.frequency.max())
         return (Parameter("average_s", "s", 1e-3 / top, 0.98 / top, (0.1 / top, 0.4 / top, 0.8 / top), log=True),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         turn = points.frequency * values[0]
         return np.asarray(np.sinc(turn) * np.exp(-1j * np.pi * turn), dtype=np.complex128)

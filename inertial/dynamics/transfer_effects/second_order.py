@@ -1,7 +1,3 @@
-"""A sprung mass: second-order response of the sensing element."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,7 +14,6 @@ class SecondOrder(TransferEffect):
     breaker: ClassVar[str] = "points beyond the natural frequency"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(points.frequency.max())
         return (
             Parameter("natural_hz", "Hz", 0.2 * top, 50.0 * top, (0.7 * top, 1.5 * top, 4.0 * top), log=True),
@@ -26,6 +21,5 @@ class SecondOrder(TransferEffect):
         )
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         ratio = points.frequency / values[0]
         return np.asarray(1.0 / (1.0 - ratio**2 + 2.0j * values[1] * ratio), dtype=np.complex128)
