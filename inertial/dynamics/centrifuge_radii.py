@@ -15,7 +15,6 @@ BOTH = ("bias", "scale", "second_order", "third_order", "odd_quadratic", "asymme
 """Terms of a unit that both mountings and two radii separate."""
 ONE_WAY = BOTH[:4]
 """Terms of a unit in one mounting: K1′ is in the scale then, and Koq in K2."""
-ARM = ("arm_stretch", "mass_offset")
 
 
 @dataclass(frozen=True)

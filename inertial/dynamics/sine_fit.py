@@ -103,11 +103,6 @@ def harmonic_distortion(record: Array, rate_hz: float, frequency: float) -> Arra
     return np.sqrt(np.sum(c[4:] ** 2, axis=0)) / np.where(fundamental > 0.0, fundamental, np.inf)
 
 
-def frequency_error_of(sigma: float, amplitude: float, span_s: float, count: int) -> float:
-    """Standard uncertainty in Hz of a fitted frequency: √6/π·(σ/A)/(T√N)."""
-    return float(np.sqrt(6.0) / np.pi * sigma / amplitude / (span_s * np.sqrt(count)))
-
-
 def _projected(design: Array, record: Array) -> tuple[Array, Array]:
     """Coefficients (terms, channels) of least squares and residuals (n, channels).
 

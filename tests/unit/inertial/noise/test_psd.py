@@ -1,10 +1,10 @@
 """The spectrum against scipy, and against the Allan variance of the same noise."""
 
+import made_noise as generate
 import numpy as np
 import pytest
 from scipy import signal
 
-from inertial.noise import generate
 from inertial.noise.allan import overlapping
 from inertial.noise.psd import allan_variance, one_sided
 
