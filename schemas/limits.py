@@ -10,22 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import (
-    Field,
-    SerializerFunctionWrapHandler,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from schemas.bounds import Name, Number, Positive
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.strict import Strict
-from schemas.toml_files import explain, parse_toml
+from schemas.strict import Grown
+from schemas.toml_files import parse_as
 
 VALIDITY_MONTHS = 12
 """Longest that a certificate may hold where the limits file does not say: a year, the usual first interval (ILAC-G24:2022)."""
@@ -39,8 +31,10 @@ ADEQUACY_P_MIN = 0.001
 be refused, at this one in a thousand; a smaller p is a score and no probability."""
 
 
-class Limit(Strict):
+class Limit(Grown):
     """The largest magnitude of a figure that a unit may have, or its least value; the file states the unit again."""
+
+    later: ClassVar[frozenset[str]] = frozenset({"max", "min"})
 
     max: Positive | None = None
     min: Positive | None = None
@@ -53,18 +47,13 @@ class Limit(Strict):
             raise ValueError(f"max, min: {given} given, one of them is needed; state max, or min for a least value")
         return self
 
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without the side that is not stated, so that runs of earlier versions keep their names."""
-        return {name: value for name, value in handler(self).items() if value is not None}
-
     @property
     def text(self) -> str:
         """The limit for people, without its unit."""
         return f"at least {self.min:.4g}" if self.min is not None else f"{self.max:.4g}"
 
 
-class Limits(Strict):
+class Limits(Grown):
     """The limits file: name, rule, coverage factor and a limit per figure.
 
     Parameters
@@ -74,6 +63,8 @@ class Limits(Strict):
     pfa_max : probability of false acceptance that the rule ``allowed_pfa`` allows; 2 % where it is not stated.
     adequacy_p_min : least p of the model's residual with which a run is certified; :data:`ADEQUACY_P_MIN` where it is not stated.
     """
+
+    later: ClassVar[frozenset[str]] = frozenset({"validity_months", "pfa_max", "adequacy_p_min"})
 
     name: Name
     rule: Rule = "guarded_acceptance"
@@ -95,13 +86,6 @@ class Limits(Strict):
     def longest_validity_months(self) -> int:
         """Longest that a certificate by these limits may hold, months: as the file says, else the product's policy."""
         return VALIDITY_MONTHS if self.validity_months is None else self.validity_months
-
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without what is not stated: runs are named for their limits, and those of earlier versions keep their names."""
-        content = handler(self)
-        later = ("validity_months", "pfa_max", "adequacy_p_min")
-        return {name: value for name, value in content.items() if name not in later or value is not None}
 
     @field_validator("figures")
     @classmethod
@@ -148,10 +132,7 @@ def parse_limits(text: str, source: str, units: Mapping[str, str]) -> Limits:
     ----------
     units : unit of every known figure, by name.
     """
-    try:
-        return limits_of(parse_toml(text, source), units)
-    except ValidationError as problem:
-        raise explain(problem, source, Limits) from None
+    return parse_as(Limits, text, source, context=units)
 
 
 def unknown_limits(name: str, known: list[str]) -> RecipeInvalid:

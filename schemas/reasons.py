@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pydantic_core import ErrorDetails
 
 from schemas.serials import NEEDED, SERIAL_PATTERN
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
 
 PATTERNS = {
     SERIAL_PATTERN: NEEDED,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from schemas.bounds import Celsius, NotNegative, Number, Positive, Seconds, Text
-from schemas.strict import Strict
+from schemas.strict import OnlyStated, Strict
 
 
 class Ageing(Strict):
@@ -36,7 +36,7 @@ class Ageing(Strict):
         return self
 
 
-class Stability(Strict):
+class Stability(OnlyStated):
     """What a kind of device does beyond a run.
 
     switch_on_ug, switch_on_ppm : standard deviation of bias and scale from one switch-on to the next
@@ -67,12 +67,8 @@ class Stability(Strict):
     scale_temperature_ppm_K: NotNegative = 0.0
     note: Text = ""
 
-    @model_serializer(mode="wrap")
-    def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if name in self.model_fields_set}
 
-
-class CertificateTerms(Strict):
+class CertificateTerms(OnlyStated):
     """The table ``[certificate]`` of a recipe: what is certified.
 
     validity_months : period that the figures are stated for; customer_agreed : whether a due date may be printed
@@ -96,7 +92,3 @@ class CertificateTerms(Strict):
             if bounds is not None and bounds[0] >= bounds[1]:
                 raise ValueError(f"{name}: {bounds[0]:g} is not below {bounds[1]:g}; give the lower bound first")
         return self
-
-    @model_serializer(mode="wrap")
-    def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if name in self.model_fields_set}
