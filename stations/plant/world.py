@@ -21,11 +21,10 @@ from schemas.station_devices import MOST_SLOTS
 from stations.plant.bench import Bench
 from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
-from stations.plant.fixture import Fixture
+from stations.plant.fixture import Fixture, Moisture
 from stations.plant.flash import Flash
 from stations.plant.hidden import HiddenEffect, hidden_effect
 from stations.plant.keyed import keyed_normal
-from stations.plant.moisture import Moisture
 from stations.plant.noise import UnitNoise
 from stations.plant.physics import Physics
 from stations.plant.preset import Preset, load_preset

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank
-from stations.plant.drive import ABSOLUTE, start_move
+from stations.plant.controller import ABSOLUTE, start_move
 from stations.plant.table import Axis
 from stations.plant.world import World
 
