@@ -15,8 +15,6 @@ from stations.safety.leases import holders
 from stations.safety.safety_status import unsafe_reason
 from stations.station import Station
 
-AXES = ("outer", "inner")
-
 
 @dataclass
 class SlotNow:

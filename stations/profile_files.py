@@ -6,10 +6,10 @@ from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.own_files import own_file, own_names
 from schemas.profile import Profile, parse_profile
+from schemas.station_devices import Carried
 from schemas.toml_files import read_text
 
 

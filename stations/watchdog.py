@@ -30,7 +30,7 @@ from stations.safety.folder import log_event
 from stations.safety.lease_parts import Part, addresses
 from stations.safety.leases import Leases, new_holder
 from stations.safety.safe_state import SafeStep, reach_safe_state
-from stations.safety.watchdog_protocol import BEAT, DONE, READY
+from stations.safety.watchdog_client import BEAT, DONE, READY
 
 ENDED = "the run's process has ended"
 POLL_S = 0.25

@@ -16,7 +16,6 @@ WRITES = frozenset({WRITE_COIL, WRITE_COILS, WRITE_REGISTERS})
 ON, OFF = 0xFF00, 0x0000
 DIAGNOSTICS, ECHO = 8, 0  # return query data: on a serial line only (6.8)
 EXCEPTION = 0x80
-LONGEST_READ = 125  # registers in one request (6.3)
 BYTE = 8
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from second_order import step_response
 from typer.testing import CliRunner
 
 from deploy.release import unpack
 from docs.documents_page import PAGE, documents, head_of, page
-from inertial.dynamics.second_order import transfer
-from inertial.dynamics.settling import step_response
+from inertial.dynamics.spectra import transfer
 from pipelines import cli
 from pipelines.chain import certify as certifying
 from pipelines.cli import COMMANDS, app

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 
 import pytest
 from each import each
+from plant_wires import tcp_link
 from small_station import lot_of, plant_of
 
 from schemas.errors import RecipeInvalid, StationRefused
@@ -14,7 +15,6 @@ from schemas.station import load_station
 from schemas.station_devices import Device, Equipment
 from stations.codec import NotEncodable, encode
 from stations.devices.registers import Registers
-from stations.links.modbus import ModbusLink
 from stations.opening import open_station
 from stations.plant.preset import load_preset, preset_names
 from stations.plant.server import PlantServer
@@ -46,7 +46,7 @@ def served(name):
     plant = plant_of(station_with(name), lot_of(2))
     plant.advance(12_345_678)
     with PlantServer(plant) as server:
-        link = ModbusLink(server.host, server.port, timeout_s=5.0, read_attempts=1)
+        link = tcp_link(server.host, server.port, timeout_s=5.0, read_attempts=1)
         yield plant, server, link
         link.close()
 

@@ -13,7 +13,7 @@ from capture_double import PulledPlug, recipe_file, small_job
 from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from stations.plant.clock import PlantClock
+from stations.plant.plant import PlantClock
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 120.0

@@ -6,6 +6,7 @@ from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
+from plant_wires import tcp_link
 from pydantic import ValidationError
 from small_station import MemorySink, lot_of, quiet_progress, short_recipe, station_of
 
@@ -24,7 +25,6 @@ from schemas.event import MemoryLog
 from schemas.fault import FaultOrder
 from schemas.poses import Pose
 from schemas.station import load_station
-from stations.links.modbus import ModbusLink
 from stations.opening import make_plant, open_station, serve_plant
 from stations.plant.server import PlantServer
 from stations.serving import serve
@@ -175,7 +175,7 @@ def test_a_write_whose_answer_is_lost_is_sent_once():
     plant = make_plant(config, lot)
     plant.inject(FaultOrder(kind="mute", serial="U000"))
     with PlantServer(plant) as server:
-        link = ModbusLink(server.host, server.port, timeout_s=0.6, read_attempts=3)
+        link = tcp_link(server.host, server.port, timeout_s=0.6, read_attempts=3)
         with pytest.raises(StationTimeout, match=r"device 11: no answer to 'write tail"):
             link.write(11, 42, [0, 0], "tail")
         assert link.read(10, 0, 1, "slots") == [8]
@@ -205,7 +205,7 @@ def deaf_server():
 
 def test_a_write_is_sent_once_and_a_read_as_often_as_allowed():
     with deaf_server() as (port, got):
-        link = ModbusLink("127.0.0.1", port, timeout_s=0.2, read_attempts=2)
+        link = tcp_link("127.0.0.1", port, timeout_s=0.2, read_attempts=2)
         with pytest.raises(StationTimeout, match="no answer"):
             link.write(3, 2782, [0, 0], "set point")
         assert got.count(bytes.fromhex("03100ade0002")) == 1
@@ -219,7 +219,7 @@ def test_a_server_that_is_gone_is_a_lost_link_with_its_address():
     plant = make_plant(load_station(), lot_of(1))
     with PlantServer(plant) as server:
         port = server.port
-        link = ModbusLink(server.host, port, timeout_s=1.0, read_attempts=2)
+        link = tcp_link(server.host, port, timeout_s=1.0, read_attempts=2)
         assert link.read(10, 0, 1, "slots") == [8]
     with pytest.raises((LinkLost, StationTimeout), match=f"127.0.0.1:{port}"):
         link.read(10, 0, 1, "slots")
