@@ -1,7 +1,5 @@
 """Types of numbers in files with generous bounds: a value outside is a typing error, or would need unlimited time."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, FiniteFloat

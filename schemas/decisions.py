@@ -1,7 +1,5 @@
 """Decisions on figures by the rule of the limits, and the grades by the bias that is left."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan, log

@@ -4,8 +4,6 @@ The kinds are defined in ``stations/plant/faults``. This module defines the nota
 tests.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal
 
@@ -36,7 +34,7 @@ class FaultOrder(Strict):
     figures: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
-    def _one_target(self) -> FaultOrder:
+    def _one_target(self) -> "FaultOrder":
         if self.serial and self.device:
             raise ValueError(
                 f"fault {self.kind}: serial '{self.serial}' and device '{self.device}', only one of the two is allowed; "

@@ -4,8 +4,6 @@ The tables ``[[reference]]`` and ``[uncertainty]`` are those of a station's file
 recipe; the whole is kept with the import, and a run that is made from it states no more.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,7 +34,7 @@ class ImportReferences(Strict):
     certificate: CertificateTerms | None = None
 
     @model_validator(mode="after")
-    def _traced(self) -> ImportReferences:
+    def _traced(self) -> "ImportReferences":
         refuse_untraced(self.uncertainty, self.reference, simulated=False)
         return self
 

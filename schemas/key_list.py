@@ -1,7 +1,5 @@
 """The keys of the files that a user writes: notation, default and meaning, from the classes that check them."""
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from importlib.resources import files

@@ -6,8 +6,6 @@ are four outcomes; with ``simple_acceptance`` (4.2.1) the limit itself decides; 
 an allowed probability of false acceptance needs (JCGM 106:2012, 8.3.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from statistics import NormalDist
 from typing import Annotated, Any, ClassVar, Literal
@@ -41,7 +39,7 @@ class Limit(Grown):
     unit: str
 
     @model_validator(mode="after")
-    def _one_side(self) -> Limit:
+    def _one_side(self) -> "Limit":
         if (self.max is None) == (self.min is None):
             given = "neither" if self.max is None else "both"
             raise ValueError(f"max, min: {given} given, one of them is needed; state max, or min for a least value")
@@ -97,7 +95,7 @@ class Limits(Grown):
         return figures
 
     @model_validator(mode="after")
-    def _units_agree(self, info: ValidationInfo) -> Limits:
+    def _units_agree(self, info: ValidationInfo) -> "Limits":
         units = _units(info)
         for name, limit in self.figures.items():
             if limit.unit != units[name]:

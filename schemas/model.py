@@ -1,7 +1,5 @@
 """Model files: a named, versioned list of effects, and the history of who changed it, when and why."""
 
-from __future__ import annotations
-
 from datetime import date, datetime
 from pathlib import Path
 from typing import Annotated
@@ -46,7 +44,7 @@ class ModelFile(Strict):
     change: list[VersionStep] = Field(default_factory=list)
 
     @model_validator(mode="after")
-    def _consistent(self) -> ModelFile:
+    def _consistent(self) -> "ModelFile":
         effects = self.model.effects
         twice = sorted({e for e in effects if effects.count(e) > 1})
         if twice:

@@ -4,8 +4,6 @@ A profile is TOML; the client and the simulated station read the same file, so a
 only. ``verified`` states whether it was compared with the device.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -68,7 +66,7 @@ class Register(Strict):
         """Whether it may be written at all."""
         return self.access != "read"
 
-    def with_decimals(self, decimals: int) -> Register:
+    def with_decimals(self, decimals: int) -> "Register":
         """The same register, its values in steps of ten to the power of minus ``decimals``."""
         return self.model_copy(update={"scale": self.scale * 10.0**-decimals, "scaled_by": ""})
 
@@ -83,7 +81,7 @@ class Register(Strict):
         return self.address + self.words
 
     @model_validator(mode="after")
-    def _fits(self) -> Register:
+    def _fits(self) -> "Register":
         if self.end > ADDRESSES:
             raise ValueError(
                 f"{self.name}: ends at address {self.end}, the last one is {ADDRESSES - 1}; move or shorten it"
@@ -165,7 +163,7 @@ class Profile(Strict):
     stated: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
-    def _consistent(self) -> Profile:
+    def _consistent(self) -> "Profile":
         spoken = self.links == ["ascii"]
         if not (self.commands if spoken else self.registers) or (self.registers if spoken else self.commands):
             carriers = ", ".join(self.links)
@@ -199,7 +197,7 @@ class Profile(Strict):
         """The register or command of that name."""
         return self.command(name) if self.commands else self.register(name)
 
-    def limited(self, maximum: Mapping[str, float]) -> Profile:
+    def limited(self, maximum: Mapping[str, float]) -> "Profile":
         """The profile with smaller largest values, by the names of its numeric orders and of the limits of motion.
 
         Raises

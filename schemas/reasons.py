@@ -1,7 +1,5 @@
 """Why a value of a file is refused, in words: a regular expression is none."""
 
-from __future__ import annotations
-
 from pydantic_core import ErrorDetails
 
 from schemas.serials import NEEDED, SERIAL_PATTERN

@@ -4,8 +4,6 @@ The file is TOML and its keys are the fields of :class:`RecipeFile`. Poses may b
 same thing with every name resolved, and is what stages and stations are given.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -106,7 +104,7 @@ class _Measurement(Grown):
         return {**given, "temperatures_C": own}
 
     @model_validator(mode="after")
-    def _usable(self) -> _Measurement:
+    def _usable(self) -> "_Measurement":
         if self.soak_min_s < SHORTEST_SOAK_S and not self.allow_short_soak:
             raise ValueError(
                 f"soak_min_s: {self.soak_min_s:g} s, the recipe needs {SHORTEST_SOAK_S:g} s; soak longer, or set "
@@ -172,7 +170,7 @@ class RecipeFile(_Measurement):
     model: str = ""
 
     @model_validator(mode="after")
-    def _one_model(self) -> RecipeFile:
+    def _one_model(self) -> "RecipeFile":
         if not self.tumbles:
             return self
         if not self.poses:
@@ -193,7 +191,7 @@ class Recipe(_Measurement):
     formulas: list[FormulaSpec] = []
 
     @model_validator(mode="after")
-    def _soaks_name_poses_that_are_there(self) -> Recipe:
+    def _soaks_name_poses_that_are_there(self) -> "Recipe":
         for number, part in enumerate(self.soaks, start=1):
             for key, listed in (("poses", self.poses), ("verification", self.verification)):
                 beyond = [k for k in getattr(part, key) or [] if k > len(listed)]
@@ -211,7 +209,7 @@ class Recipe(_Measurement):
         return self
 
     @model_validator(mode="after")
-    def _comes_to_an_end(self) -> Recipe:
+    def _comes_to_an_end(self) -> "Recipe":
         soaks = range(len(self.temperatures_C))
         dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)
         waits = sum(
@@ -248,7 +246,7 @@ class Recipe(_Measurement):
         return _picked(self.verification, self.soaks[soak].verification if self.soaks else None)
 
     @model_validator(mode="after")
-    def _tumbles_in_poses(self) -> Recipe:
+    def _tumbles_in_poses(self) -> "Recipe":
         if self.tumbles and not self.poses:
             raise ValueError("poses: none, the multi-position test needs at least 1; add poses")
         return self

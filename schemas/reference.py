@@ -1,7 +1,5 @@
 """A reference standard of a station: what its calibrations are traced to, by which certificate, until when."""
 
-from __future__ import annotations
-
 from datetime import date as Day  # noqa: N812 - a field has its name
 from typing import Annotated, ClassVar, Literal
 
@@ -44,7 +42,7 @@ class Reference(Grown):
     sha256: Annotated[str, Field(pattern=r"^([0-9a-f]{64})?$")] = ""
 
     @model_validator(mode="after")
-    def _complete(self) -> Reference:
+    def _complete(self) -> "Reference":
         if self.U is not None and (self.k is None or self.unit is None):
             raise ValueError("k, unit: needed beside U; add the coverage factor and the unit of the certificate")
         return self

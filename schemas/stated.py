@@ -1,7 +1,5 @@
 """A stated standard uncertainty: u, or U with its k, or a half-width with its distribution; the unit stands in the key."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
@@ -82,7 +80,7 @@ class Entry(OnlyStated):
         return given
 
     @model_validator(mode="after")
-    def _stated_once(self) -> Entry:
+    def _stated_once(self) -> "Entry":
         given = _forms(self)
         parts, forms = [part for _, part, _, _ in given], {form for _, _, form, _ in given}
         twice = sorted({part for part in parts if parts.count(part) > 1})

@@ -1,7 +1,5 @@
 """A station's file: which devices it has and where, what they may do, and how a simulated one is made."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -39,7 +37,7 @@ class Limits(Strict):
     position_deg: Positive = 0.01
 
     @model_validator(mode="after")
-    def _ordered(self) -> Limits:
+    def _ordered(self) -> "Limits":
         for name, (low, high) in (
             ("outer_deg", self.outer_deg),
             ("inner_deg", self.inner_deg),
@@ -113,7 +111,7 @@ class StationConfig(Grown):
     uncertainty: Uncertainty | None = None
 
     @model_validator(mode="after")
-    def _budget_is_traced(self) -> StationConfig:
+    def _budget_is_traced(self) -> "StationConfig":
         if self.uncertainty is not None:
             refuse_untraced(self.uncertainty, self.reference, simulated=self.kind == "simulated")
         return self
@@ -125,7 +123,7 @@ class StationConfig(Grown):
         return {**built_in, **named}
 
     @model_validator(mode="after")
-    def _can_be_safe(self) -> StationConfig:
+    def _can_be_safe(self) -> "StationConfig":
         low, high = self.limits.temperature_C
         if self.safety.chamber == "set_point" and not low <= self.safety.temperature_C <= high:
             raise ValueError(
@@ -135,7 +133,7 @@ class StationConfig(Grown):
         return self
 
     @model_validator(mode="after")
-    def _complete(self) -> StationConfig:
+    def _complete(self) -> "StationConfig":
         if self.kind == "simulated" and self.simulation is None:
             raise ValueError("simulation: missing, a station of kind simulated needs it; add [simulation]")
         if self.kind == "modbus":

@@ -1,7 +1,5 @@
 """The devices and the test equipment of a station's file."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 from typing import Annotated, ClassVar, Literal
@@ -44,7 +42,7 @@ class Carried(Strict):
     server_name: str = ""
 
     @model_validator(mode="after")
-    def _of_one_kind(self) -> Carried:
+    def _of_one_kind(self) -> "Carried":
         for kind, names in (("rtu", SERIAL), ("tls", SECURE)):
             given = {} if self.link == kind else self.model_dump(include=set(names), exclude_defaults=True)
             stray = [name for name in names if name in given]
@@ -86,7 +84,7 @@ class Slots(Carried):
     count: Annotated[int, Field(ge=1, le=MOST_SLOTS)] = 8
 
     @model_validator(mode="after")
-    def _addressable(self) -> Slots:
+    def _addressable(self) -> "Slots":
         last = self.device_id + self.count - 1
         if last > LAST_DEVICE_ID:
             raise ValueError(

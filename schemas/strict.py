@@ -1,7 +1,5 @@
 """The bases of the parts of a file that is written by hand."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer

@@ -4,8 +4,6 @@
 Every table has a schema version that travels with its file.
 """
 
-from __future__ import annotations
-
 from schemas import version
 from schemas.table import Table, any_text, flag, gaps, number, numbers, text, whole
 from schemas.units import AXES

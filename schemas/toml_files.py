@@ -1,7 +1,5 @@
 """TOML files that people write: bounded reading, parsing, and the first problem of a model as one message."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar

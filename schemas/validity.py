@@ -1,7 +1,5 @@
 """``[stability]`` of a device and ``[certificate]`` of a recipe: what changes beyond the run, what is certified for how long."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, model_validator
@@ -25,7 +23,7 @@ class Ageing(Strict):
     correlation_days: Positive | None = None
 
     @model_validator(mode="after")
-    def _complete(self) -> Ageing:
+    def _complete(self) -> "Ageing":
         needed = {
             "log": ("per_decade_ug",), "linear": ("per_year_ug",), "walk": ("walk_ug_rtday",),
             "bounded": ("deviation_ug", "correlation_days"),
@@ -86,7 +84,7 @@ class CertificateTerms(OnlyStated):
     frame: Literal["fixture", "intrinsic"] = "intrinsic"
 
     @model_validator(mode="after")
-    def _ordered(self) -> CertificateTerms:
+    def _ordered(self) -> "CertificateTerms":
         for name in ("force_range_g", "temperature_range_C"):
             bounds = getattr(self, name)
             if bounds is not None and bounds[0] >= bounds[1]:

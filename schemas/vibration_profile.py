@@ -1,7 +1,5 @@
 """Profiles of random vibration: breakpoints of the density, one file each in ``schemas/vibration``."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from itertools import pairwise
 from typing import Annotated

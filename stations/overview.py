@@ -1,7 +1,5 @@
 """State of a station at one instant: angles, temperatures, states, devices in the slots, and the holder of the lease."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field

@@ -1,7 +1,5 @@
 """The device profiles by name: those of the product, and those of the user (:mod:`schemas.own_files`)."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable

@@ -7,8 +7,6 @@ growing intervals, until the station is safe. A command sets an absolute state, 
 by name (:mod:`stations.safety.watchdog_client`), because it stands above the safety modules: it opens devices.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -1,7 +1,5 @@
 """Diagnosis of a centrifuge test: whether its polynomial is adequate, missing effects, and next measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

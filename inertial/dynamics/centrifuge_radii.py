@@ -1,7 +1,5 @@
 """Centrifuge at two radii or more: the curve of the unit, the stretch of the arm and the offset of the proof mass together."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Packages of effects in which every module defines one effect and is found by its file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib import import_module
 from pkgutil import iter_modules

@@ -1,7 +1,5 @@
 """What an exciter can do at a frequency."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

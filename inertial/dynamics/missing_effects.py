@@ -1,7 +1,5 @@
 """The verdict on the model of a dynamic test: whether it is adequate, and which effects are missing, in classes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Generic, Protocol, TypeVar

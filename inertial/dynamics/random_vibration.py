@@ -1,7 +1,5 @@
 """Random vibration: densities by breakpoints, their overall level, and the rectification coefficient."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Diagnosis of a shock comparison, the unit's waveform against the reference's: adequacy and missing effects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ ISO 16063-11 method 3, IEEE 1057: least squares on [cos ωt, sin ωt, 1]; a line
 periods errs by up to d/(πn).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """In frequency: confidence of densities, means under vibration, folding, and the second-order accelerometer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a model of a transfer function is good enough, where it fails, which effects are missing, what to measure next."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

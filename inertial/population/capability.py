@@ -1,7 +1,5 @@
 """Capability of a population against limits, with confidence intervals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -151,7 +151,9 @@ def _plane(part: TiltPart) -> tuple[str, str]:
 
 def _still(part: TiltPart, rows: pd.DataFrame) -> list[str]:
     """The axes in the plane whose output is the same at every angle: it has no scale to refer anything to."""
-    return [axis for axis in _plane(part) if np.ptp(rows.loc[rows["axis"] == axis, "value"].to_numpy(dtype=float)) == 0.0]
+    return [
+        axis for axis in _plane(part) if np.ptp(rows.loc[rows["axis"] == axis, "value"].to_numpy(dtype=float)) == 0.0
+    ]
 
 
 def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltFit:

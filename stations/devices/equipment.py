@@ -1,7 +1,5 @@
 """Test equipment in a role of a station: exciter, shock machine, centrifuge, power supply, generator of steps."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Refusal of orders beyond an exciter's displacement, velocity or acceleration, and of references that cannot be right."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

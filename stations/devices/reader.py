@@ -1,7 +1,5 @@
 """The reader of the devices under test: the clock of their samples and the instruments of the fixture."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """A recording of test equipment, and the result file that it comes from: a MATLAB file with a rate, a unit and slots."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Registers of a device by name: profile, codec and link together."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """One slot of the reader: identity of its device, and the samples in its memory."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Source: Modbus Application Protocol 1.1b3, 6.1–6.12 and 7; Modbus over serial line 1.02, 6.2.2 (CRC).
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Text lines over TCP: a query or a command, and one line as the answer."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Interface between devices and links; address and protocol belong to the link."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """The links of a station, made from its file: the only place that makes any, and behind each the gate for writes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -3,8 +3,6 @@
 After a failed write it is unknown whether the device acted: the adapter reads back and reports it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout

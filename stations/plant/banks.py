@@ -1,7 +1,5 @@
 """The register banks of the simulated station: the value of the world behind each register."""
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,7 +35,7 @@ def build_banks(world: World, devices: Devices, equipment: Mapping[str, Device])
     return banks
 
 
-def build_line_devices(world: World, devices: Devices, equipment: Mapping[str, Device]) -> dict[int, LineDevice]:
+def build_line_devices(world: World, devices: Devices, equipment: Mapping[str, Device]) -> "dict[int, LineDevice]":
     """Devices with a text protocol, by device id."""
     profiles = {device.device_id: profile_of(device) for device in (devices.chamber, *equipment.values())}
     return {device_id: simulated(profile, world) for device_id, profile in profiles.items() if profile.commands}

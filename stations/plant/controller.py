@@ -1,7 +1,5 @@
 """Common parts of the simulated controllers: usual registers and set points of chambers, the start of a move of drives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from schemas.profile import Profile

@@ -1,7 +1,5 @@
 """The fixture in the chamber: temperatures of air and elements, vibration, in steps of a second; humidity at any instant."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 
@@ -35,7 +33,7 @@ class Fixture:
         slots: Sequence[int],
         air: np.random.Generator,
         hidden: Sequence[HiddenEffect],
-        moisture: Moisture,
+        moisture: "Moisture",
     ) -> None:
         place = stream(sim.seed, "fixture")
         low, high = sim.slot_lag_s

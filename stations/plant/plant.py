@@ -3,8 +3,6 @@
 Clients change it by writes to registers and by lines of text, and by nothing else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

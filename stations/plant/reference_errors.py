@@ -3,8 +3,6 @@
 Written from the mechanisms, independently of the budget that is to cover them.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Common part of the simulated devices that speak SCPI: the last error, and orders of numbers."""
 
-from __future__ import annotations
-
 DONE = "1"
 OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
 TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}

@@ -3,8 +3,6 @@
 It knows no register, no fault and no journal: those act on it from outside.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 import threading
@@ -144,7 +142,7 @@ class World:
         self.now_us = target_us
         self.sampler.advance(target_us)
 
-    def schedule(self, at_s: float, order: int, action: Callable[[World], None]) -> None:
+    def schedule(self, at_s: float, order: int, action: "Callable[[World], None]") -> None:
         """Calls ``action`` with this world at ``at_s`` s; among equal times the smaller ``order`` comes first."""
         heapq.heappush(self._due, (round(at_s * 1e6), order, action))
 

@@ -1,7 +1,5 @@
 """The run's side of its watchdog: starts the process, checks it with each heartbeat, replaces it where it is gone."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

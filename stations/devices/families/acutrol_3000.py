@@ -1,7 +1,5 @@
 """Centrifuges and rate tables that speak as the ACUTROL 3000, with a recorder that leaves a result file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Shock machines with arm, release and guard door, and a triggered recorder that leaves a result file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar
 

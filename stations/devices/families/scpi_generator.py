@@ -1,7 +1,5 @@
 """Function generator with a multichannel recorder, by SCPI: before an exciter's amplifier, or at the self-test inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar
 

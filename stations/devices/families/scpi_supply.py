@@ -1,7 +1,5 @@
 """Programmable power supplies that speak SCPI; the nominal setting of the devices is in the supply's memory 1."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from schemas.errors import OperatorNeeded, StationRefused

@@ -1,7 +1,5 @@
 """Vibration controllers that a host selects, starts and reads over lines of text, with the recording in a result file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """The simulated Oriental Motor AZ drive."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, number

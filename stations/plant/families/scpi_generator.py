@@ -1,7 +1,5 @@
 """The simulated generator with recorder, before an exciter with its amplifier, or at the self-test inputs of the devices."""
 
-from __future__ import annotations
-
 import math
 
 from schemas.profile import Profile
@@ -25,7 +23,7 @@ NUMBERS = {
 }
 
 
-def simulated(world: World, profile: Profile) -> Generator:
+def simulated(world: World, profile: Profile) -> "Generator":
     """A generator in front of the world's bench, in the role of its profile."""
     return Generator(world, steps=profile.kind == "step_generator")
 

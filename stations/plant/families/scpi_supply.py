@@ -1,7 +1,5 @@
 """The simulated programmable power supply of the devices."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
 from stations.plant.scpi import DONE, UNDEFINED, ScpiDevice
 from stations.plant.world import World
@@ -9,7 +7,7 @@ from stations.plant.world import World
 DROP = 0.9  # of the set voltage, where the current limit holds it
 
 
-def simulated(world: World, profile: Profile) -> Supply:
+def simulated(world: World, profile: Profile) -> "Supply":
     """A supply of all devices of the world."""
     return Supply(world, profile)
 

@@ -1,7 +1,5 @@
 """The simulated SMC LEC controller."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from schemas.profile import Profile

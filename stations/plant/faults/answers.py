@@ -1,7 +1,5 @@
 """Faults of a device's answers: exceptions, no answer, writes that are ignored or incomplete."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar

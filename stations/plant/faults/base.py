@@ -1,7 +1,5 @@
 """The base class of the kinds of faults; each kind overrides what it changes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar

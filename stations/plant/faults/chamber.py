@@ -1,7 +1,5 @@
 """Faults of the chamber, the emergency stop and vibration."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Faults of test equipment: exciter, shock machine and centrifuge with their recorder."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.plant.faults.base import UNIT, Fault

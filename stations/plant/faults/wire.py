@@ -1,7 +1,5 @@
 """Faults of the wire, and the script by which a proxy in front of the plant's server carries them out."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ Each effect is modelled from its mechanism, independently of the columns in ``in
 the fit would prove nothing. A new effect is a subclass of :class:`HiddenEffect`, listed here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields
 

@@ -1,7 +1,5 @@
 """Interface of the hidden effects, and the quantities at their instants."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

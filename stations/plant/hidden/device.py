@@ -1,7 +1,5 @@
 """Inside the device: springs and suspensions under load, heat, moisture in the package, relaxation of stress."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

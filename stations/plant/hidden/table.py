@@ -1,7 +1,5 @@
 """Errors of table, encoder and fixture: the same for every device, or for every device in a slot."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
