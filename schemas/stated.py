@@ -114,7 +114,7 @@ def _forms(entry: Entry) -> list[tuple[str, str, str, str]]:
     """(key, part, form, unit) of the uncertainties that an entry states."""
     matches = (STATED.match(name) for name in type(entry).model_fields)
     stated = ((m[0], m["part"] or "", m["form"], m["unit"]) for m in matches if m and m["unit"] in TO_SI)
-    return [(name, *rest) for name, *rest in stated if getattr(entry, name) is not None]
+    return [one for one in stated if getattr(entry, one[0]) is not None]
 
 
 Stated = NotNegative | None
