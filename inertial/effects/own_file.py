@@ -39,7 +39,7 @@ def checked_classes(module: ModuleType, source: Path) -> None:
         missing = [name for name in NEEDED if not hasattr(item, name)]
         if missing:
             raise BrokenEffect(f"{where}: no {' and no '.join(missing)}, an effect needs it; add it to the class")
-        methods = sorted(getattr(item, "__abstractmethods__", ()))
+        methods: list[str] = sorted(getattr(item, "__abstractmethods__", ()))
         if not item.coefficients and item.names in {SensorEffect.names, StationEffect.names}:
             methods.append("names")
         if methods:

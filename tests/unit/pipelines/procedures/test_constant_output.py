@@ -5,21 +5,21 @@ import pandas as pd
 import pytest
 
 from pipelines.procedures import PROCEDURES
-from pipelines.procedures.recorded import REFERENCE, Device, ProcedureRecord, UnitRecord
+from pipelines.procedures.recorded import REFERENCE, Device, ProcedureRecord, ProcedureStep, UnitRecord
 from schemas.recipe import Recipe
 
 SCALE = 0.007
 DEVICE = Device({}, {}, full_scale=0.1, out_unit="V")
 
 
-def made(kind: str, step, number: int, rng: np.random.Generator) -> ProcedureRecord:
+def made(kind: str, step: ProcedureStep, number: int, rng: np.random.Generator) -> ProcedureRecord:
     """A record of a live unit, a still one, and the reference."""
     if kind == "tilt":
         time = np.arange(20) / 10.0
         alpha = np.radians(step.setting["angle_deg"])
         force = np.tile([0.0, np.sin(alpha), np.cos(alpha)], (20, 1))
     else:
-        time = np.arange(int(step.lasting_s * 20000.0)) / 20000.0
+        time = np.arange(int((step.lasting_s or 0.0) * 20000.0)) / 20000.0
         wave = step.setting["level_g"] * np.cos(2.0 * np.pi * step.setting["frequency_hz"] * time)
         force = np.outer(wave, [1e-3, 1e-3, 1.0])
     live = SCALE * force + rng.normal(0.0, 1e-6, force.shape)
