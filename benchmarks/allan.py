@@ -15,9 +15,9 @@ sys.path.insert(0, str(ROOT))
 import allantools  # noqa: E402
 import numpy as np  # noqa: E402
 
-from inertial.noise import generate  # noqa: E402
 from inertial.noise.allan import overlapping  # noqa: E402
 from inertial.noise.terms import fit_terms  # noqa: E402
+from tests import made_noise as generate  # noqa: E402
 
 RATE = 100.0
 

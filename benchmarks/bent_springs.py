@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stations.plant.device import stream
-from stations.plant.hidden.base import Block, Untouched
+from stations.plant.hidden.base import Block, HiddenEffect
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LEAST, MOST = 2e-3, 4e-3  # g at 1 g, far above the uncertainty of a whole turn
@@ -21,7 +21,7 @@ def bends(seed: int, serial: str) -> tuple[Array, Array]:
     return quadratic, cubic
 
 
-class BentSprings(Untouched):
+class BentSprings(HiddenEffect):
     """The springs of the units of a lot."""
 
     def __init__(self, seed: int, serials: Sequence[str]) -> None:

@@ -1,7 +1,5 @@
 """Design matrices of a model: the columns of its effects, and the names of their coefficients."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any

@@ -1,7 +1,5 @@
 """Whether a table stood where its encoders said, judged from the outputs of a whole lot: every unit is an inclinometer."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Types of numbers in files with generous bounds: a value outside is a typing error, or would need unlimited time."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, FiniteFloat
@@ -42,7 +40,6 @@ Celsius = Annotated[FiniteFloat, Field(ge=COLDEST_C, le=HOTTEST_C), _NotFlag]
 Degrees = Annotated[FiniteFloat, Field(ge=-3600.0, le=3600.0), _NotFlag]
 Rate = Annotated[FiniteFloat, Field(gt=0.0, le=FASTEST_HZ), _NotFlag]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED), _NotFlag]
-Count = Annotated[int, Field(ge=1, le=10**9), _NotFlag]
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
 """A name that is used as the name of a file or folder."""
 Text = Annotated[str, Field(max_length=LONGEST_TEXT)]

@@ -1,14 +1,12 @@
 """Decisions on figures by the rule of the limits, and the grades by the bias that is left."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan, log
 from statistics import NormalDist
 from typing import Literal, Protocol
 
-from schemas.limits import LARGEST_PFA, Limits, Rule
+from schemas.limits import LARGEST_PFA, Limits
 
 Outcome = Literal["pass", "conditional pass", "conditional fail", "fail"]
 
@@ -213,11 +211,6 @@ def describe_rule(limits: Limits) -> str:
             f"U with k = {limits.coverage_factor:g}"
         )
     return f"ILAC-G8:09/2019 guarded acceptance, w = U with k = {limits.coverage_factor:g}"
-
-
-def grade_of(value_ug: float, expanded_ug: float, rule: Rule) -> str | None:
-    """The best grade whose bias limit accepts the value under the rule with w = U; None where not even the lowest does."""
-    return grade_with(value_ug, 0.0 if rule == "simple_acceptance" else expanded_ug)
 
 
 def grade_with(value_ug: float, guard_ug: float) -> str | None:

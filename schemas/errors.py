@@ -4,8 +4,6 @@ A message reads ``where: what was found (value, unit), what is needed; what to d
 result, not an exception; anything that is not one of these classes is a defect of the program.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import ClassVar

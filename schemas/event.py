@@ -1,7 +1,5 @@
 """An event of a run: kind, reason and action."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, Protocol
 

@@ -4,32 +4,27 @@ The kinds are defined in ``stations/plant/faults``. This module defines the nota
 tests.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails
 
 from schemas.bounds import LARGEST_TIME_S, Number, Text
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 from schemas.reasons import reason_of
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
+from schemas.strict import Strict
 
 Part = Literal["", "outer", "inner", "chamber", "reader"]
 SEPARATOR = ":"
 
 
-class FaultOrder(BaseModel):
+class FaultOrder(Strict):
     """A fault from ``at_s`` on the clock of the simulated station, for ``for_s`` seconds or permanently.
 
     The target is the unit ``serial`` or the device ``device`` of the station; ``figures`` are the parameters of the kind.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
     at_s: Annotated[Number, Field(ge=0.0, le=LARGEST_TIME_S)] = 0.0
@@ -39,7 +34,7 @@ class FaultOrder(BaseModel):
     figures: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
-    def _one_target(self) -> FaultOrder:
+    def _one_target(self) -> "FaultOrder":
         if self.serial and self.device:
             raise ValueError(
                 f"fault {self.kind}: serial '{self.serial}' and device '{self.device}', only one of the two is allowed; "

@@ -4,8 +4,6 @@ Only the call of the parser is inside :func:`foreign`, never code of this produc
 broken file. :func:`shown` shortens what a message quotes from a file.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Generator
 from contextlib import contextmanager

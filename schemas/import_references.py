@@ -4,18 +4,16 @@ The tables ``[[reference]]`` and ``[uncertainty]`` are those of a station's file
 recipe; the whole is kept with the import, and a run that is made from it states no more.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from schemas.bounds import Celsius, Text
 from schemas.reference import Reference
 from schemas.station import refuse_untraced
 from schemas.strict import Strict
-from schemas.toml_files import explain, parse_toml, read_text
+from schemas.toml_files import parse_as, read_text
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
 
@@ -36,7 +34,7 @@ class ImportReferences(Strict):
     certificate: CertificateTerms | None = None
 
     @model_validator(mode="after")
-    def _traced(self) -> ImportReferences:
+    def _traced(self) -> "ImportReferences":
         refuse_untraced(self.uncertainty, self.reference, simulated=False)
         return self
 
@@ -65,8 +63,4 @@ def read_references(path: Path) -> ImportReferences:
     RecipeInvalid
         Unreadable, or a key is wrong; the key is named.
     """
-    where = f"references {path.name}"
-    try:
-        return ImportReferences.model_validate(parse_toml(read_text(path, "references"), where))
-    except ValidationError as problem:
-        raise explain(problem, where, ImportReferences) from None
+    return parse_as(ImportReferences, read_text(path, "references"), f"references {path.name}")

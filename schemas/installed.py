@@ -1,7 +1,5 @@
 """Libraries that cannot be imported: a fault of the installation, not of the program. Needs the standard library alone."""
 
-from __future__ import annotations
-
 import re
 import sys
 import traceback

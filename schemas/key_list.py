@@ -1,8 +1,5 @@
 """The keys of the files that a user writes: notation, default and meaning, from the classes that check them."""
 
-from __future__ import annotations
-
-import re
 import tomllib
 from functools import cache
 from importlib.resources import files
@@ -14,12 +11,12 @@ from pydantic_core import PydanticUndefined
 
 from schemas.limits import Limits
 from schemas.recipe import RecipeFile
+from schemas.stated import STATED
 from schemas.station import StationConfig
 
 FILES: dict[str, type[BaseModel]] = {"recipe": RecipeFile, "limits": Limits, "station": StationConfig}
 """The files whose keys are listed, by what a user calls them."""
 
-STATED = re.compile(r"^(?:(?P<part>[a-z]+)_)?(?P<form>u|U|half_width)_(?P<unit>[a-zA-Z0-9_]+)$")
 FORMS = {
     "u": "Standard uncertainty",
     "U": "Expanded uncertainty",

@@ -1,7 +1,5 @@
 """Optional libraries: imported when they are needed, with a message how to install them."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any

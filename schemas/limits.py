@@ -6,26 +6,16 @@ are four outcomes; with ``simple_acceptance`` (4.2.1) the limit itself decides; 
 an allowed probability of false acceptance needs (JCGM 106:2012, 8.3.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import (
-    Field,
-    SerializerFunctionWrapHandler,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from schemas.bounds import Name, Number, Positive
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.strict import Strict
-from schemas.toml_files import explain, parse_toml
+from schemas.strict import Grown
+from schemas.toml_files import parse_as
 
 VALIDITY_MONTHS = 12
 """Longest that a certificate may hold where the limits file does not say: a year, the usual first interval (ILAC-G24:2022)."""
@@ -39,24 +29,21 @@ ADEQUACY_P_MIN = 0.001
 be refused, at this one in a thousand; a smaller p is a score and no probability."""
 
 
-class Limit(Strict):
+class Limit(Grown):
     """The largest magnitude of a figure that a unit may have, or its least value; the file states the unit again."""
+
+    later: ClassVar[frozenset[str]] = frozenset({"max", "min"})
 
     max: Positive | None = None
     min: Positive | None = None
     unit: str
 
     @model_validator(mode="after")
-    def _one_side(self) -> Limit:
+    def _one_side(self) -> "Limit":
         if (self.max is None) == (self.min is None):
             given = "neither" if self.max is None else "both"
             raise ValueError(f"max, min: {given} given, one of them is needed; state max, or min for a least value")
         return self
-
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without the side that is not stated, so that runs of earlier versions keep their names."""
-        return {name: value for name, value in handler(self).items() if value is not None}
 
     @property
     def text(self) -> str:
@@ -64,7 +51,7 @@ class Limit(Strict):
         return f"at least {self.min:.4g}" if self.min is not None else f"{self.max:.4g}"
 
 
-class Limits(Strict):
+class Limits(Grown):
     """The limits file: name, rule, coverage factor and a limit per figure.
 
     Parameters
@@ -74,6 +61,8 @@ class Limits(Strict):
     pfa_max : probability of false acceptance that the rule ``allowed_pfa`` allows; 2 % where it is not stated.
     adequacy_p_min : least p of the model's residual with which a run is certified; :data:`ADEQUACY_P_MIN` where it is not stated.
     """
+
+    later: ClassVar[frozenset[str]] = frozenset({"validity_months", "pfa_max", "adequacy_p_min"})
 
     name: Name
     rule: Rule = "guarded_acceptance"
@@ -96,13 +85,6 @@ class Limits(Strict):
         """Longest that a certificate by these limits may hold, months: as the file says, else the product's policy."""
         return VALIDITY_MONTHS if self.validity_months is None else self.validity_months
 
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without what is not stated: runs are named for their limits, and those of earlier versions keep their names."""
-        content = handler(self)
-        later = ("validity_months", "pfa_max", "adequacy_p_min")
-        return {name: value for name, value in content.items() if name not in later or value is not None}
-
     @field_validator("figures")
     @classmethod
     def _known(cls, figures: dict[str, Limit], info: ValidationInfo) -> dict[str, Limit]:
@@ -113,7 +95,7 @@ class Limits(Strict):
         return figures
 
     @model_validator(mode="after")
-    def _units_agree(self, info: ValidationInfo) -> Limits:
+    def _units_agree(self, info: ValidationInfo) -> "Limits":
         units = _units(info)
         for name, limit in self.figures.items():
             if limit.unit != units[name]:
@@ -148,10 +130,7 @@ def parse_limits(text: str, source: str, units: Mapping[str, str]) -> Limits:
     ----------
     units : unit of every known figure, by name.
     """
-    try:
-        return limits_of(parse_toml(text, source), units)
-    except ValidationError as problem:
-        raise explain(problem, source, Limits) from None
+    return parse_as(Limits, text, source, context=units)
 
 
 def unknown_limits(name: str, known: list[str]) -> RecipeInvalid:

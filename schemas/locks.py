@@ -1,7 +1,5 @@
 """Locks: the version and the hashes of each library, and the Pythons that an entry is for."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import NamedTuple

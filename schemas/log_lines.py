@@ -1,7 +1,5 @@
 """Messages of services and commands on standard error: a line of text, or of JSON where TUMBLELINE_LOG is ``json``."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

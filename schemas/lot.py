@@ -1,7 +1,5 @@
 """The units that are measured together."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import (
@@ -43,7 +41,7 @@ class Lot(Strict):
     repeat: Annotated[int, Field(ge=0, lt=MOST_REPEATS)] = 0
 
     @model_validator(mode="after")
-    def _each_once(self) -> Lot:
+    def _each_once(self) -> "Lot":
         for what, values in (
             ("serial", [u.serial for u in self.units]),
             ("slot", [u.slot for u in self.units]),

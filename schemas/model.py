@@ -1,17 +1,15 @@
 """Model files: a named, versioned list of effects, and the history of who changed it, when and why."""
 
-from __future__ import annotations
-
 from datetime import date, datetime
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from schemas.bounds import Name, Text
 from schemas.recipe import FormulaSpec
 from schemas.strict import Strict
-from schemas.toml_files import explain, parse_toml, read_text
+from schemas.toml_files import parse_as, read_text
 
 MOST_VERSIONS = 1_000_000
 
@@ -46,7 +44,7 @@ class ModelFile(Strict):
     change: list[VersionStep] = Field(default_factory=list)
 
     @model_validator(mode="after")
-    def _consistent(self) -> ModelFile:
+    def _consistent(self) -> "ModelFile":
         effects = self.model.effects
         twice = sorted({e for e in effects if effects.count(e) > 1})
         if twice:
@@ -70,10 +68,7 @@ class ModelFile(Strict):
 
 def parse_model(text: str, source: str) -> ModelFile:
     """The model of a TOML text, or ``RecipeInvalid`` naming the key and what is needed."""
-    try:
-        return ModelFile.model_validate(parse_toml(text, source))
-    except ValidationError as problem:
-        raise explain(problem, source, ModelFile) from None
+    return parse_as(ModelFile, text, source)
 
 
 def load_model(path: Path) -> ModelFile:

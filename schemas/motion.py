@@ -1,7 +1,5 @@
 """Limits of an exciter's motion: displacement, velocity, acceleration, and what a sine or a random profile asks of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -26,7 +24,7 @@ class Motion(Strict):
     velocity_m_s: Limit | None = None
     acceleration_g: Limit | None = None
 
-    def tighter(self, other: Motion) -> Motion:
+    def tighter(self, other: "Motion") -> "Motion":
         """The smaller limit of both, each by itself."""
         mine, its = self.model_dump(), other.model_dump()
         return Motion(**{k: min((v for v in (mine[k], its[k]) if v is not None), default=None) for k in mine})

@@ -6,8 +6,6 @@ the name of a built-in one is refused, because the name would have different con
 the name with different contents, a message names the file that is used and the other one, in workers too.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable
 from hashlib import sha256

@@ -1,7 +1,5 @@
 """Attitudes of the table, and which of them are measured at one soak."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import (

@@ -4,20 +4,18 @@ A profile is TOML; the client and the simulated station read the same file, so a
 only. ``verified`` states whether it was compared with the device.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from schemas.bounds import Number
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.motion import Motion
 from schemas.strict import Strict
-from schemas.toml_files import explain, parse_toml
+from schemas.toml_files import parse_as
 
 WordOrder = Literal["high_first", "low_first", "high_first_swapped", "low_first_swapped"]
 RegisterType = Literal["uint16", "int16", "uint32", "int32", "float32", "string", "bit"]
@@ -68,7 +66,7 @@ class Register(Strict):
         """Whether it may be written at all."""
         return self.access != "read"
 
-    def with_decimals(self, decimals: int) -> Register:
+    def with_decimals(self, decimals: int) -> "Register":
         """The same register, its values in steps of ten to the power of minus ``decimals``."""
         return self.model_copy(update={"scale": self.scale * 10.0**-decimals, "scaled_by": ""})
 
@@ -83,7 +81,7 @@ class Register(Strict):
         return self.address + self.words
 
     @model_validator(mode="after")
-    def _fits(self) -> Register:
+    def _fits(self) -> "Register":
         if self.end > ADDRESSES:
             raise ValueError(
                 f"{self.name}: ends at address {self.end}, the last one is {ADDRESSES - 1}; move or shorten it"
@@ -131,6 +129,9 @@ class Command(Strict):
         return bool(self.tell)
 
 
+AnyEntry = TypeVar("AnyEntry", Register, Command)
+
+
 class Fifo(Strict):
     """The window onto a device's ring of samples: ``registers`` registers from ``address`` on."""
 
@@ -162,7 +163,7 @@ class Profile(Strict):
     stated: dict[str, Number] = Field(default_factory=dict[str, float])
 
     @model_validator(mode="after")
-    def _consistent(self) -> Profile:
+    def _consistent(self) -> "Profile":
         spoken = self.links == ["ascii"]
         if not (self.commands if spoken else self.registers) or (self.registers if spoken else self.commands):
             carriers = ", ".join(self.links)
@@ -179,28 +180,24 @@ class Profile(Strict):
 
     def register(self, name: str) -> Register:
         """The register of that name; an unknown one is refused with what looks like it."""
-        for register in self.registers:
-            if register.name == name:
-                return register
-        raise RecipeInvalid(
-            f"profile {self.name}: no register '{name}'; {did_you_mean(name, (r.name for r in self.registers))}",
-            key=name,
-        )
+        return self._named(name, "register", self.registers)
 
     def command(self, name: str) -> Command:
         """The command of that name; an unknown one is refused with what looks like it."""
-        for command in self.commands:
-            if command.name == name:
-                return command
-        raise RecipeInvalid(
-            f"profile {self.name}: no command '{name}'; {did_you_mean(name, (c.name for c in self.commands))}", key=name
-        )
+        return self._named(name, "command", self.commands)
+
+    def _named(self, name: str, what: str, entries: Sequence[AnyEntry]) -> AnyEntry:
+        for entry in entries:
+            if entry.name == name:
+                return entry
+        known = did_you_mean(name, (entry.name for entry in entries))
+        raise RecipeInvalid(f"profile {self.name}: no {what} '{name}'; {known}", key=name)
 
     def entry(self, name: str) -> Register | Command:
         """The register or command of that name."""
         return self.command(name) if self.commands else self.register(name)
 
-    def limited(self, maximum: Mapping[str, float]) -> Profile:
+    def limited(self, maximum: Mapping[str, float]) -> "Profile":
         """The profile with smaller largest values, by the names of its numeric orders and of the limits of motion.
 
         Raises
@@ -280,7 +277,4 @@ def _refuse_gaps(group: str, registers: list[Register]) -> None:
 
 def parse_profile(text: str, source: str) -> Profile:
     """The profile in a TOML text, or :class:`RecipeInvalid` naming the key and what is needed."""
-    try:
-        return Profile.model_validate(parse_toml(text, source))
-    except ValidationError as problem:
-        raise explain(problem, source, Profile) from None
+    return parse_as(Profile, text, source)

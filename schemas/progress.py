@@ -1,7 +1,5 @@
 """The interface through which long work reports its progress."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 

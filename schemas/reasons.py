@@ -1,13 +1,8 @@
 """Why a value of a file is refused, in words: a regular expression is none."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pydantic_core import ErrorDetails
 
 from schemas.serials import NEEDED, SERIAL_PATTERN
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
 
 PATTERNS = {
     SERIAL_PATTERN: NEEDED,

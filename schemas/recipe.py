@@ -4,20 +4,10 @@ The file is TOML and its keys are the fields of :class:`RecipeFile`. Poses may b
 same thing with every name resolved, and is what stages and stations are given.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import (
-    Field,
-    FiniteFloat,
-    SerializerFunctionWrapHandler,
-    ValidationError,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, FiniteFloat, field_validator, model_validator
 
 from schemas.bounds import (
     LONGEST_RUN_S,
@@ -38,8 +28,8 @@ from schemas.bounds import (
 )
 from schemas.fault import FaultOrder
 from schemas.poses import Pose, SoakPart
-from schemas.strict import Strict
-from schemas.toml_files import explain, parse_toml
+from schemas.strict import Grown, Strict
+from schemas.toml_files import parse_as
 from schemas.uncertainty import Uncertainty
 from schemas.validity import CertificateTerms, Stability
 
@@ -54,7 +44,7 @@ Angles = Annotated[list[Degrees], Field(min_length=2, max_length=2)]
 Gravity = Annotated[FiniteFloat, Field(gt=9.7, lt=9.9)]  # every place on earth lies between 9.76 and 9.84 m/s²
 
 
-class _Measurement(Strict):
+class _Measurement(Grown):
     """The keys that a recipe file and a resolved recipe share.
 
     ``zero_output`` is the nominal output at 0 g, in the output's unit; the zero-g offset is counted from it.
@@ -63,9 +53,13 @@ class _Measurement(Strict):
     simulated station, to try what a recipe does then. ``verification_order``: at the end of each soak, or spread among the poses
     of the fit; it is part of the recipe because it moves the figure of verification. ``uncertainty`` states what the recipe's own
     fixture adds to the station's, ``stability`` what this kind of device does beyond a run, ``certificate`` what is certified.
-    simulated station, to try what a recipe does then. ``procedures`` lists the test procedures of the lot in order; without it
+    ``procedures`` lists the test procedures of the lot in order; without it
     the lot goes through the multi-position test and the static record.
     """
+
+    later: ClassVar[frozenset[str]] = frozenset(
+        {"verification_order", "uncertainty", "stability", "certificate", "procedures"}
+    )
 
     name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
     description: Text = ""
@@ -93,19 +87,6 @@ class _Measurement(Strict):
     stability: Stability | None = None
     certificate: CertificateTerms | None = None
 
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without what is not stated: runs and captures of earlier versions keep their names."""
-        content = handler(self)
-        later: dict[str, Any] = {
-            "verification_order": "last",
-            "uncertainty": None,
-            "stability": None,
-            "certificate": None,
-            "procedures": [],
-        }
-        return {name: value for name, value in content.items() if name not in later or value != later[name]}
-
     @property
     def tumbles(self) -> bool:
         """Whether the lot goes through the multi-position test: always, unless a list of procedures leaves it out."""
@@ -123,7 +104,7 @@ class _Measurement(Strict):
         return {**given, "temperatures_C": own}
 
     @model_validator(mode="after")
-    def _usable(self) -> _Measurement:
+    def _usable(self) -> "_Measurement":
         if self.soak_min_s < SHORTEST_SOAK_S and not self.allow_short_soak:
             raise ValueError(
                 f"soak_min_s: {self.soak_min_s:g} s, the recipe needs {SHORTEST_SOAK_S:g} s; soak longer, or set "
@@ -189,7 +170,7 @@ class RecipeFile(_Measurement):
     model: str = ""
 
     @model_validator(mode="after")
-    def _one_model(self) -> RecipeFile:
+    def _one_model(self) -> "RecipeFile":
         if not self.tumbles:
             return self
         if not self.poses:
@@ -210,7 +191,7 @@ class Recipe(_Measurement):
     formulas: list[FormulaSpec] = []
 
     @model_validator(mode="after")
-    def _soaks_name_poses_that_are_there(self) -> Recipe:
+    def _soaks_name_poses_that_are_there(self) -> "Recipe":
         for number, part in enumerate(self.soaks, start=1):
             for key, listed in (("poses", self.poses), ("verification", self.verification)):
                 beyond = [k for k in getattr(part, key) or [] if k > len(listed)]
@@ -228,7 +209,7 @@ class Recipe(_Measurement):
         return self
 
     @model_validator(mode="after")
-    def _comes_to_an_end(self) -> Recipe:
+    def _comes_to_an_end(self) -> "Recipe":
         soaks = range(len(self.temperatures_C))
         dwells = sum(len(self.poses_at(k)) + len(self.verification_at(k)) for k in soaks)
         waits = sum(
@@ -265,7 +246,7 @@ class Recipe(_Measurement):
         return _picked(self.verification, self.soaks[soak].verification if self.soaks else None)
 
     @model_validator(mode="after")
-    def _tumbles_in_poses(self) -> Recipe:
+    def _tumbles_in_poses(self) -> "Recipe":
         if self.tumbles and not self.poses:
             raise ValueError("poses: none, the multi-position test needs at least 1; add poses")
         return self
@@ -285,7 +266,4 @@ def _picked(poses: list[Pose], numbers: list[int] | None) -> list[Pose]:
 
 def parse_recipe(text: str, source: str) -> RecipeFile:
     """The recipe file's content, or :class:`RecipeInvalid` naming the key and what is needed."""
-    try:
-        return RecipeFile.model_validate(parse_toml(text, source))
-    except ValidationError as problem:
-        raise explain(problem, source, RecipeFile) from None
+    return parse_as(RecipeFile, text, source)

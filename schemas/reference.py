@@ -1,20 +1,18 @@
 """A reference standard of a station: what its calibrations are traced to, by which certificate, until when."""
 
-from __future__ import annotations
-
 from datetime import date as Day  # noqa: N812 - a field has its name
-from typing import Annotated, Any, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from schemas.bounds import Number, Positive, Text
-from schemas.strict import Strict
+from schemas.strict import Grown
 from schemas.uncertainty import TO_SI
 
 Unit = Literal["urad", "arcsec", "deg", "ppm", "percent", "ug", "K", "s", "g", "m_s2"]
 
 
-class Reference(Strict):
+class Reference(Grown):
     """A standard with a certificate of its own.
 
     Parameters
@@ -27,6 +25,8 @@ class Reference(Strict):
     U, k, unit : its expanded uncertainty; drift_per_year : in the same unit.
     sha256 : of the certificate's file.
     """
+
+    later: ClassVar[frozenset[str]] = frozenset({"accreditation", "date", "U", "k", "unit", "drift_per_year", "sha256"})
 
     id: Annotated[str, Field(min_length=1)]
     what: str = ""
@@ -42,17 +42,10 @@ class Reference(Strict):
     sha256: Annotated[str, Field(pattern=r"^([0-9a-f]{64})?$")] = ""
 
     @model_validator(mode="after")
-    def _complete(self) -> Reference:
+    def _complete(self) -> "Reference":
         if self.U is not None and (self.k is None or self.unit is None):
             raise ValueError("k, unit: needed beside U; add the coverage factor and the unit of the certificate")
         return self
-
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without what is not stated: stations of earlier versions keep their content."""
-        content = handler(self)
-        later = ("accreditation", "date", "U", "k", "unit", "drift_per_year", "sha256")
-        return {name: value for name, value in content.items() if name not in later or value not in {None, ""}}
 
     def standard(self, unit: str) -> float | None:
         """Standard uncertainty in rad, K, … where the certificate states it in a unit of the same kind; else None."""

@@ -1,7 +1,5 @@
 """What a station's file says for trouble: when a run pauses, how the station is left, and how it is tested before a shift."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -47,7 +45,7 @@ class Safety(Strict):
     lapse_s: Annotated[Number, Field(gt=0.0, le=45.0)] = 20.0
 
     @model_validator(mode="after")
-    def _notices_in_time(self) -> Safety:
+    def _notices_in_time(self) -> "Safety":
         if self.lapse_s < 2.0 * self.heartbeat_s:
             raise ValueError(
                 f"lapse_s: {self.lapse_s:g} s, two heartbeats of {self.heartbeat_s:g} s are needed at least; raise lapse_s, "

@@ -5,8 +5,6 @@ consists of letters and digits without look-alikes, and has no character with a 
 a shell.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

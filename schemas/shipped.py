@@ -1,7 +1,5 @@
 """Files of the deployment that come with the product: samples of recipes and stations, the lock of libraries."""
 
-from __future__ import annotations
-
 import sysconfig
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How a simulated station is made: spread of its devices, hidden effects, faults, errors of its references."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import (

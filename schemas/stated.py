@@ -1,15 +1,13 @@
 """A stated standard uncertainty: u, or U with its k, or a half-width with its distribution; the unit stands in the key."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from schemas.bounds import NotNegative, Number, Positive, Text
-from schemas.strict import Strict
+from schemas.strict import OnlyStated
 
 Scope = Literal["station", "run", "soak", "pose", "slot", "mount", "unit", "dwell"]
 Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
@@ -20,7 +18,7 @@ TO_SI = {
 }  # fmt: skip
 """Factors to rad, 1, g, K and s."""
 SHARED_SCOPES = ("station", "run", "slot", "mount")
-_STATED = re.compile(r"^(?:(?P<part>[a-z]+)_)?(?P<form>u|U|half_width)_(?P<unit>[A-Za-z0-9_]+)$")
+STATED = re.compile(r"^(?:(?P<part>[a-z]+)_)?(?P<form>u|U|half_width)_(?P<unit>[A-Za-z0-9_]+)$")
 
 
 class StandardUncertainty(NamedTuple):
@@ -36,7 +34,7 @@ class StandardUncertainty(NamedTuple):
     divisor: float
 
 
-class Entry(Strict):
+class Entry(OnlyStated):
     """One entry of the budget.
 
     rectangular : key of a half-width whose distribution is rectangular unless another one is stated; empty for none
@@ -55,8 +53,8 @@ class Entry(Strict):
 
     def standard(self, part: str = "") -> StandardUncertainty:
         """The standard uncertainty of a part of the entry; 0 where the entry is exact or the part is not stated."""
-        for name, form, unit in _forms(self):
-            if _part_of(name) == part:
+        for name, own, form, unit in _forms(self):
+            if own == part:
                 return self._converted(form, unit, float(getattr(self, name)))
         return StandardUncertainty(0.0, "", 0.0, "normal", 1.0)
 
@@ -82,22 +80,22 @@ class Entry(Strict):
         return given
 
     @model_validator(mode="after")
-    def _stated_once(self) -> Entry:
-        given = list(_forms(self))
-        parts = [_part_of(name) for name, _, _ in given]
+    def _stated_once(self) -> "Entry":
+        given = _forms(self)
+        parts, forms = [part for _, part, _, _ in given], {form for _, _, form, _ in given}
         twice = sorted({part for part in parts if parts.count(part) > 1})
         if twice:
-            both = ", ".join(name for name, _, _ in given if _part_of(name) == twice[0])
+            both = ", ".join(name for name, part, _, _ in given if part == twice[0])
             raise ValueError(f"{both}: the same uncertainty stated twice, one is needed; leave one out")
-        if any(form == "U" for _, form, _ in given) and self.k is None:
+        if "U" in forms and self.k is None:
             raise ValueError("k: missing beside an expanded uncertainty U; add the coverage factor of its certificate")
-        if any(form == "half_width" for _, form, _ in given) and self.distribution is None:
+        if "half_width" in forms and self.distribution is None:
             raise ValueError("distribution: missing beside a half_width; add rectangular, triangular or arcsine")
-        if self.exact and any(_part_of(name) == "" for name, _, _ in given):
+        if self.exact and "" in parts:
             raise ValueError("exact: true beside an uncertainty; leave one of the two out")
         if not self.exact and not given and self._needs_value:
             raise ValueError("no uncertainty is stated; add u_…, U_… with k, or half_width_… with distribution")
-        positive = any(getattr(self, name) > 0.0 for name, _, _ in given)
+        positive = any(getattr(self, name) > 0.0 for name, *_ in given)
         if positive and self.scope in SHARED_SCOPES and not (self.reference or self.origin):
             raise ValueError("reference: missing; name the reference standard by its id, or give a source")
         return self
@@ -111,25 +109,12 @@ class Entry(Strict):
         """Where the figure comes from, if from no reference standard."""
         return self.source
 
-    @model_serializer(mode="wrap")
-    def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        content = handler(self)
-        return {name: value for name, value in content.items() if name in self.model_fields_set}
 
-
-def _forms(entry: Entry) -> list[tuple[str, str, str]]:
-    """(key, form, unit) of the uncertainties that an entry states."""
-    forms: list[tuple[str, str, str]] = []
-    for name in type(entry).model_fields:
-        match = _STATED.match(name)
-        if match and match["unit"] in TO_SI and getattr(entry, name) is not None:
-            forms.append((name, match["form"], match["unit"]))
-    return forms
-
-
-def _part_of(name: str) -> str:
-    match = _STATED.match(name)
-    return "" if match is None else match["part"] or ""
+def _forms(entry: Entry) -> list[tuple[str, str, str, str]]:
+    """(key, part, form, unit) of the uncertainties that an entry states."""
+    matches = (STATED.match(name) for name in type(entry).model_fields)
+    stated = ((m[0], m["part"] or "", m["form"], m["unit"]) for m in matches if m and m["unit"] in TO_SI)
+    return [one for one in stated if getattr(entry, one[0]) is not None]
 
 
 Stated = NotNegative | None

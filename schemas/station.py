@@ -1,19 +1,11 @@
 """A station's file: which devices it has and where, what they may do, and how a simulated one is made."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import (
-    Field,
-    SerializerFunctionWrapHandler,
-    ValidationError,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from schemas.bounds import Celsius, Degrees, Name, Positive, Rate, Seconds, Text, Wait
 from schemas.errors import WrongUse
@@ -24,8 +16,8 @@ from schemas.reference import Reference
 from schemas.safety import Safety, SelfTest, Suspenders
 from schemas.simulation import Simulation
 from schemas.station_devices import Device, Devices, Equipment, built_in_equipment
-from schemas.strict import Strict
-from schemas.toml_files import explain, parse_toml, read_text
+from schemas.strict import Grown, Strict
+from schemas.toml_files import parse_as, read_text
 from schemas.uncertainty import TO_SI, Uncertainty
 
 Angles = tuple[Degrees, Degrees]
@@ -45,7 +37,7 @@ class Limits(Strict):
     position_deg: Positive = 0.01
 
     @model_validator(mode="after")
-    def _ordered(self) -> Limits:
+    def _ordered(self) -> "Limits":
         for name, (low, high) in (
             ("outer_deg", self.outer_deg),
             ("inner_deg", self.inner_deg),
@@ -83,28 +75,24 @@ class Pace(Strict):
     room_C: Celsius = 23.0
 
 
-class LinkSettings(Strict):
+class LinkSettings(Grown):
     """Patience of the links.
 
     ``speed``: seconds of the station per second of this machine; 1 on hardware, for a simulated station that
     ``tumbleline station serve --speed`` serves the same number.
     """
 
+    later: ClassVar[frozenset[str]] = frozenset({"speed"})
+
     timeout_s: Seconds = 3.0
     read_attempts: Annotated[int, Field(ge=1, le=5)] = 2
     speed: Annotated[float, Field(ge=0.001, le=1000.0)] = 1.0
 
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without the speed of hardware: captures of earlier versions keep their names."""
-        content = handler(self)
-        if content.get("speed") == 1.0:
-            del content["speed"]
-        return content
 
-
-class StationConfig(Strict):
+class StationConfig(Grown):
     """A station."""
+
+    later: ClassVar[frozenset[str]] = frozenset({"equipment", "uncertainty"})
 
     name: Annotated[Name, Field(pattern=r"^[a-z0-9][a-z0-9._-]*$")]
     kind: Literal["simulated", "modbus"]
@@ -123,20 +111,10 @@ class StationConfig(Strict):
     uncertainty: Uncertainty | None = None
 
     @model_validator(mode="after")
-    def _budget_is_traced(self) -> StationConfig:
+    def _budget_is_traced(self) -> "StationConfig":
         if self.uncertainty is not None:
             refuse_untraced(self.uncertainty, self.reference, simulated=self.kind == "simulated")
         return self
-
-    @model_serializer(mode="wrap")
-    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without equipment and uncertainty where there is none: captures of earlier versions keep their names."""
-        content = handler(self)
-        if content.get("uncertainty") is None:
-            content.pop("uncertainty", None)
-        if content.get("equipment") in ({}, Equipment().model_dump(), None):
-            content.pop("equipment", None)
-        return content
 
     def fitted(self) -> dict[str, Device]:
         """The equipment of the station by role; a simulated one has the built-in equipment where its file names none."""
@@ -145,7 +123,7 @@ class StationConfig(Strict):
         return {**built_in, **named}
 
     @model_validator(mode="after")
-    def _can_be_safe(self) -> StationConfig:
+    def _can_be_safe(self) -> "StationConfig":
         low, high = self.limits.temperature_C
         if self.safety.chamber == "set_point" and not low <= self.safety.temperature_C <= high:
             raise ValueError(
@@ -155,16 +133,15 @@ class StationConfig(Strict):
         return self
 
     @model_validator(mode="after")
-    def _complete(self) -> StationConfig:
+    def _complete(self) -> "StationConfig":
         if self.kind == "simulated" and self.simulation is None:
             raise ValueError("simulation: missing, a station of kind simulated needs it; add [simulation]")
         if self.kind == "modbus":
-            for name in Devices.model_fields:
-                if missing := getattr(self.devices, name).missing():
-                    raise ValueError(f"devices.{name}.{missing}: empty, a station of kind modbus needs one; add it")
-            for role, device in self.equipment.there().items():
+            addressed = {f"devices.{name}": getattr(self.devices, name) for name in Devices.model_fields}
+            addressed |= {f"equipment.{role}": device for role, device in self.equipment.there().items()}
+            for place, device in addressed.items():
                 if missing := device.missing():
-                    raise ValueError(f"equipment.{role}.{missing}: empty, a station of kind modbus needs one; add it")
+                    raise ValueError(f"{place}.{missing}: empty, a station of kind modbus needs one; add it")
             supply = self.equipment.power_supply
             if supply is not None and "voltage" not in supply.maximum:
                 raise ValueError(
@@ -228,7 +205,4 @@ def load_station(path: Path | None = None) -> StationConfig:
     else:
         file = path if is_file(path) else own_file("stations", str(path), {BUILT_IN}) or path
         source, text = str(file), read_text(file, "station")
-    try:
-        return StationConfig.model_validate(parse_toml(text, source))
-    except ValidationError as problem:
-        raise explain(problem, source, StationConfig) from None
+    return parse_as(StationConfig, text, source)

@@ -1,29 +1,69 @@
 """The devices and the test equipment of a station's file."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
-from typing import Annotated, Any
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import (
-    Field,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from schemas.bounds import Positive
-from schemas.carrier import Carried
-from schemas.strict import Strict
+from schemas.profile import Carrier, WordOrder
+from schemas.strict import Grown, Strict
 from schemas.toml_files import parse_toml
 
 SIMULATED_EQUIPMENT = "simulated_equipment.toml"
 MOST_SLOTS = 32  # the reader's registers name that many
 LAST_DEVICE_ID = 247  # Modbus over serial line 1.02, 2.2
+SERIAL = ("serial", "baud", "parity", "stop_bits")
+SECURE = ("ca_file", "certificate_file", "key_file", "server_name")
 
 
-class Device(Carried):
+class Carried(Strict):
+    """A profile at an address; a simulated station leaves the address empty and gets its own.
+
+    ``link`` is ``tcp``, ``tls``, ``ascii`` (lines over TCP), each to host and port, or ``rtu`` on the line ``serial``. With
+    ``tls`` the device's certificate must be signed by the authority in ``ca_file`` and bear ``server_name``, or the host's name;
+    ``certificate_file`` and ``key_file`` are shown to the device where it asks for them. ``word_order`` is that of a device
+    which is set to another than its profile's.
+    """
+
+    profile: str
+    word_order: WordOrder | None = None
+    link: Carrier = "tcp"
+    host: str = ""
+    port: Annotated[int, Field(ge=0, le=65535)] = 502
+    serial: str = ""
+    baud: Annotated[int, Field(ge=300, le=1_000_000)] = 19200
+    parity: Literal["none", "even", "odd"] = "even"
+    stop_bits: Literal[1, 2] = 1
+    ca_file: str = ""
+    certificate_file: str = ""
+    key_file: str = ""
+    server_name: str = ""
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> "Carried":
+        for kind, names in (("rtu", SERIAL), ("tls", SECURE)):
+            given = {} if self.link == kind else self.model_dump(include=set(names), exclude_defaults=True)
+            stray = [name for name in names if name in given]
+            if stray:
+                raise ValueError(
+                    f"{', '.join(stray)}: for link {kind}, the link is {self.link}; leave it out, or set link"
+                )
+        if bool(self.key_file) != bool(self.certificate_file):
+            raise ValueError("certificate_file, key_file: one without the other; name both, or none")
+        return self
+
+    def missing(self) -> str:
+        """The key that a real device at this address still needs; empty when it has all."""
+        if self.link == "rtu":
+            return "" if self.serial else "serial"
+        if not self.host:
+            return "host"
+        return "ca_file" if self.link == "tls" and not self.ca_file else ""
+
+
+class Device(Carried, Grown):
     """A device at an address.
 
     ``maximum`` bounds what may be ordered, by the names of the profile's orders, below the profile's own largest values; for an
@@ -31,14 +71,10 @@ class Device(Carried):
     devices' supply is ``maximum.voltage`` of the power supply.
     """
 
+    later: ClassVar[frozenset[str]] = frozenset({"maximum"})
+
     device_id: Annotated[int, Field(ge=1, le=247)]
     maximum: dict[str, Positive] = Field(default_factory=dict[str, float])
-
-    @model_serializer(mode="wrap")
-    def _without_default(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without an empty ``maximum``: captures of earlier versions keep their names."""
-        content = handler(self)
-        return {name: value for name, value in content.items() if name != "maximum" or value}
 
 
 class Slots(Carried):
@@ -48,7 +84,7 @@ class Slots(Carried):
     count: Annotated[int, Field(ge=1, le=MOST_SLOTS)] = 8
 
     @model_validator(mode="after")
-    def _addressable(self) -> Slots:
+    def _addressable(self) -> "Slots":
         last = self.device_id + self.count - 1
         if last > LAST_DEVICE_ID:
             raise ValueError(

@@ -1,11 +1,37 @@
-"""The base of every part of a file that is written by hand."""
+"""The bases of the parts of a file that is written by hand."""
 
-from __future__ import annotations
+from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
 
 
 class Strict(BaseModel):
     """A part of a file in which an unknown key is an error, not something to skip."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Grown(Strict):
+    """A part with keys that earlier versions did not have: at their defaults its document leaves them out.
+
+    Runs, captures and stations of those versions keep their content, and with it their names.
+    """
+
+    later: ClassVar[frozenset[str]]
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        defaults = {name: type(self).model_fields[name].get_default(call_default_factory=True) for name in self.later}
+        return {
+            name: value
+            for name, value in handler(self).items()
+            if name not in defaults or getattr(self, name) != defaults[name]
+        }
+
+
+class OnlyStated(Strict):
+    """A part whose document has the keys that are stated, and no other."""
+
+    @model_serializer(mode="wrap")
+    def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: value for name, value in handler(self).items() if name in self.model_fields_set}

@@ -45,15 +45,21 @@ class Table:
     Parameters
     ----------
     columns : the columns that must be there, with what their values must satisfy.
-    finite : columns in which NaN and infinity are refused; all of them are numbers.
+    measured : columns of numbers that need not be there, or may have gaps in rows that do not count.
     key : columns that together name a row; no two rows may share them.
-    only_ok : finite columns count only in rows whose ``status`` is ``ok``.
+    only_ok : numbers count only in rows whose ``status`` is ``ok``.
     """
 
     columns: dict[str, Column]
-    finite: tuple[str, ...] = ()
+    measured: tuple[str, ...] = ()
     key: tuple[str, ...] = ()
     only_ok: bool = False
+
+    @cached_property
+    def finite(self) -> tuple[str, ...]:
+        """Columns of numbers in which NaN and infinity are refused."""
+        needed = (name for name, c in self.columns.items() if c.kind == "float64" and not c.missing)
+        return (*needed, *self.measured)
 
     @cached_property
     def schema(self) -> pa.DataFrameSchema:

@@ -4,8 +4,6 @@
 Every table has a schema version that travels with its file.
 """
 
-from __future__ import annotations
-
 from schemas import version
 from schemas.table import Table, any_text, flag, gaps, number, numbers, text, whole
 from schemas.units import AXES
@@ -26,7 +24,7 @@ _SURROUNDINGS = ("chamber_C", "unit_C", "supply_V", "vibration_g", "since_move_s
 
 TABLES: dict[str, Table] = {
     # Samples may hold NaN: what a device really sent is kept, and the validate stage refuses the unit.
-    "samples": Table({**_PLACE, "time_s": number(), **gaps(AXES)}, finite=("time_s",)),
+    "samples": Table({**_PLACE, "time_s": number(), **gaps(AXES)}),
     "readings": Table(
         {
             **_PLACE,
@@ -41,7 +39,7 @@ TABLES: dict[str, Table] = {
             "out_unit": text(*OUTPUT_UNITS),
             "full_scale": number(low=0.0),
         },
-        finite=(*_ANGLES, "chamber_C", "unit_C", "start_s", "duration_s", "rate_hz", "full_scale"),
+        measured=(*_ANGLES, "chamber_C", "unit_C"),
         key=("unit", "record"),
         only_ok=True,
     ),
@@ -53,7 +51,6 @@ TABLES: dict[str, Table] = {
             "unit": text(),
             **gaps(("unit_C",)),
         },
-        finite=("time_s", "chamber_C"),
     ),
     "events": Table(
         {
@@ -63,7 +60,6 @@ TABLES: dict[str, Table] = {
             "reason": any_text(),
             "action": any_text(),
         },
-        finite=("time_s",),
     ),
     "soaks": Table(
         {
@@ -71,7 +67,6 @@ TABLES: dict[str, Table] = {
             "record": whole(),
             **numbers(("target_C", "seconds", "air_overshoot_K", "device_overshoot_K")),
         },
-        finite=("time_s", "target_C", "seconds", "air_overshoot_K", "device_overshoot_K"),
     ),
     "verdicts": Table(
         {
@@ -85,7 +80,7 @@ TABLES: dict[str, Table] = {
     ),
     "dwells": Table(
         {"unit": text(), "dwell": whole(), "time_s": number(), **numbers(_OUT)},
-        finite=("time_s", *_OUT, *_SD, *_FORCE, "outer_deg", "inner_deg", "unit_C", "chamber_C"),
+        measured=(*_SD, *_FORCE, "outer_deg", "inner_deg", "unit_C", "chamber_C"),
         key=("unit", "dwell"),
     ),
     "coefficients": Table(
@@ -97,7 +92,6 @@ TABLES: dict[str, Table] = {
             **numbers(("value", "standard_error")),
             "unit_text": any_text(),
         },
-        finite=("value", "standard_error"),
         key=("unit", "axis", "effect", "name"),
     ),
     "covariance": Table(
@@ -108,7 +102,6 @@ TABLES: dict[str, Table] = {
             "column": whole(),
             "value": number(),
         },
-        finite=("value",),
         key=("unit", "axis", "row", "column"),
     ),
     "residuals": Table(
@@ -120,7 +113,6 @@ TABLES: dict[str, Table] = {
             **numbers(("force_g", "residual_ug", "standard_error_ug", "expected_ug")),
             **gaps(("unit_C",)),
         },
-        finite=("residual_ug", "force_g", "standard_error_ug", "expected_ug"),
         key=("unit", "dwell", "axis"),
     ),
     "predictions": Table(
@@ -131,7 +123,6 @@ TABLES: dict[str, Table] = {
             "other": whole(),
             "covariance_ug2": number(),
         },
-        finite=("covariance_ug2",),
         key=("unit", "axis", "dwell", "other"),
     ),
     "wander": Table(
@@ -142,7 +133,6 @@ TABLES: dict[str, Table] = {
             **numbers(("white_ug", "flicker_ug", "walk_ug", "lack_of_fit")),
             "dof": whole(),
         },
-        finite=("white_ug", "flicker_ug", "walk_ug", "lack_of_fit"),
         key=("unit", "axis"),
     ),
     "verification": Table(
@@ -152,12 +142,10 @@ TABLES: dict[str, Table] = {
             "pose": text(),
             **numbers(("norm_g", "error_ug", "uncertainty_ug", "error_x_ug", "error_y_ug", "error_z_ug")),
         },
-        finite=("norm_g", "error_ug", "uncertainty_ug", "error_x_ug", "error_y_ug", "error_z_ug"),
         key=("unit", "dwell"),
     ),
     "verification_poses": Table(
         {"unit": text(), "pose": text(), "dwells": whole(1), **numbers(("error_ug", "uncertainty_ug"))},
-        finite=("error_ug", "uncertainty_ug"),
         key=("unit", "pose"),
     ),
     "allan": Table(
@@ -167,7 +155,6 @@ TABLES: dict[str, Table] = {
             **numbers(("tau_s", "deviation_ug", "low_ug", "high_ug")),
             **gaps(("fitted_ug",)),
         },
-        finite=("tau_s", "deviation_ug", "low_ug", "high_ug"),
         key=("unit", "axis", "tau_s"),
     ),
     "noise": Table(
@@ -213,7 +200,6 @@ TABLES: dict[str, Table] = {
             "outcome": text(),
             "rule": any_text(),
         },
-        finite=("value", "uncertainty"),
         key=("unit", "figure"),
     ),
     # one row per unit, quantity and contribution
@@ -224,7 +210,6 @@ TABLES: dict[str, Table] = {
             **numbers(("u", "share", "divisor", "stated")),
             **gaps(("dof", "sensitivity", "visible")),
         },
-        finite=("u", "share"),
         key=("unit", "quantity", "axis", "contribution"),
     ),
     "uncertainties": Table(
@@ -234,13 +219,11 @@ TABLES: dict[str, Table] = {
             **numbers(("value", "u_a", "u_b", "u", "k", "expanded")),
             **gaps(("dof", "shown", "unseen")),
         },
-        finite=("value", "u_a", "u_b", "u", "k", "expanded"),
         key=("unit", "quantity", "axis"),
     ),
     # of the coefficients of all axes in one vector, x before y before z, lower triangle
     "budget_covariance": Table(
         {"unit": text(), "row": whole(), "column": whole(), "value": number()},
-        finite=("value",),
         key=("unit", "row", "column"),
     ),
     # on the model of the run: the effects of the fit; one row, none without a model
@@ -264,7 +247,6 @@ TABLES: dict[str, Table] = {
             **numbers(("mean", "u", "limit", "accept")),
             **gaps(("process", "pfa", "pfr", "accepted", "largest_pfa")),
         },
-        finite=("mean", "u", "limit", "accept"),
         key=("figure",),
     ),
     "grades": Table(

@@ -1,28 +1,21 @@
 """TOML files that people write: bounded reading, parsing, and the first problem of a model as one message."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
 from schemas.foreign import foreign, shown
 from schemas.reasons import reason_of
 from schemas.shipped import hint_of_sample
 
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
-
+AnyModel = TypeVar("AnyModel", bound=BaseModel)
 
 LONGEST_FILE = 4 * 2**20  # bytes of a file that is written by hand
-
-
 LONGEST_REASON = 400  # characters of the reason that a check gives
-
-
 DEEPEST = 16  # levels of nested tables and lists; the deepest of our files has five
 
 
@@ -59,6 +52,14 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
             f"{source}: tables and lists more than {DEEPEST} deep in one another, none needs so many; correct the file"
         )
     return content
+
+
+def parse_as(kind: type[AnyModel], text: str, source: str, context: Any = None) -> AnyModel:
+    """The content of a TOML text as a model, or :class:`RecipeInvalid` naming the key and what is needed."""
+    try:
+        return kind.model_validate(parse_toml(text, source), context=context)
+    except ValidationError as problem:
+        raise explain(problem, source, kind) from None
 
 
 def _depth(content: Any) -> int:

@@ -4,8 +4,6 @@ Each entry states a standard uncertainty u, or an expanded one U with its k, or 
 stands in the key (``u_urad``, ``U_K``, ``half_width_arcsec``). It names the reference standard, or another source.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -85,7 +83,7 @@ class Gravity(RelativeEntry):
         return self.source != "formula"
 
     @model_validator(mode="after")
-    def _placed(self) -> Gravity:
+    def _placed(self) -> "Gravity":
         if self.source == "formula" and (self.latitude_deg is None or self.height_m is None):
             raise ValueError('latitude_deg, height_m: needed with source = "formula"; add both')
         if self.source == "survey" and self.value_m_s2 is None:

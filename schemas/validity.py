@@ -1,13 +1,11 @@
 """``[stability]`` of a device and ``[certificate]`` of a recipe: what changes beyond the run, what is certified for how long."""
 
-from __future__ import annotations
+from typing import Annotated, Literal
 
-from typing import Annotated, Any, Literal
-
-from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from schemas.bounds import Celsius, NotNegative, Number, Positive, Seconds, Text
-from schemas.strict import Strict
+from schemas.strict import OnlyStated, Strict
 
 
 class Ageing(Strict):
@@ -25,7 +23,7 @@ class Ageing(Strict):
     correlation_days: Positive | None = None
 
     @model_validator(mode="after")
-    def _complete(self) -> Ageing:
+    def _complete(self) -> "Ageing":
         needed = {
             "log": ("per_decade_ug",), "linear": ("per_year_ug",), "walk": ("walk_ug_rtday",),
             "bounded": ("deviation_ug", "correlation_days"),
@@ -36,7 +34,7 @@ class Ageing(Strict):
         return self
 
 
-class Stability(Strict):
+class Stability(OnlyStated):
     """What a kind of device does beyond a run.
 
     switch_on_ug, switch_on_ppm : standard deviation of bias and scale from one switch-on to the next
@@ -67,12 +65,8 @@ class Stability(Strict):
     scale_temperature_ppm_K: NotNegative = 0.0
     note: Text = ""
 
-    @model_serializer(mode="wrap")
-    def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if name in self.model_fields_set}
 
-
-class CertificateTerms(Strict):
+class CertificateTerms(OnlyStated):
     """The table ``[certificate]`` of a recipe: what is certified.
 
     validity_months : period that the figures are stated for; customer_agreed : whether a due date may be printed
@@ -90,13 +84,9 @@ class CertificateTerms(Strict):
     frame: Literal["fixture", "intrinsic"] = "intrinsic"
 
     @model_validator(mode="after")
-    def _ordered(self) -> CertificateTerms:
+    def _ordered(self) -> "CertificateTerms":
         for name in ("force_range_g", "temperature_range_C"):
             bounds = getattr(self, name)
             if bounds is not None and bounds[0] >= bounds[1]:
                 raise ValueError(f"{name}: {bounds[0]:g} is not below {bounds[1]:g}; give the lower bound first")
         return self
-
-    @model_serializer(mode="wrap")
-    def _only_stated(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if name in self.model_fields_set}

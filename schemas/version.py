@@ -1,7 +1,5 @@
 """The version of the tables' schemas: it is written into every file, and is raised by one when the columns of a table change."""
 
-from __future__ import annotations
-
 from schemas.errors import ArchiveUnusable
 
 VERSION = 1

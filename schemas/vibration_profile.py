@@ -1,17 +1,15 @@
 """Profiles of random vibration: breakpoints of the density, one file each in ``schemas/vibration``."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from itertools import pairwise
 from typing import Annotated
 
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, field_validator
 
 from schemas.bounds import Positive, Text
 from schemas.errors import RecipeInvalid, close_matches, did_you_mean
-from schemas.recipe import Strict
-from schemas.toml_files import explain, parse_toml
+from schemas.strict import Strict
+from schemas.toml_files import parse_as
 
 
 class VibrationProfile(Strict):
@@ -41,16 +39,12 @@ def vibration_profiles() -> list[str]:
 
 def load_vibration_profile(name: str) -> VibrationProfile:
     """The built-in profile of this name; :class:`RecipeInvalid` names close ones."""
-    if name not in vibration_profiles():
-        known = vibration_profiles()
+    known = vibration_profiles()
+    if name not in known:
         raise RecipeInvalid(
             f"profile: no vibration profile '{name}'; {did_you_mean(name, known)}",
             key="profile",
             close=close_matches(name, known),
         )
-    source = f"vibration/{name}.toml"
     text = files("schemas").joinpath("vibration", f"{name}.toml").read_text("utf-8")
-    try:
-        return VibrationProfile.model_validate(parse_toml(text, source))
-    except ValidationError as problem:
-        raise explain(problem, source, VibrationProfile) from None
+    return parse_as(VibrationProfile, text, f"vibration/{name}.toml")

@@ -1,7 +1,5 @@
 """Clocks of a station: wall time on hardware, the time of the simulated plant in simulation."""
 
-from __future__ import annotations
-
 import json
 import time
 from typing import Protocol

@@ -1,7 +1,5 @@
 """Conversion between register words and values, in both directions; client and simulated station share it."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from typing import Literal

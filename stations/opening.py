@@ -19,7 +19,6 @@ from schemas.station_devices import Device
 from stations.clock import Clock, WallClock
 from stations.devices.adapters import axis_adapter, chamber_adapter, equipment_adapter
 from stations.devices.axis import TableAxis
-from stations.devices.chamber import ThermalChamber
 from stations.devices.commands import Commands
 from stations.devices.reader import Reader
 from stations.devices.registers import Registers
@@ -36,7 +35,6 @@ from stations.station import Station, nobody_else
 
 if TYPE_CHECKING:
     from stations.plant.plant import Plant
-
 
 _NAME = "tumbleline-{user}-processor-{number}.lock"
 
@@ -113,7 +111,7 @@ def make_plant(
 @contextmanager
 def serve_plant(config: StationConfig, lot: Lot, plant: Plant, roles: Sequence[str] = ()) -> Generator[Station]:
     """A station whose devices are the plant's, on loopback; ``lot`` is what its client expects to find."""
-    from stations.plant.clock import PlantClock  # noqa: PLC0415 - hardware needs no plant
+    from stations.plant.plant import PlantClock  # noqa: PLC0415 - hardware needs no plant
 
     with serve_devices(config, plant, roles) as links:
         station = _assemble(config, [unit.slot for unit in lot.units], links, PlantClock(plant), roles)
@@ -155,13 +153,21 @@ def _assemble(
     }
     reader = _registers("reader", "reader", devices.reader, links)
     _, fastest = tighter((0.0, limits.rate_hz), reader.profile, "rate")
+    chamber, where = profile_of(devices.chamber), devices.slots
+    banks = {
+        slot: Registers(f"slot {slot}", links.registers("slots"), where.device_id + slot, profile_of(where))
+        for slot in slots
+    }
     parts = (
         TiltTable(axes["outer"], axes["inner"], clock),
-        _chamber(devices.chamber, links, limits),
-        Reader(reader, {slot: Slot(_slot_registers(config, links, slot)) for slot in slots}, fastest),
+        chamber_adapter(chamber)(
+            _values("chamber", "chamber", devices.chamber, links),
+            *tighter(limits.temperature_C, chamber, "set_point"),
+        ),
+        Reader(reader, {slot: Slot(registers) for slot, registers in banks.items()}, fastest),
     )
     equipment = {
-        role: equipment_adapter(role, profile_of(device))(_values(role, device, links), clock)
+        role: equipment_adapter(role, profile_of(device))(_values(role.replace("_", " "), role, device, links), clock)
         for role, device in config.fitted().items()
         if role in roles
     }
@@ -169,29 +175,15 @@ def _assemble(
     return Station(config, clock, *parts, safe_steps=steps, equipment=equipment)
 
 
-def _values(role: str, device: Device, links: Links) -> Values:
-    """Values of test equipment: text commands on an ascii link, registers on any other."""
-    name = role.replace("_", " ")
+def _values(name: str, place: str, device: Device, links: Links) -> Values:
+    """Values of a device: text commands on an ascii link, registers on any other."""
     if device.link == "ascii":
-        return Commands(name, links.lines(role), profile_of(device))
-    return _registers(name, role, device, links)
+        return Commands(name, links.lines(place), profile_of(device))
+    return _registers(name, place, device, links)
 
 
 def _registers(name: str, place: str, device: Device, links: Links) -> Registers:
     return Registers(name, links.registers(place), device.device_id, profile_of(device))
-
-
-def _chamber(device: Device, links: Links, limits: Limits) -> ThermalChamber:
-    """The chamber by its controller's family, on registers or on lines."""
-    profile = profile_of(device)
-    adapter = chamber_adapter(profile)
-    spoken = device.link == "ascii"
-    values = (
-        Commands("chamber", links.lines("chamber"), profile)
-        if spoken
-        else _registers("chamber", "chamber", device, links)
-    )
-    return adapter(values, *tighter(limits.temperature_C, profile, "set_point"))
 
 
 def _axis(registers: Registers, bounds: tuple[float, float], limits: Limits) -> TableAxis:
@@ -219,11 +211,6 @@ def tighter(bounds: tuple[float, float], profile: Profile, name: str) -> tuple[f
             key="limits",
         )
     return low, high
-
-
-def _slot_registers(config: StationConfig, links: Links, slot: int) -> Registers:
-    where = config.devices.slots
-    return Registers(f"slot {slot}", links.registers("slots"), where.device_id + slot, profile_of(where))
 
 
 @contextmanager

@@ -1,7 +1,5 @@
 """State of a station at one instant: angles, temperatures, states, devices in the slots, and the holder of the lease."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -14,8 +12,6 @@ from stations.safety.folder import state_folder
 from stations.safety.leases import holders
 from stations.safety.safety_status import unsafe_reason
 from stations.station import Station
-
-AXES = ("outer", "inner")
 
 
 @dataclass

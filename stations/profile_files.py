@@ -1,15 +1,13 @@
 """The device profiles by name: those of the product, and those of the user (:mod:`schemas.own_files`)."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid, did_you_mean
 from schemas.own_files import own_file, own_names
 from schemas.profile import Profile, parse_profile
+from schemas.station_devices import Carried
 from schemas.toml_files import read_text
 
 

@@ -1,7 +1,5 @@
 """The self-test of a station before a shift: instruments, moves, noise of the slots, and a check standard."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence

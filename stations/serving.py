@@ -6,15 +6,16 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import partial
 from threading import Event
 from typing import TYPE_CHECKING
 
 from schemas.errors import StationError, StationRefused, WrongUse
 from schemas.lot import Lot
-from schemas.profile import Register
+from schemas.profile import Command, Register
 from schemas.station import StationConfig
 from schemas.station_devices import Devices
-from stations.codec import Value, named
+from stations.codec import named
 from stations.devices.commands import Commands
 from stations.devices.registers import Registers
 from stations.links.making import Links
@@ -171,35 +172,27 @@ def _look(config: StationConfig, links: Links) -> Iterator[RegisterReading]:
 def _values(links: Links, device: Served) -> Iterator[RegisterReading]:
     """Values of one device; after the first request without an answer its other registers are not read."""
     profile = profile_of(getattr(links.config.devices, device.place))
+    asked: list[tuple[Register | Command, int, Callable[[], str]]]
     if profile.commands:
         commands = Commands(device.name, links.lines(device.place), profile)
-        for number, command in enumerate(profile.commands):
-            try:
-                value = commands.text(command.name)
-            except StationError as problem:
-                yield RegisterReading(
-                    device.name, device.device_id, command.name, number, "", command.unit, str(problem)
-                )
-                return
-            yield RegisterReading(device.name, device.device_id, command.name, number, value, command.unit)
-        return
-    registers = Registers(device.name, links.registers(device.place), device.device_id, profile)
-    for register in profile.registers:
-        if register.access == "write":
-            continue
+        asked = [(c, number, partial(commands.text, c.name)) for number, c in enumerate(profile.commands)]
+    else:
+        registers = Registers(device.name, links.registers(device.place), device.device_id, profile)
+        readable = [r for r in profile.registers if r.access != "write"]
+        asked = [(r, r.address, partial(_shown, registers, r)) for r in readable]
+    for entry, address, read in asked:
         try:
-            value = registers.read(register.name)
+            value, fault = read(), ""
         except StationError as problem:
-            yield _reading(device, register, "", str(problem))
+            value, fault = "", str(problem)
+        yield RegisterReading(device.name, device.device_id, entry.name, address, value, entry.unit, fault)
+        if fault:
             return
-        yield _reading(device, register, _shown(register, value), "")
 
 
-def _reading(device: Served, register: Register, value: str, fault: str) -> RegisterReading:
-    return RegisterReading(device.name, device.device_id, register.name, register.address, value, register.unit, fault)
-
-
-def _shown(register: Register, value: Value) -> str:
+def _shown(registers: Registers, register: Register) -> str:
+    """The present value of a register, as text."""
+    value = registers.read(register.name)
     if isinstance(value, list):
         return ", ".join(f"{number:.6g}" for number in value)
     if isinstance(value, str):

@@ -1,22 +1,18 @@
 """A station: clock, table, chamber and reader, and the soak that needs them together."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from schemas.errors import NotReached
 from schemas.station import StationConfig
 from stations.clock import Clock
 from stations.devices.chamber import ThermalChamber
+from stations.devices.reader import Reader
 from stations.devices.table import TiltTable
 from stations.safety.safe_state import Reached, SafeStep, reach_safe_state
-
-if TYPE_CHECKING:
-    from stations.devices.reader import Reader
 
 Observe = Callable[[], list[float]]
 

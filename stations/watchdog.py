@@ -7,8 +7,6 @@ growing intervals, until the station is safe. A command sets an absolute state, 
 by name (:mod:`stations.safety.watchdog_client`), because it stands above the safety modules: it opens devices.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select
@@ -30,7 +28,7 @@ from stations.safety.folder import log_event
 from stations.safety.lease_parts import Part, addresses
 from stations.safety.leases import Leases, new_holder
 from stations.safety.safe_state import SafeStep, reach_safe_state
-from stations.safety.watchdog_protocol import BEAT, DONE, READY
+from stations.safety.watchdog_client import BEAT, DONE, READY
 
 ENDED = "the run's process has ended"
 POLL_S = 0.25

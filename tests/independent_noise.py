@@ -1,6 +1,6 @@
 """Noise for judging estimators, made without any of their code: by Fourier synthesis, and by sums in time.
 
-`inertial.noise.generate` filters white noise (Kasdin), the plant and the covariances add Ornstein–Uhlenbeck processes. Here 1/f
+`tests.made_noise` filters white noise (Kasdin), the plant and the covariances add Ornstein–Uhlenbeck processes. Here 1/f
 noise is drawn frequency by frequency, so that neither a filter nor a set of time constants is shared with what is judged.
 """
 

@@ -17,7 +17,14 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 from pymodbus.server import ModbusSerialServer, ModbusTlsServer
 
+from stations.links.modbus import WireLink
+from stations.links.wires import TcpWire
 from stations.plant.server import PlantServer
+
+
+def tcp_link(host: str, port: int, *, timeout_s: float, read_attempts: int) -> WireLink:
+    """Registers and bits of the devices at one Modbus TCP address, without a gate."""
+    return WireLink(TcpWire(host, port, timeout_s), read_attempts=read_attempts)
 
 
 @dataclass

@@ -1,7 +1,5 @@
 """Centrifuge: the polynomial over a = rω²/g, with the input reversed or not."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

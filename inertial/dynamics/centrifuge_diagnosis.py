@@ -1,23 +1,17 @@
 """Diagnosis of a centrifuge test: whether its polynomial is adequate, missing effects, and next measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.counts import degrees_of_freedom
-from inertial.dynamics import goodness
 from inertial.dynamics.centrifuge_effects import EFFECTS, Spins
 from inertial.dynamics.centrifuge_radii import radii_as_observed
-from inertial.dynamics.missing_effects import breakers_of, missing_classes
-from inertial.dynamics.transfer_diagnosis import FEWEST_DOF, EffectClass
+from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge
 from inertial.errors import NotIdentified
 
 Array = NDArray[np.float64]
-FOLDS = 5
 DEFAULT = ("second_order", "third_order")
 
 
@@ -43,26 +37,15 @@ class SpinFit:
 
 
 @dataclass(frozen=True)
-class SpinDiagnosis:
+class SpinDiagnosis(Judged[SpinFit]):
     """The verdict on a model of a centrifuge test.
 
-    adequate : None where it cannot be judged, with ``reason``
-    fit : of the judged model; extended : with one effect of each class, the same where none is named
-    classes : effects that make the model adequate, one class after the other
     error_g, extended_g : rms residual
-    left_out : rms weighted residual of left-out points before and after; near 1 for a right model
     next_steps : the measurements that separate the effects of the classes
     """
 
-    adequate: bool | None
-    reason: str
-    fit: SpinFit
-    extended: SpinFit
-    classes: tuple[EffectClass, ...]
-    unexplained: bool
     error_g: float
     extended_g: float
-    left_out: tuple[float, float]
     next_steps: tuple[str, ...]
 
 
@@ -107,16 +90,19 @@ def fit_spins(points: Spins, output: Array, error: Array, effects: Sequence[str]
 def diagnose_spins(points: Spins, output: Array, error: Array, effects: Sequence[str] = DEFAULT) -> SpinDiagnosis:
     """The verdict on bias, scale and ``effects``, with the classes of effects that make the model adequate."""
     seen = [name for name, one in EFFECTS.items() if one.seen(points)]
-    judged = [name for name in effects if name in seen]
-    base = fit_spins(points, output, error, judged)
-    if base.dof < FEWEST_DOF:
-        left = degrees_of_freedom(base.dof)
-        reason = f"{left}, at least {FEWEST_DOF} are needed; add speeds, or measure the other mounting too"
-        return _verdict(points, output, error, (base, base), None, reason, ())
-    if goodness.adequate(base):
-        return _verdict(points, output, error, (base, base), True, "", ())
-    classes, best = missing_classes(base, judged, seen, lambda names: fit_spins(points, output, error, names))
-    return _verdict(points, output, error, (base, best), False, "", classes)
+    names = [name for name in effects if name in seen]
+    judged = judge(
+        fit_spins(points, output, error, names),
+        names,
+        seen,
+        lambda more, _: fit_spins(points, output, error, more),
+        lambda fit: _left_out(points, output, error, fit.effects),
+        remedy="add speeds, or measure the other mounting too",
+    )
+    before, after = (float(np.sqrt(np.mean(fit.residuals**2))) for fit in (judged.fit, judged.extended))
+    return SpinDiagnosis(
+        **vars(judged), error_g=before, extended_g=after, next_steps=breakers_of(judged.classes, EFFECTS)
+    )
 
 
 def _rows(points: Spins, effects: Sequence[str]) -> Array:
@@ -129,31 +115,6 @@ def _uncertain_radii(points: Spins) -> list[float]:
     """The radii whose errors are unknowns: those of several; the error of a single one is in the scale."""
     radii = np.unique(points.radius_m).tolist()
     return radii if len(radii) > 1 and points.radius_error_m > 0.0 else []
-
-
-def _verdict(
-    points: Spins,
-    output: Array,
-    error: Array,
-    fits: tuple[SpinFit, SpinFit],
-    adequate: bool | None,  # noqa: FBT001 - a verdict, not a switch
-    reason: str,
-    classes: tuple[EffectClass, ...],
-) -> SpinDiagnosis:
-    base, best = fits
-    left = [_left_out(points, output, error, one.effects) for one in fits]
-    return SpinDiagnosis(
-        adequate,
-        reason,
-        base,
-        best,
-        classes,
-        adequate is False and not goodness.adequate(best),
-        float(np.sqrt(np.mean(base.residuals**2))),
-        float(np.sqrt(np.mean(best.residuals**2))),
-        (left[0], left[1]),
-        breakers_of(classes, EFFECTS),
-    )
 
 
 def _left_out(points: Spins, output: Array, error: Array, effects: Sequence[str]) -> float:

@@ -1,7 +1,5 @@
 """Centrifuge at two radii or more: the curve of the unit, the stretch of the arm and the offset of the proof mass together."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +13,6 @@ BOTH = ("bias", "scale", "second_order", "third_order", "odd_quadratic", "asymme
 """Terms of a unit that both mountings and two radii separate."""
 ONE_WAY = BOTH[:4]
 """Terms of a unit in one mounting: K1′ is in the scale then, and Koq in K2."""
-ARM = ("arm_stretch", "mass_offset")
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,7 @@
 """Packages of effects in which every module defines one effect and is found by its file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib import import_module
-from inspect import isabstract
 from pkgutil import iter_modules
 from typing import Any, TypeVar
 
@@ -28,9 +25,7 @@ def effects_of(package: str, path: Iterable[str], base: type[AnyEffect]) -> dict
         if info.name == "base":
             continue
         content = vars(import_module(f"{package}.{info.name}")).values()
-        own: list[Any] = [
-            one for one in content if isinstance(one, type) and issubclass(one, base) and not isabstract(one)
-        ]
+        own: list[Any] = [c for c in content if isinstance(c, type) and issubclass(c, base) and c is not base]
         if len(own) != 1 or own[0].id != info.name:
             raise IncompleteEffect(f"{package}.{info.name}: one effect with id '{info.name}' is needed; define it")
         effects[info.name] = own[0]()

@@ -1,7 +1,5 @@
 """Whether the fit of a model to the points of a test agrees with their uncertainties."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 from inertial.distributions import chi2_tail

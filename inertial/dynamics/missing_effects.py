@@ -1,17 +1,63 @@
-"""Effects that a model lacks: forward selection in classes of effects that the data do not separate."""
-
-from __future__ import annotations
+"""The verdict on the model of a dynamic test: whether it is adequate, and which effects are missing, in classes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, Protocol, TypeVar
+from dataclasses import dataclass
+from typing import ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from inertial.counts import degrees_of_freedom
 from inertial.distributions import chi2_tail
 from inertial.dynamics.goodness import Fitted, adequate
-from inertial.dynamics.transfer_diagnosis import ADDED_P, CLASS_WIDTH, MOST_ADDED, EffectClass
 
 AnyFit = TypeVar("AnyFit", bound=Fitted)
+
+ADDED_P = 1e-3
+"""Largest p-value of an added effect of a model that is not adequate, times the number of candidates."""
+CLASS_WIDTH = 9.0
+"""Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
+MOST_ADDED = 3
+FEWEST_DOF = 6
+FOLDS = 5
+"""Every so many points are left out in turn."""
+
+
+@dataclass(frozen=True)
+class EffectClass:
+    """Effects that these points do not separate, the best first; ``chi_square`` and ``dof`` of the best one's fit."""
+
+    effects: tuple[str, ...]
+    p_value: float
+    chi_square: float
+    dof: int
+
+
+@dataclass(frozen=True)
+class Judged(Generic[AnyFit]):
+    """The verdict on a model of a test.
+
+    adequate : None where it cannot be judged, with ``reason``
+    fit : of the judged model; extended : with one effect of each class, the same where none is named
+    classes : effects that make the model adequate, one class after the other
+    left_out : rms weighted residual of left-out points before and after; near 1 for a right model
+    """
+
+    adequate: bool | None
+    reason: str
+    fit: AnyFit
+    extended: AnyFit
+    classes: tuple[EffectClass, ...]
+    left_out: tuple[float, float]
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the model is not adequate with the named effects either."""
+        return self.adequate is False and not adequate(self.extended)
+
+    @property
+    def recommended(self) -> tuple[str, ...]:
+        """One effect per class, the best of it."""
+        return tuple(one.effects[0] for one in self.classes)
 
 
 class Separated(Protocol):
@@ -26,50 +72,66 @@ def breakers_of(classes: Sequence[EffectClass], effects: Mapping[str, Separated]
     return tuple(dict.fromkeys(effects[name].breaker for one in open_classes for name in one.effects[:2]))
 
 
-def missing_classes(
-    base: AnyFit, effects: Sequence[str], candidates: Sequence[str], fit_of: Callable[[list[str]], AnyFit]
-) -> tuple[tuple[EffectClass, ...], AnyFit]:
-    """Classes of effects that make a model adequate, one after the other, and the fit with the best of each.
-
-    An effect is named only where the model is inadequate and the effect improves it with a p-value below 10⁻³, times the
-    number of candidates.
+def judge(
+    base: AnyFit,
+    effects: Sequence[str],
+    candidates: Sequence[str],
+    extended_fit: Callable[[list[str], AnyFit], AnyFit],
+    left_out: Callable[[AnyFit], float],
+    *,
+    remedy: str,
+    residuals: int = 0,
+) -> Judged[AnyFit]:
+    """The verdict on a model, with the classes of effects that make it adequate.
 
     Parameters
     ----------
     base : fit of the judged model with ``effects``
     candidates : ids of all effects that the data can show
-    fit_of : the fit of a model with some effects
+    extended_fit : the fit of a model with one effect more, from its effects and the fit without it
+    left_out : rms weighted residual of points that a fit of this model has not seen
+    remedy : what gives more degrees of freedom
+    residuals : number of residuals, for the price of a parameter; the degrees of freedom of the smaller model where 0
     """
-    classes: list[EffectClass] = []
-    best, current = base, list(effects)
-    while len(classes) < MOST_ADDED and not adequate(best):
-        left = [name for name in candidates if name not in current]
-        next_class = _next_class(best, current, left, fit_of)
+    classes, best, reason = list[EffectClass](), base, ""
+    good = adequate(base) if base.dof >= FEWEST_DOF else None
+    if good is None:
+        reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; {remedy}"
+    current = list(effects)
+    while good is False and len(classes) < MOST_ADDED and adequate(best) is False:
+        left = {name: extended_fit([*current, name], best) for name in candidates if name not in current}
+        next_class = _best_class(best, left, float(np.log(residuals or max(best.dof, 2))), left_out)
         if next_class is None:
             break
-        one, best = next_class
-        classes.append(one)
-        current.append(one.effects[0])
-    return tuple(classes), best
+        classes.append(next_class)
+        current.append(next_class.effects[0])
+        best = left[next_class.effects[0]]
+    before = left_out(base)
+    return Judged(good, reason, base, best, tuple(classes), (before, left_out(best) if classes else before))
 
 
-def _next_class(
-    best: AnyFit, current: list[str], candidates: list[str], fit_of: Callable[[list[str]], AnyFit]
-) -> tuple[EffectClass, AnyFit] | None:
-    fits = {name: fit_of([*current, name]) for name in candidates}
-    price = float(np.log(max(best.dof, 2)))
+def _best_class(
+    best: AnyFit, fits: Mapping[str, AnyFit], price: float, left_out: Callable[[AnyFit], float]
+) -> EffectClass | None:
+    """The effects that reduce the residual of a fit most; None where none is significant.
+
+    An effect is named only where it improves the model with a p-value below 10⁻³, times the number of candidates, and where
+    points that were left out gain by it: what only follows the fitted points, or their too small uncertainties, predicts no others.
+    """
 
     def score(fit: Fitted) -> float:
         return fit.chi_square - price * fit.dof
 
     def added_p(fit: Fitted) -> float:
         gain, parameters = max(0.0, best.chi_square - fit.chi_square), max(1, best.dof - fit.dof)
-        return float(min(1.0, len(candidates) * chi2_tail(gain, parameters)))
+        return float(min(1.0, len(fits) * chi2_tail(gain, parameters)))
 
     real = sorted((name for name in fits if added_p(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
-    if not real:
+    before = left_out(best) if real else float("nan")
+    first = next((name for name in real if not left_out(fits[name]) >= before), None)  # nan: no points can be left out
+    if first is None:
         return None
-    top = fits[real[0]]
+    top = fits[first]
     width = CLASS_WIDTH * max(1.0, top.chi_square / max(top.dof, 1))  # further missing effects blur the comparison
-    same = tuple(name for name in real if score(fits[name]) - score(top) < width)
-    return EffectClass(same, added_p(top), top.chi_square, top.dof), top
+    others = (name for name in real if name != first and abs(score(fits[name]) - score(top)) < width)
+    return EffectClass((first, *others), added_p(top), top.chi_square, top.dof)

@@ -1,7 +1,5 @@
 """Shock pulses: peak, duration, baseline and velocity change of a recorded pulse."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

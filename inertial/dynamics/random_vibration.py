@@ -1,6 +1,4 @@
-"""Random vibration: densities by breakpoints, their overall level, made signals, and the rectification coefficient."""
-
-from __future__ import annotations
+"""Random vibration: densities by breakpoints, their overall level, and the rectification coefficient."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +27,6 @@ def interpolated(at: Array, frequency: Array, density: Array) -> Array:
     inside = (at >= frequency[0]) & (at <= frequency[-1])
     safe = np.where(inside, at, frequency[0])
     return np.where(inside, np.exp(np.interp(np.log(safe), np.log(frequency), np.log(density))), 0.0)
-
-
-def made_signal(frequency: Array, density: Array, rate_hz: float, count: int, rng: np.random.Generator) -> Array:
-    """A Gaussian signal (count,) in g with the density of breakpoints, made in the frequency domain."""
-    f = np.fft.rfftfreq(count, 1.0 / rate_hz)
-    target = interpolated(np.maximum(f, 1e-12), frequency, density)
-    z = rng.standard_normal((2, f.size))
-    spectrum = np.sqrt(target * rate_hz * count / 4.0) * (z[0] + 1j * z[1])
-    return np.fft.irfft(spectrum, count)
 
 
 def rectification(level_g: Array, shift_g: Array, error_g: Array) -> tuple[float, float, float]:

@@ -1,7 +1,5 @@
 """Zero and sensitivity over the supply voltage: departures from a ratiometric output, or from one that is independent of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,78 +1,49 @@
 """Diagnosis of a shock comparison, the unit's waveform against the reference's: adequacy and missing effects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from inertial.counts import degrees_of_freedom
-from inertial.dynamics import goodness
-from inertial.dynamics.missing_effects import breakers_of, missing_classes
+from inertial.dynamics.missing_effects import FOLDS, Judged, breakers_of, judge
 from inertial.dynamics.shock_effects import EFFECTS
 from inertial.dynamics.shock_fit import ShockFit, ShockRecord, fit_shock, residual_percent
-from inertial.dynamics.transfer_diagnosis import FEWEST_DOF, EffectClass
 
 DEFAULT = ("delay",)
-FOLDS = 5
 PARTS = ("before the pulse", "the pulse", "after the pulse")
 
 
 @dataclass(frozen=True)
-class ShockDiagnosis:
-    """The verdict on a shock comparison; see :class:`inertial.dynamics.centrifuge_diagnosis.SpinDiagnosis` for the fields.
+class ShockDiagnosis(Judged[ShockFit]):
+    """The verdict on a shock comparison.
 
     where : the part of the record with the largest share of χ², and the share
     error_percent, extended_percent : rms residual, of the peak
+    next_steps : the measurements that separate the effects of the classes
     """
 
-    adequate: bool | None
-    reason: str
-    fit: ShockFit
-    extended: ShockFit
-    classes: tuple[EffectClass, ...]
-    unexplained: bool
     where: tuple[str, float]
     error_percent: float
     extended_percent: float
-    left_out: tuple[float, float]
     next_steps: tuple[str, ...]
 
 
 def diagnose_shock(record: ShockRecord, effects: Sequence[str] = DEFAULT) -> ShockDiagnosis:
     """The verdict on a comparison with ``effects``, with the classes of effects that make it adequate."""
-    base = fit_shock(record, effects)
-    if base.dof < FEWEST_DOF:
-        reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; record faster"
-        return _verdict(record, base, base, None, reason, ())
-    if goodness.adequate(base):
-        return _verdict(record, base, base, True, "", ())
-    classes, best = missing_classes(base, list(effects), list(EFFECTS), lambda names: fit_shock(record, names))
-    return _verdict(record, base, best, False, "", classes)
-
-
-def _verdict(
-    record: ShockRecord,
-    base: ShockFit,
-    best: ShockFit,
-    adequate: bool | None,  # noqa: FBT001 - a verdict, not a switch
-    reason: str,
-    classes: tuple[EffectClass, ...],
-) -> ShockDiagnosis:
-    left = _left_out(record, base.effects), (_left_out(record, best.effects) if classes else np.nan)
+    judged = judge(
+        fit_shock(record, effects),
+        effects,
+        list(EFFECTS),
+        lambda more, _: fit_shock(record, more),
+        lambda fit: _left_out(record, fit.effects),
+        remedy="record faster",
+    )
     return ShockDiagnosis(
-        adequate,
-        reason,
-        base,
-        best,
-        classes,
-        adequate is False and not goodness.adequate(best),
-        _where(record, base),
-        residual_percent(record, list(base.residuals)),
-        residual_percent(record, list(best.residuals)),
-        (left[0], left[1] if classes else left[0]),
-        breakers_of(classes, EFFECTS),
+        **vars(judged),
+        where=_where(record, judged.fit),
+        error_percent=residual_percent(record, judged.fit.residuals),
+        extended_percent=residual_percent(record, judged.extended.residuals),
+        next_steps=breakers_of(judged.classes, EFFECTS),
     )
 
 

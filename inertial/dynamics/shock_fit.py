@@ -1,7 +1,5 @@
 """Fit of a sensitivity and effects to the waveforms of shocks, the unit's against the reference's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -1,7 +1,5 @@
 """Shock response spectrum, absolute acceleration: ISO 18431-4, the ramp-invariant recursion after Smallwood."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter

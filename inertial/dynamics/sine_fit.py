@@ -4,8 +4,6 @@ ISO 16063-11 method 3, IEEE 1057: least squares on [cos ωt, sin ωt, 1]; a line
 periods errs by up to d/(πn).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,11 +99,6 @@ def harmonic_distortion(record: Array, rate_hz: float, frequency: float) -> Arra
     c, _ = _projected(np.hstack(parts), record)
     fundamental = np.hypot(c[0], c[1])
     return np.sqrt(np.sum(c[4:] ** 2, axis=0)) / np.where(fundamental > 0.0, fundamental, np.inf)
-
-
-def frequency_error_of(sigma: float, amplitude: float, span_s: float, count: int) -> float:
-    """Standard uncertainty in Hz of a fitted frequency: √6/π·(σ/A)/(T√N)."""
-    return float(np.sqrt(6.0) / np.pi * sigma / amplitude / (span_s * np.sqrt(count)))
 
 
 def _projected(design: Array, record: Array) -> tuple[Array, Array]:

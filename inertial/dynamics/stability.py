@@ -1,7 +1,5 @@
 """Bias stability by its several definitions, warm-up time, and repeatability from turn-on to turn-on."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of a recorded step response: overshoot, settling time into a band, rise time and delay, with uncertainties."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

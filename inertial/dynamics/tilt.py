@@ -1,7 +1,5 @@
 """Single-axis tilt in one plane: bias, scale, angle and, from enough poses, K2 and K3 of the axes that lie in the plane."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 
@@ -77,7 +75,7 @@ class TiltFit:
         slope = share * np.where(value < 0.0, -1.0, 1.0)
         return float(share @ sizes), float(np.sqrt(slope @ covariance @ slope))
 
-    def phase_covariance(self, other: TiltFit, angle_error: float) -> float:
+    def phase_covariance(self, other: "TiltFit", angle_error: float) -> float:
         """Covariance of the phases of two axes from the errors of the angles, which both axes have in common; rad².
 
         Parameters

@@ -1,39 +1,19 @@
 """Whether a model of a transfer function is good enough, where it fails, which effects are missing, what to measure next."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inertial.counts import degrees_of_freedom
-from inertial.distributions import chi2_tail
-from inertial.dynamics import goodness
+from inertial.dynamics.missing_effects import CLASS_WIDTH, FOLDS, EffectClass, Judged, judge
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import IDENTIFIED_SHARE, Points, TransferFit, best_of_exchange, fit_transfer
 
 Array = NDArray[np.float64]
-ADDED_P = 1e-3
-"""Largest p-value of an added effect of a model that is not adequate, times the number of candidates."""
-CLASS_WIDTH = 9.0
-"""Effects whose fits differ by less than this in χ² (with a parameter's price) are not separated: three standard deviations."""
+
 SEPARATED = 10.0
 """Uncertainties of a point by which rival models must differ at a frequency that is proposed: several of their errors as well."""
-MOST_ADDED = 3
-FOLDS = 5
-FEWEST_DOF = 6
-
-
-@dataclass(frozen=True)
-class EffectClass:
-    """Effects that these points do not separate, the best first; ``chi_square`` and ``dof`` of the best one's fit."""
-
-    effects: tuple[str, ...]
-    p_value: float
-    chi_square: float
-    dof: int
 
 
 @dataclass(frozen=True)
@@ -63,36 +43,22 @@ class StatedParameter:
 
 
 @dataclass(frozen=True)
-class TransferDiagnosis:
+class TransferDiagnosis(Judged[TransferFit]):
     """The verdict on a model of a transfer function.
 
-    adequate : None where it cannot be judged, with ``reason``
-    fit : of the judged model; extended : with the recommended effects; the same where none is
+    where : parts of the frequency range with more than their share of χ²; empty for an adequate model
+    error_percent, extended_percent : rms of the relative complex residual
     rivals : models that describe the points as well as ``extended``: another effect of a class, a filter that every device has,
         sprung mass and low-pass exchanged
-    error_percent, extended_percent : rms of the relative complex residual
-    left_out : rms weighted residual of left-out points before and after; near 1 for a right model
-    next_hz : frequencies to measure next; highest_hz : of the points
+    next_hz : the frequencies to measure next; highest_hz : of the points
     """
 
-    adequate: bool | None
-    reason: str
-    fit: TransferFit
-    extended: TransferFit
-    rivals: tuple[TransferFit, ...]
     where: tuple[Failure, ...]
-    classes: tuple[EffectClass, ...]
-    unexplained: bool
     error_percent: float
     extended_percent: float
-    left_out: tuple[float, float]
+    rivals: tuple[TransferFit, ...]
     next_hz: tuple[float, ...]
     highest_hz: float
-
-    @property
-    def recommended(self) -> tuple[str, ...]:
-        """One effect per class, the best of it."""
-        return tuple(one.effects[0] for one in self.classes)
 
     def parameter(self, name: str) -> StatedParameter:
         """A parameter of the extended model, as far as every model that the points do not exclude agrees."""
@@ -127,56 +93,35 @@ def diagnose_transfer(
     effects : of the model to judge
     highest_hz : to which the exciter reaches, for the next frequencies; the points' highest where None
     """
+
+    def extended_fit(names: list[str], best: TransferFit) -> TransferFit:
+        known = {p.name: float(v) for p, v in zip(best.parameters, best.values, strict=True)}
+        fit = fit_transfer(points, names, known)
+        # mass and low-pass exchanged are another minimum, which breeds further effects
+        return best_of_exchange(points, fit)[0] if names[-1] in {"two_pole", "second_order"} else fit
+
     base = fit_transfer(points, effects)
-    if base.dof < FEWEST_DOF:
-        reason = f"{degrees_of_freedom(base.dof)}, at least {FEWEST_DOF} are needed; sweep more frequencies"
-        return _verdict(points, base, base, None, reason, (), unexplained=False, highest=highest_hz)
-    if goodness.adequate(base):
-        return _verdict(points, base, base, True, "", (), unexplained=False, highest=highest_hz)
-    classes: list[EffectClass] = []
-    best, current = base, list(effects)
-    while len(classes) < MOST_ADDED and goodness.adequate(best) is False:
-        next_class = _next_class(points, best, current)
-        if next_class is None:
-            break
-        one, best = next_class
-        classes.append(one)
-        current.append(one.effects[0])
-    unexplained = goodness.adequate(best) is False
-    return _verdict(points, base, best, False, "", tuple(classes), unexplained=unexplained, highest=highest_hz)
-
-
-def _next_class(points: Points, best: TransferFit, current: Sequence[str]) -> tuple[EffectClass, TransferFit] | None:
-    """The effects that reduce the residual most, and the fit with the best of them; None where none is significant."""
-    candidates = [name for name, one in EFFECTS.items() if name not in current and one.seen(points.conditions)]
-    known = {p.name: float(v) for p, v in zip(best.parameters, best.values, strict=True)}
-    fits: dict[str, TransferFit] = {}
-    for name in candidates:
-        fits[name] = fit_transfer(points, [*current, name], known)
-        if name in {
-            "two_pole",
-            "second_order",
-        }:  # mass and low-pass exchanged are another minimum, which breeds further effects
-            fits[name] = best_of_exchange(points, fits[name])[0]
-    price = np.log(len(best.residual))
-
-    def score(fit: TransferFit) -> float:
-        return fit.chi_square + price * len(fit.parameters)
-
-    def p_value(fit: TransferFit) -> float:
-        gain = max(0.0, best.chi_square - fit.chi_square)
-        return float(min(1.0, len(candidates) * chi2_tail(gain, len(fit.parameters) - len(best.parameters))))
-
-    real = sorted((name for name in fits if p_value(fits[name]) < ADDED_P), key=lambda name: score(fits[name]))
-    # what only follows the noise of the fitted points, or their too small uncertainties, predicts no others
-    before = _left_out(points, current)
-    first = next((name for name in real if not _left_out(points, [*current, name]) >= before), None)
-    if first is None:
-        return None
-    top = fits[first]
-    scale = max(1.0, top.chi_square / max(top.dof, 1))  # what another effect still leaves blurs the comparison
-    same = (first, *(n for n in real if n != first and abs(score(fits[n]) - score(top)) < CLASS_WIDTH * scale))
-    return EffectClass(same, p_value(top), top.chi_square, top.dof), top
+    judged = judge(
+        base,
+        effects,
+        [name for name, one in EFFECTS.items() if one.seen(points.conditions)],
+        extended_fit,
+        lambda fit: _left_out(points, fit.effects),
+        remedy="sweep more frequencies",
+        residuals=len(base.residual),
+    )
+    top = float(points.conditions.frequency.max())
+    open_end = judged.adequate is None or judged.unexplained
+    rivals = () if open_end else _rivals(points, judged.extended, judged.classes)
+    return TransferDiagnosis(
+        **vars(judged),
+        where=_where(points, base) if judged.adequate is False else (),
+        error_percent=_error(points, base),
+        extended_percent=_error(points, judged.extended),
+        rivals=rivals,
+        next_hz=_next_frequencies(points, judged.extended, rivals, highest_hz or top),
+        highest_hz=top,
+    )
 
 
 def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass]) -> tuple[TransferFit, ...]:
@@ -207,36 +152,6 @@ def _rivals(points: Points, extended: TransferFit, classes: Sequence[EffectClass
             fits.append(other)
     price = CLASS_WIDTH * max(1.0, extended.chi_square / max(extended.dof, 1))
     return tuple(fit for fit in fits if fit.chi_square < extended.chi_square + price)
-
-
-def _verdict(
-    points: Points,
-    base: TransferFit,
-    extended: TransferFit,
-    adequate: bool | None,  # noqa: FBT001 - a verdict, not a switch
-    reason: str,
-    classes: tuple[EffectClass, ...],
-    *,
-    unexplained: bool,
-    highest: float | None,
-) -> TransferDiagnosis:
-    left = (_left_out(points, base.effects), _left_out(points, extended.effects) if classes else np.nan)
-    rivals = () if adequate is None or unexplained else _rivals(points, extended, classes)
-    return TransferDiagnosis(
-        adequate,
-        reason,
-        base,
-        extended,
-        rivals,
-        _where(points, base) if adequate is False else (),
-        classes,
-        unexplained,
-        _error(points, base),
-        _error(points, extended),
-        (left[0], left[1] if classes else left[0]),
-        _next_frequencies(points, extended, rivals, highest or float(points.conditions.frequency.max())),
-        float(points.conditions.frequency.max()),
-    )
 
 
 def _error(points: Points, fit: TransferFit) -> float:

@@ -1,7 +1,5 @@
 """Fit of a transfer function: sensitivity times effects, each point weighted by its own uncertainty in magnitude and phase."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -42,7 +40,7 @@ class Points:
     magnitude_error: Array
     phase_error: Array
 
-    def picked(self, rows: NDArray[np.bool_]) -> Points:
+    def picked(self, rows: NDArray[np.bool_]) -> "Points":
         """Some of the points."""
         return Points(
             self.conditions.picked(rows), self.value[rows], self.magnitude_error[rows], self.phase_error[rows]

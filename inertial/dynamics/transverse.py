@@ -1,7 +1,5 @@
 """Transverse sensitivity: the output of an axis under motion across it, over the angle of the unit (ISO 16063-31)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Variance of 1/f wander in a short series of means, beside known noise and fitted terms, and how well it is known."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -163,7 +161,7 @@ class Remainders:
     shares: list[tuple[Array, Array]]
 
     @classmethod
-    def of(cls, rows: Array, flicker: Array, walk: Array) -> Remainders:
+    def of(cls, rows: Array, flicker: Array, walk: Array) -> "Remainders":
         """Of terms (n, terms), and kernels (n, n)."""
         free = null_space(rows.T)
         kernels = [free.T @ kernel @ free for kernel in (flicker, walk)]

@@ -1,7 +1,5 @@
 """Adjacent means of white noise, 1/f noise and random walk: covariances, and degrees of freedom of their variances."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

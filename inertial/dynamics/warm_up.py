@@ -1,7 +1,5 @@
 """Warm-up time with its uncertainty in white and 1/f noise: where a curve through the noise enters the band for good."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Integral nonlinearity of a converter built of equal segments: periodic in the input."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +12,7 @@ class AdcNonlinearity(SensorEffect):
     id: ClassVar[str] = "adc_nonlinearity"
     symbol: ClassVar[str] = "INL"
     equation: ClassVar[str] = "a·sin(2π·fi/p) + b·cos(2π·fi/p)"
+    coefficients: ClassVar[tuple[str, ...]] = ("INL_sin", "INL_cos")
     source: ClassVar[str] = "IEEE Std 1241, integral nonlinearity"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 1000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order", "fifth_order")
@@ -27,6 +26,3 @@ class AdcNonlinearity(SensorEffect):
         half = np.tan(np.pi * state.converted(axis) / period)
         square = half * half
         return stack(state, [2.0 * half / (1.0 + square), (1.0 - square) / (1.0 + square)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return "INL_sin", "INL_cos"

@@ -1,5 +1,3 @@
-"""Bias that drifts at a constant rate."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class AgingLinear(SensorEffect):
     id: ClassVar[str] = "aging_linear"
     symbol: ClassVar[str] = "kt"
     equation: ClassVar[str] = "kt·t"
+    coefficients: ClassVar[tuple[str, ...]] = ("kt",)
     source: ClassVar[str] = "mechanism: relaxation of stress; drift term of IEEE Std 1293-1998"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
     per: ClassVar[tuple[str, ...]] = ("h",)
@@ -23,6 +22,3 @@ class AgingLinear(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         hours = state.time / 3600.0
         return stack(state, [hours])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kt",)

@@ -1,5 +1,3 @@
-"""Bias that drifts with the logarithm of the time since power-on."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +18,7 @@ class AgingLog(SensorEffect):
     id: ClassVar[str] = "aging_log"
     symbol: ClassVar[str] = "kl"
     equation: ClassVar[str] = "kl·ln(1 + u/τ)"
+    coefficients: ClassVar[tuple[str, ...]] = ("kl",)
     source: ClassVar[str] = "mechanism: thermally activated relaxation with a spread of barriers"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("warm_up", "aging_linear")
@@ -39,6 +38,3 @@ class AgingLog(SensorEffect):
         if clock == BEGINS_AGAIN and state.since_power is not None:
             since = state.since_power
         return stack(state, [np.log1p(since / tau)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kl",)

@@ -1,5 +1,3 @@
-"""Inner axis not square to the outer: a small rotation about y between the two."""
-
 from typing import ClassVar
 
 import numpy as np

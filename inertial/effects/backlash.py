@@ -1,5 +1,4 @@
-"""Lost motion of the drives: the table stops short on the side it comes from."""
-
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -8,6 +7,9 @@ from inertial import frames, operators
 from inertial.effects.base import Array, StationEffect
 from inertial.state import State
 
+_PLAY_RAD = 1e-4
+"""Moves larger than this take up the whole play."""
+
 
 class Backlash(StationEffect):
     """Lost motion of the drives: the table stops short on the side it comes from."""
@@ -15,6 +17,7 @@ class Backlash(StationEffect):
     id: ClassVar[str] = "backlash"
     symbol: ClassVar[str] = "ε"
     equation: ClassVar[str] = "α + ε·sgn(Δα), β + ε·sgn(Δβ)"
+    coefficients: ClassVar[tuple[str, ...]] = ("backlash_outer", "backlash_inner")
     source: ClassVar[str] = "geometry of a two-axis table"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("pose_hysteresis",)
@@ -22,29 +25,16 @@ class Backlash(StationEffect):
     simplicity: ClassVar[int] = 43
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
-        outer, inner = state.need("outer", self.id), state.need("inner", self.id)
-        force = frames.force_from_angles(outer, inner)
-        about_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
-        about_inner = np.stack([force[..., 1], -force[..., 0], np.zeros_like(inner)], axis=-1)
-        sides = [_side(outer)[..., None] * about_outer, _side(inner)[..., None] * about_inner]
-        return np.stack(sides, axis=-1)
+        return self._turned(state, operators.play)  # the drive rests on a side of the play while the axis does not move
 
     def start_change(self, state: State, **nonlinear: float) -> Array:
+        return self._turned(state, operators.play_memory)
+
+    def _turned(self, state: State, operator: Callable[[Array, float], Array]) -> Array:
+        """Change of force (..., n, 3, 2) by each axis where its angle is off by an operator of it."""
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         force = frames.force_from_angles(outer, inner)
         about_outer = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
         about_inner = np.stack([force[..., 1], -force[..., 0], np.zeros_like(inner)], axis=-1)
-        memory = [operators.play_memory(angle, _PLAY_RAD)[..., None] for angle in (outer, inner)]
-        return np.stack([memory[0] * about_outer, memory[1] * about_inner], axis=-1)
-
-    def names(self) -> tuple[str, ...]:
-        return "backlash_outer", "backlash_inner"
-
-
-_PLAY_RAD = 1e-4
-"""Moves larger than this take up the whole play."""
-
-
-def _side(angle: Array) -> Array:
-    """Side of the play on which the drive rests, −1 … 1, kept while the axis does not move."""
-    return operators.play(angle, _PLAY_RAD)
+        sides = [operator(angle, _PLAY_RAD)[..., None] for angle in (outer, inner)]
+        return np.stack([sides[0] * about_outer, sides[1] * about_inner], axis=-1)

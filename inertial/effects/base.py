@@ -70,6 +70,7 @@ class Effect(ABC):
     id : public name in model files, on the command line and in JSON
     symbol : as in IEEE Std 1293 where it has one
     equation : the term for output axis i, for people
+    coefficients : names of the coefficients of every axis, or of the station's parameters; empty where ``names`` makes them
     scope : "sensor" (coefficients per unit and axis), "station" (shared by all units of a run), "slot"
     source : where the term comes from
     typical_ug : range of plausible sizes at 1 g or over the usual range of its driver, µg
@@ -89,6 +90,7 @@ class Effect(ABC):
     id: ClassVar[str]
     symbol: ClassVar[str]
     equation: ClassVar[str]
+    coefficients: ClassVar[tuple[str, ...]] = ()
     scope: ClassVar[Scope] = "sensor"
     source: ClassVar[str]
     typical_ug: ClassVar[tuple[float, float]]
@@ -140,9 +142,9 @@ class SensorEffect(Effect):
             A quantity the effect depends on is not recorded.
         """
 
-    @abstractmethod
     def names(self, axis: int) -> tuple[str, ...]:
         """Names of the p coefficients of one axis."""
+        return self.coefficients
 
     def names_at(self, axis: int, **nonlinear: float) -> tuple[str, ...]:
         """Names of the coefficients of one axis where constants of the run decide how many there are."""
@@ -162,9 +164,9 @@ class StationEffect(Effect):
     def force_change(self, state: State, **nonlinear: float) -> Array:
         """True minus commanded specific force, (..., n, 3, q), g per unit of each of the q parameters."""
 
-    @abstractmethod
     def names(self) -> tuple[str, ...]:
         """Names of the q parameters."""
+        return self.coefficients
 
     def start_change(self, state: State, **nonlinear: float) -> Array:
         """What the state of a memory before the first dwell would add to the force: (..., n, 3, k); k = 0 without memory."""

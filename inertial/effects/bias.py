@@ -1,5 +1,3 @@
-"""Zero-g output of the sensor."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +12,7 @@ class Bias(SensorEffect):
     id: ClassVar[str] = "bias"
     symbol: ClassVar[str] = "K0"
     equation: ClassVar[str] = "K0"
+    coefficients: ClassVar[tuple[str, ...]] = ("K0",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (50.0, 150000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("level_error",)
@@ -23,6 +22,3 @@ class Bias(SensorEffect):
 
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         return stack(state, [np.ones_like(state.time)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K0",)

@@ -1,5 +1,3 @@
-"""Bias that differs for positive and negative specific force."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +12,7 @@ class BiasAsymmetry(SensorEffect):
     id: ClassVar[str] = "bias_asymmetry"
     symbol: ClassVar[str] = "K0′"
     equation: ClassVar[str] = "½K0′·sgn(fi), smoothed over w"
+    coefficients: ClassVar[tuple[str, ...]] = ("K0'",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("odd_quadratic", "third_order", "dead_zone")
@@ -24,6 +23,3 @@ class BiasAsymmetry(SensorEffect):
 
     def columns(self, state: State, axis: int, *, transition: float, **nonlinear: float) -> Array:
         return stack(state, [np.tanh(state.along(axis) / transition)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K0'",)

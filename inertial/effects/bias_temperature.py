@@ -1,5 +1,3 @@
-"""Bias that follows the sensor's temperature."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class BiasTemperature(SensorEffect):
     id: ClassVar[str] = "bias_temperature"
     symbol: ClassVar[str] = "kT"
     equation: ClassVar[str] = "kT·θ"
+    coefficients: ClassVar[tuple[str, ...]] = ("kT",)
     source: ClassVar[str] = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug: ClassVar[tuple[float, float]] = (0.5, 2500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "supply_sensitivity", "thermal_lag")
@@ -22,6 +21,3 @@ class BiasTemperature(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
         return stack(state, [theta])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kT",)

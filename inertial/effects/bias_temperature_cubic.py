@@ -1,5 +1,3 @@
-"""Third order of the bias over temperature."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class BiasTemperatureCubic(SensorEffect):
     id: ClassVar[str] = "bias_temperature_cubic"
     symbol: ClassVar[str] = "kT3"
     equation: ClassVar[str] = "kT3·θ³"
+    coefficients: ClassVar[tuple[str, ...]] = ("kT3",)
     source: ClassVar[str] = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_kink",)
@@ -23,6 +22,3 @@ class BiasTemperatureCubic(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
         return stack(state, [theta**3])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kT3",)

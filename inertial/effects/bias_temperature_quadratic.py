@@ -1,5 +1,3 @@
-"""Curvature of the bias over temperature."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class BiasTemperatureQuadratic(SensorEffect):
     id: ClassVar[str] = "bias_temperature_quadratic"
     symbol: ClassVar[str] = "kT2"
     equation: ClassVar[str] = "kT2·θ²"
+    coefficients: ClassVar[tuple[str, ...]] = ("kT2",)
     source: ClassVar[str] = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("thermal_hysteresis", "thermal_kink")
@@ -23,6 +22,3 @@ class BiasTemperatureQuadratic(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
         return stack(state, [theta**2])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kT2",)

@@ -1,5 +1,3 @@
-"""Output that stops at full scale."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +12,7 @@ class Clipping(SensorEffect):
     id: ClassVar[str] = "clipping"
     symbol: ClassVar[str] = "FS"
     equation: ClassVar[str] = "min(max(fi, −FS), FS) − fi"
+    coefficients: ClassVar[tuple[str, ...]] = ("FS",)
     source: ClassVar[str] = "transfer curve of a limiter"
     typical_ug: ClassVar[tuple[float, float]] = (100.0, 500000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order",)
@@ -31,6 +30,3 @@ class Clipping(SensorEffect):
     ) -> Array:
         f = state.converted(axis, place)
         return stack(state, [np.clip(f, -full_scale, full_scale) - f])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("FS",)

@@ -1,5 +1,3 @@
-"""Output that creeps to its new value after a change of specific force."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -25,6 +23,7 @@ class CreepAfterMove(SensorEffect):
     id: ClassVar[str] = "creep_after_move"
     symbol: ClassVar[str] = "kC"
     equation: ClassVar[str] = "kC·ΣΔfi·exp(−s/τ), over all moves so far, and the way of the table if way = 1"
+    coefficients: ClassVar[tuple[str, ...]] = ("kC",)
     source: ClassVar[str] = "mechanism: viscoelastic hinge or adhesive (one Maxwell element)"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
     per: ClassVar[tuple[str, ...]] = ("g",)
@@ -52,9 +51,6 @@ class CreepAfterMove(SensorEffect):
 
     def start_columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
         return stack(state, [np.exp(-(state.time - state.time[..., :1]) / tau)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kC",)
 
 
 def _on_arrival(state: State, axis: int, tau: float, since: Array) -> Array:

@@ -1,5 +1,3 @@
-"""Quadratic response to specific force across the axis."""
-
 from typing import ClassVar
 
 from inertial.effects.base import AXES, Array, SensorEffect, others, stack

@@ -1,5 +1,3 @@
-"""Product of the specific force along the axis with that across it: a pendulum that tips."""
-
 from typing import ClassVar
 
 from inertial.effects.base import AXES, Array, SensorEffect, others, stack

@@ -1,5 +1,3 @@
-"""Output that stays at zero until the specific force leaves a zone about null."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +12,7 @@ class DeadZone(SensorEffect):
     id: ClassVar[str] = "dead_zone"
     symbol: ClassVar[str] = "DZ"
     equation: ClassVar[str] = "−clip(fi, −w, w)"
+    coefficients: ClassVar[tuple[str, ...]] = ("DZ",)
     source: ClassVar[str] = "mechanism: stiction or a threshold of the converter; IEEE Std 1293-1998, threshold"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("bias_asymmetry", "odd_quadratic")
@@ -28,6 +27,3 @@ class DeadZone(SensorEffect):
 
     def columns(self, state: State, axis: int, *, width: float, place: float = CONVERTER, **nonlinear: float) -> Array:
         return stack(state, [-np.clip(state.converted(axis, place), -width, width)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("DZ",)

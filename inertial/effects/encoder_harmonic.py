@@ -1,5 +1,3 @@
-"""Encoder error that repeats once or twice a turn: eccentric disc, sagging load."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +13,7 @@ class EncoderHarmonic(StationEffect):
     id: ClassVar[str] = "encoder_harmonic"
     symbol: ClassVar[str] = "ε, φ"
     equation: ClassVar[str] = "α + ε·sin(nα + φ), likewise β"
+    coefficients: ClassVar[tuple[str, ...]] = ("harmonic_sin", "harmonic_cos")
     source: ClassVar[str] = "geometry of a two-axis table"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 2000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "cross_coupling")
@@ -35,6 +34,3 @@ class EncoderHarmonic(StationEffect):
             turned, angle = frames.to_fixture((0.0, 1.0, 0.0), outer, inner), outer
         phase = harmonic * angle[..., None]
         return np.stack([turned * np.sin(phase), turned * np.cos(phase)], axis=-1)
-
-    def names(self) -> tuple[str, ...]:
-        return "harmonic_sin", "harmonic_cos"

@@ -1,5 +1,3 @@
-"""Fifth power of the specific force."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class FifthOrder(SensorEffect):
     id: ClassVar[str] = "fifth_order"
     symbol: ClassVar[str] = "K5"
     equation: ClassVar[str] = "K5·fi⁵"
+    coefficients: ClassVar[tuple[str, ...]] = ("K5",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order", "odd_quadratic")
@@ -22,6 +21,3 @@ class FifthOrder(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f = state.along(axis)
         return stack(state, [f**5])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K5",)

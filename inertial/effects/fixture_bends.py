@@ -1,5 +1,3 @@
-"""Fixture that turns all units as it follows the temperature."""
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Fourth power of the specific force."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class FourthOrder(SensorEffect):
     id: ClassVar[str] = "fourth_order"
     symbol: ClassVar[str] = "K4"
     equation: ClassVar[str] = "K4·fi⁴"
+    coefficients: ClassVar[tuple[str, ...]] = ("K4",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "scale_asymmetry")
@@ -22,6 +21,3 @@ class FourthOrder(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f = state.along(axis)
         return stack(state, [f**4])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K4",)

@@ -1,5 +1,3 @@
-"""Local gravity other than the recipe says."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, StationEffect
@@ -12,6 +10,7 @@ class GravityValue(StationEffect):
     id: ClassVar[str] = "gravity_value"
     symbol: ClassVar[str] = "ε"
     equation: ClassVar[str] = "f·(1 + ε)"
+    coefficients: ClassVar[tuple[str, ...]] = ("gravity",)
     source: ClassVar[str] = "pole to equator 5300 ppm; identical with the scale factor"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 5300.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("scale",)
@@ -20,6 +19,3 @@ class GravityValue(StationEffect):
 
     def force_change(self, state: State, **nonlinear: float) -> Array:
         return state.force[..., None]
-
-    def names(self) -> tuple[str, ...]:
-        return ("gravity",)

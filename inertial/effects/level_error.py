@@ -1,5 +1,3 @@
-"""Outer axis or laboratory vertical out of level: up = (δ1, δ2, 1)."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +13,7 @@ class LevelError(StationEffect):
     id: ClassVar[str] = "level_error"
     symbol: ClassVar[str] = "δ1, δ2"
     equation: ClassVar[str] = "f = R(α, β)ᵀ·(δ1, δ2, 1)"
+    coefficients: ClassVar[tuple[str, ...]] = ("level_1", "level_2")
     source: ClassVar[str] = "geometry of a two-axis table, or of a plate and the heading of each placement"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("outer_encoder_offset", "magnetic")
@@ -29,6 +28,3 @@ class LevelError(StationEffect):
             return np.stack(frames.horizontal(state.force, state.heading), axis=-1)
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         return np.stack([frames.to_fixture(v, outer, inner) for v in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))], axis=-1)
-
-    def names(self) -> tuple[str, ...]:
-        return "level_1", "level_2"

@@ -1,5 +1,3 @@
-"""Response to the laboratory's horizontal magnetic field, seen as it turns in the fixture's frame."""
-
 from typing import ClassVar
 
 import numpy as np

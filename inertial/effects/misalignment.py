@@ -1,5 +1,3 @@
-"""Response to specific force across the sensor's axis: axes that are not square, and the mounting's rotation."""
-
 from typing import ClassVar
 
 from inertial.effects.base import AXES, Array, SensorEffect, others, stack

@@ -1,5 +1,3 @@
-"""Axes that tilt with temperature."""
-
 from typing import ClassVar
 
 from inertial.effects.base import AXES, Array, SensorEffect, others, stack

@@ -1,5 +1,3 @@
-"""Quadratic term that keeps the sign of the specific force."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +12,7 @@ class OddQuadratic(SensorEffect):
     id: ClassVar[str] = "odd_quadratic"
     symbol: ClassVar[str] = "Koq"
     equation: ClassVar[str] = "Koq·fi·|fi|"
+    coefficients: ClassVar[tuple[str, ...]] = ("Koq",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("third_order", "fifth_order", "bias_asymmetry")
@@ -24,6 +23,3 @@ class OddQuadratic(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f = state.along(axis)
         return stack(state, [f * np.abs(f)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("Koq",)

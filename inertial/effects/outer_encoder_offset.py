@@ -1,5 +1,3 @@
-"""Zero of the outer encoder."""
-
 from typing import ClassVar
 
 from inertial import frames
@@ -13,6 +11,7 @@ class OuterEncoderOffset(StationEffect):
     id: ClassVar[str] = "outer_encoder_offset"
     symbol: ClassVar[str] = "ε"
     equation: ClassVar[str] = "α + ε"
+    coefficients: ClassVar[tuple[str, ...]] = ("outer_offset",)
     source: ClassVar[str] = "geometry of a two-axis table"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 5000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("level_error",)
@@ -23,6 +22,3 @@ class OuterEncoderOffset(StationEffect):
         outer, inner = state.need("outer", self.id), state.need("inner", self.id)
         turned = frames.to_fixture((0.0, 1.0, 0.0), outer, inner)
         return turned[..., None]
-
-    def names(self) -> tuple[str, ...]:
-        return ("outer_offset",)

@@ -39,9 +39,11 @@ def checked_classes(module: ModuleType, source: Path) -> None:
         missing = [name for name in NEEDED if not hasattr(item, name)]
         if missing:
             raise BrokenEffect(f"{where}: no {' and no '.join(missing)}, an effect needs it; add it to the class")
-        abstract = sorted(getattr(item, "__abstractmethods__", ()))
-        if abstract:
-            raise BrokenEffect(f"{where}: no method {' and no method '.join(abstract)}, it is needed; define it")
+        methods: list[str] = sorted(getattr(item, "__abstractmethods__", ()))
+        if not item.coefficients and item.names in {SensorEffect.names, StationEffect.names}:
+            methods.append("names")
+        if methods:
+            raise BrokenEffect(f"{where}: no method {' and no method '.join(methods)}, it is needed; define it")
         for name in METHODS:
             if name in vars(item):
                 setattr(item, name, _guarded(vars(item)[name], where, source))

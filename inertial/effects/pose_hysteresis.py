@@ -1,5 +1,3 @@
-"""Output that remembers from which side a specific force was reached."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +15,7 @@ class PoseHysteresis(SensorEffect):
     equation: ClassVar[str] = (
         "kP·h(fi), h the play operator of half width w; or kP·tanh(Δfi/w), where each move wipes the last"
     )
+    coefficients: ClassVar[tuple[str, ...]] = ("kP",)
     source: ClassVar[str] = (
         "Visintin, Differential Models of Hysteresis; mechanism: friction or charging of the pickoff"
     )
@@ -40,6 +39,3 @@ class PoseHysteresis(SensorEffect):
         first = np.zeros(state.time.shape)
         first[..., 0] = 1.0
         return stack(state, [operators.play_memory(state.force[..., axis], half_width) if kept else first])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kP",)

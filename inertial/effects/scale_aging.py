@@ -1,5 +1,3 @@
-"""Scale factor that drifts at a constant rate."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class ScaleAging(SensorEffect):
     id: ClassVar[str] = "scale_aging"
     symbol: ClassVar[str] = "K1t"
     equation: ClassVar[str] = "K1t·t·(fi + δj·fj + δk·fk)"
+    coefficients: ClassVar[tuple[str, ...]] = ("K1t",)
     source: ClassVar[str] = "mechanism: ageing of the reference or the magnet"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
     per: ClassVar[tuple[str, ...]] = ("g·h",)
@@ -23,6 +22,3 @@ class ScaleAging(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         hours = state.time / 3600.0
         return stack(state, [hours * state.along(axis)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K1t",)

@@ -1,5 +1,3 @@
-"""Scale factor that differs for positive and negative specific force."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +12,7 @@ class ScaleAsymmetry(SensorEffect):
     id: ClassVar[str] = "scale_asymmetry"
     symbol: ClassVar[str] = "K1′"
     equation: ClassVar[str] = "½K1′·|fi|"
+    coefficients: ClassVar[tuple[str, ...]] = ("K1'",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("second_order", "fourth_order")
@@ -24,6 +23,3 @@ class ScaleAsymmetry(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f = state.along(axis)
         return stack(state, [np.abs(f)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K1'",)

@@ -1,5 +1,3 @@
-"""Scale factor that follows the sensor's temperature, along the sensor's own axis: S(θ)·M."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class ScaleTemperature(SensorEffect):
     id: ClassVar[str] = "scale_temperature"
     symbol: ClassVar[str] = "αT"
     equation: ClassVar[str] = "αT·θ·(fi + δj·fj + δk·fk)"
+    coefficients: ClassVar[tuple[str, ...]] = ("aT",)
     source: ClassVar[str] = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug: ClassVar[tuple[float, float]] = (50.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("gravity_value",)
@@ -22,6 +21,3 @@ class ScaleTemperature(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
         return stack(state, [theta * state.along(axis)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("aT",)

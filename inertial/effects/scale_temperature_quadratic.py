@@ -1,5 +1,3 @@
-"""Curvature of the scale factor over temperature, along the sensor's own axis: S(θ)·M."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class ScaleTemperatureQuadratic(SensorEffect):
     id: ClassVar[str] = "scale_temperature_quadratic"
     symbol: ClassVar[str] = "αT2"
     equation: ClassVar[str] = "αT2·θ²·(fi + δj·fj + δk·fk)"
+    coefficients: ClassVar[tuple[str, ...]] = ("aT2",)
     source: ClassVar[str] = "temperature model b(T) = b0 + kT·θ + kT2·θ², S(T) = S0·(1 + αT·θ)"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 3000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ()
@@ -23,6 +22,3 @@ class ScaleTemperatureQuadratic(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         theta = state.need("theta", self.id)
         return stack(state, [theta**2 * state.along(axis)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("aT2",)

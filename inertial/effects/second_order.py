@@ -1,5 +1,3 @@
-"""Output proportional to the square of the specific force: rectifies vibration."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class SecondOrder(SensorEffect):
     id: ClassVar[str] = "second_order"
     symbol: ClassVar[str] = "K2"
     equation: ClassVar[str] = "K2·fi²"
+    coefficients: ClassVar[tuple[str, ...]] = ("K2",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (5.0, 1000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("scale_asymmetry", "fourth_order", "cross_axis_quadratic")
@@ -22,6 +21,3 @@ class SecondOrder(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f = state.along(axis)
         return stack(state, [f**2])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K2",)

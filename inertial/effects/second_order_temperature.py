@@ -1,5 +1,3 @@
-"""Quadratic term that follows temperature."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class SecondOrderTemperature(SensorEffect):
     id: ClassVar[str] = "second_order_temperature"
     symbol: ClassVar[str] = "K2T"
     equation: ClassVar[str] = "θ·K2T·fi²"
+    coefficients: ClassVar[tuple[str, ...]] = ("K2T",)
     source: ClassVar[str] = "mechanism: stiffness of the suspension over temperature"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 500.0)
     hides_behind: ClassVar[tuple[str, ...]] = ()
@@ -23,6 +22,3 @@ class SecondOrderTemperature(SensorEffect):
         theta = state.need("theta", self.id)
         f = state.along(axis)
         return stack(state, [theta * f**2])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K2T",)

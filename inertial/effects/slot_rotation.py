@@ -1,5 +1,3 @@
-"""Rotation of a slot of the fixture, the same in every run."""
-
 from typing import ClassVar
 
 from inertial.effects.base import AXES, Array, Scope, SensorEffect, others, stack

@@ -1,5 +1,3 @@
-"""Bias that jumps once."""
-
 from dataclasses import replace
 from typing import ClassVar
 
@@ -18,6 +16,7 @@ class StepChange(SensorEffect):
     id: ClassVar[str] = "step_change"
     symbol: ClassVar[str] = "kS"
     equation: ClassVar[str] = "kS·H(t − t0)"
+    coefficients: ClassVar[tuple[str, ...]] = ("kS",)
     source: ClassVar[str] = "mechanism: stiction released, a shock, a charge trapped"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear",)
@@ -28,9 +27,6 @@ class StepChange(SensorEffect):
 
     def columns(self, state: State, axis: int, *, instant: float, **nonlinear: float) -> Array:
         return stack(state, [(state.time > instant).astype(float)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kS",)
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:
         """Instants between the dwells of the run, with dwells on both sides."""

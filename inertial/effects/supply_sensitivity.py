@@ -1,5 +1,3 @@
-"""Bias and scale factor that follow the supply voltage."""
-
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -15,6 +13,7 @@ class SupplySensitivity(SensorEffect):
     id: ClassVar[str] = "supply_sensitivity"
     symbol: ClassVar[str] = "kV"
     equation: ClassVar[str] = "kV·ΔV + K1V·ΔV·(fi + δj·fj + δk·fk)"
+    coefficients: ClassVar[tuple[str, ...]] = ("kV", "K1V")
     source: ClassVar[str] = "mechanism: ratiometric output; power-supply rejection"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 5000.0)
     per: ClassVar[tuple[str, ...]] = ("V", "g·V")
@@ -27,9 +26,6 @@ class SupplySensitivity(SensorEffect):
     def columns(self, state: State, axis: int, *, nominal: float, **nonlinear: float) -> Array:
         change = state.need("supply", self.id) - nominal
         return stack(state, [change, change * state.along(axis)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return "kV", "K1V"
 
     def constants(self, state: State) -> Mapping[str, float]:
         """The mean supply of the run, V: changes count from there."""

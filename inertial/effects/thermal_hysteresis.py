@@ -1,5 +1,3 @@
-"""Bias that remembers from which side a temperature was reached."""
-
 from typing import ClassVar
 
 from inertial import operators
@@ -16,6 +14,7 @@ class ThermalHysteresis(SensorEffect):
     id: ClassVar[str] = "thermal_hysteresis"
     symbol: ClassVar[str] = "kH"
     equation: ClassVar[str] = "kH·h(T; w) + kH2·h(T; 0.35·w), h the play operator of half width w"
+    coefficients: ClassVar[tuple[str, ...]] = ("kH", "kH2")
     source: ClassVar[str] = "Visintin, Differential Models of Hysteresis; mechanism: friction in the die attach"
     typical_ug: ClassVar[tuple[float, float]] = (100.0, 10000.0)
     per: ClassVar[tuple[str, ...]] = ("K", "K")
@@ -42,6 +41,3 @@ class ThermalHysteresis(SensorEffect):
             return operators.play_memory(temperature, half_width)
 
         return stack(state, [state.temperature_operator((self.id, "start", half_width), memory)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return "kH", "kH2"

@@ -1,5 +1,3 @@
-"""Bias whose slope over temperature changes at one temperature."""
-
 from dataclasses import replace
 from typing import ClassVar
 
@@ -15,6 +13,7 @@ class ThermalKink(SensorEffect):
     id: ClassVar[str] = "thermal_kink"
     symbol: ClassVar[str] = "kK"
     equation: ClassVar[str] = "kK·w·softplus((T − Tc)/w)"
+    coefficients: ClassVar[tuple[str, ...]] = ("kK",)
     source: ClassVar[str] = "mechanism: glass transition of an adhesive"
     typical_ug: ClassVar[tuple[float, float]] = (50.0, 5000.0)
     per: ClassVar[tuple[str, ...]] = ("K",)
@@ -33,9 +32,6 @@ class ThermalKink(SensorEffect):
         above = (temperature - centre) / width
         # np.logaddexp takes ten times as long
         return stack(state, [width * (np.maximum(above, 0.0) + np.log1p(np.exp(-np.abs(above))))])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kK",)
 
     def parameters(self, state: State) -> tuple[Nonlinear, ...]:
         """The kink between the run's extreme temperatures: beyond them it is a straight line."""

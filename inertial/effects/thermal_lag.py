@@ -1,5 +1,3 @@
-"""Bias that follows a part of the sensor which is later than its thermometer."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +13,7 @@ class ThermalLag(SensorEffect):
     id: ClassVar[str] = "thermal_lag"
     symbol: ClassVar[str] = "kL"
     equation: ClassVar[str] = "(kL + kL2·θ)·(T_lag − T)"
+    coefficients: ClassVar[tuple[str, ...]] = ("kL", "kL2")
     source: ClassVar[str] = "first-order heat conduction between thermometer and sensing element"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
     per: ClassVar[tuple[str, ...]] = ("K", "K²")
@@ -36,6 +35,3 @@ class ThermalLag(SensorEffect):
 
     def start_columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
         return stack(state, [np.exp(-(state.time - state.time[..., :1]) / tau)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return "kL", "kL2"

@@ -1,5 +1,3 @@
-"""Bias in proportion to the rate of temperature: a gradient across the sensor."""
-
 from typing import ClassVar
 
 from inertial import operators
@@ -13,6 +11,7 @@ class ThermalRate(SensorEffect):
     id: ClassVar[str] = "thermal_rate"
     symbol: ClassVar[str] = "kR"
     equation: ClassVar[str] = "kR·dT/dt, over a settling time τ"
+    coefficients: ClassVar[tuple[str, ...]] = ("kR",)
     source: ClassVar[str] = "mechanism: gradient under a steady flow of heat"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 5000.0)
     per: ClassVar[tuple[str, ...]] = ("(K/min)",)
@@ -28,6 +27,3 @@ class ThermalRate(SensorEffect):
             return 60.0 * (temperature - operators.first_order_lag(time, temperature, settling)) / settling
 
         return stack(state, [state.temperature_operator((self.id, settling), rate)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kR",)

@@ -1,5 +1,3 @@
-"""Cubic nonlinearity of the transfer curve."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class ThirdOrder(SensorEffect):
     id: ClassVar[str] = "third_order"
     symbol: ClassVar[str] = "K3"
     equation: ClassVar[str] = "K3·fi³"
+    coefficients: ClassVar[tuple[str, ...]] = ("K3",)
     source: ClassVar[str] = "IEEE Std 1293-1998, model equation"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 1000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("scale", "odd_quadratic", "fifth_order")
@@ -22,6 +21,3 @@ class ThirdOrder(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         f = state.along(axis)
         return stack(state, [f**3])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("K3",)

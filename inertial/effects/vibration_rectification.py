@@ -1,5 +1,3 @@
-"""Bias from vibration, through the quadratic term."""
-
 from typing import ClassVar
 
 from inertial.effects.base import Array, SensorEffect, stack
@@ -12,6 +10,7 @@ class VibrationRectification(SensorEffect):
     id: ClassVar[str] = "vibration_rectification"
     symbol: ClassVar[str] = "VRE"
     equation: ClassVar[str] = "VRE·a_rms²"
+    coefficients: ClassVar[tuple[str, ...]] = ("VRE",)
     source: ClassVar[str] = "IEEE Std 1293-1998, vibration rectification"
     typical_ug: ClassVar[tuple[float, float]] = (1.0, 1000.0)
     per: ClassVar[tuple[str, ...]] = ("g²",)
@@ -23,6 +22,3 @@ class VibrationRectification(SensorEffect):
     def columns(self, state: State, axis: int, **nonlinear: float) -> Array:
         vibration = state.need("vibration", self.id)
         return stack(state, [vibration**2])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("VRE",)

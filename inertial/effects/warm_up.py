@@ -1,5 +1,3 @@
-"""Bias that settles after power-on."""
-
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +13,7 @@ class WarmUp(SensorEffect):
     id: ClassVar[str] = "warm_up"
     symbol: ClassVar[str] = "kW"
     equation: ClassVar[str] = "kW·exp(−u/τ)"
+    coefficients: ClassVar[tuple[str, ...]] = ("kW",)
     source: ClassVar[str] = "mechanism: self-heating; IEEE Std 1293-1998, warm-up"
     typical_ug: ClassVar[tuple[float, float]] = (10.0, 10000.0)
     hides_behind: ClassVar[tuple[str, ...]] = ("aging_linear", "aging_log")
@@ -26,6 +25,3 @@ class WarmUp(SensorEffect):
     def columns(self, state: State, axis: int, *, tau: float, **nonlinear: float) -> Array:
         since = since_first(state) if state.since_power is None else state.since_power
         return stack(state, [coldness(state, tau) * np.exp(-since / tau)])
-
-    def names(self, axis: int) -> tuple[str, ...]:
-        return ("kW",)

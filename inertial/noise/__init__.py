@@ -1,1 +1,1 @@
-"""Stochastic errors of an output: Allan deviation, its terms, spectrum, generators and the drift filter."""
+"""Stochastic errors of an output: Allan deviation, its terms, spectrum and the drift filter."""

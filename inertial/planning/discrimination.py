@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _SINGULAR, _RIDGE, _TINY = 1e-11, 1e-12, 1e-300
-"""Smallest eigenvalue of a deterof_trued, scaled normal matrix; ridge added to its diagonal; smallest diagonal before scaling."""
+"""Smallest eigenvalue of a determined, scaled normal matrix; ridge added to its diagonal; smallest diagonal before scaling."""
 
 _OTHERS = 0.1
 """Weight of the other pairs beside the pair with the smallest separation."""
@@ -54,7 +54,7 @@ class Discrimination:
     def ratio_to_required(self, matrix: Array) -> Array:
         """√(required χ² / reached χ²), (..., pairs): above 1 where a pair is not discriminated yet.
 
-        Infinite where the plan does not deterof_true the base model.
+        Infinite where the plan does not determine the base model.
         """
         base = list(self.base)
         inner, _ = _scaled(matrix[..., base, :][..., base])

@@ -149,7 +149,7 @@ def _remainder(effect: AnyEffect, state: State, span: Array) -> _Remainder | Non
     best: _Remainder | None = None
     seen: list[bool] = []
     try:
-        for values in _values(effect, state):
+        for values in design.grid_of(effect, state):
             columns = _columns(effect, state, values)
             remainder = _measured(columns, _after(span, columns, _start(effect, state, values)))
             seen.append(remainder.remaining_fraction > SEEN)
@@ -184,12 +184,6 @@ def _measured(columns: Array, after: Array) -> _Remainder:
     v = np.where(v < 1e-6, 0.0, v)
     by_axis = v.max(axis=-1)
     return _Remainder(float(v.max()), (float(by_axis[0]), float(by_axis[1]), float(by_axis[2])), after, before)
-
-
-def _values(effect: AnyEffect, state: State) -> list[Mapping[str, float]]:
-    from inertial.design import grid_of  # noqa: PLC0415  # criticism stands above planning elsewhere
-
-    return list(grid_of(effect, state))
 
 
 def _start(effect: AnyEffect, state: State, values: Mapping[str, float]) -> Array:

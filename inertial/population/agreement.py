@@ -1,7 +1,5 @@
 """Agreement of two results with their uncertainties."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm

@@ -1,12 +1,10 @@
 """Capability of a population against limits, with confidence intervals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, chi2, norm
+from scipy.stats import binomtest, norm
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -23,14 +21,6 @@ class Index:
     value: float
     low: float
     high: float
-
-
-def cp(sigma: float, width: float, n: int) -> Index:
-    """(USL − LSL)/6σ with the χ² interval (Montgomery, eq. 8.20)."""
-    value = width / (6.0 * sigma)
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low, high = (float(np.sqrt(chi2.ppf(p, n - 1) / (n - 1))) for p in (tail, 1.0 - tail))
-    return Index(value, value * low, value * high)
 
 
 def cpk(

@@ -1,7 +1,5 @@
 """Changes of level in a series: when, how much, and between which points they may lie."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +79,7 @@ class _Noise:
     wider: Array
 
     @classmethod
-    def of(cls, values: Array) -> _Noise:
+    def of(cls, values: Array) -> "_Noise":
         plain = drawn_in(values)
         memory = memory_of(plain)
         left = drawn_in(innovations(values, memory))

@@ -1,7 +1,5 @@
 """Groups compared, and what stands out of a population."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

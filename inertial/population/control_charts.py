@@ -1,7 +1,5 @@
 """Control charts of single values: Shewhart with the Western Electric rules, and the exponentially weighted moving average."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 
@@ -52,7 +50,7 @@ def baseline(values: Array, first: int | None = None) -> Baseline:
     return Baseline(float(np.mean(values[:first])), float(np.mean(np.abs(np.diff(values)))) / D2_OF_TWO)
 
 
-def signals(values: Array, chart: Baseline) -> tuple[Flags, Ewma]:
+def signals(values: Array, chart: Baseline) -> "tuple[Flags, Ewma]":
     """Signals of the four rules, (4, n), and the moving average."""
     return western_electric(values, chart), ewma(values, chart)
 

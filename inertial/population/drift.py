@@ -6,8 +6,6 @@ again. The kind's figures come from all its units; a unit's own history then mov
 as far as it tells something (a Kalman filter, which here is the best linear unbiased prediction).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

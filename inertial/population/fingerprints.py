@@ -1,7 +1,5 @@
 """Units told by their coefficients: whether a calibration fits the unit that its serial names, and whom it fits instead."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

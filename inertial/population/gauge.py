@@ -1,7 +1,5 @@
 """Gauge repeatability and reproducibility from repeated mounts, by analysis of variance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Series whose values hang together, or whose tails are heavier than normal: how much, by the series itself."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter

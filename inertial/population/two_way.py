@@ -1,7 +1,5 @@
 """Values that belong to a unit and to a place at once: the parts of both, apart."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -6,8 +6,6 @@ weighed by their noise, b = Σ Jᵀ·R·y ~ N(0, A + A·A), A = Σ Jᵀ·R·J, R
 Patterson and Thompson 1971). An influence that the coefficients imitate has no column in A, and nothing is said of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 With nine degrees of freedom a normal law at two standard uncertainties states a risk of 2.3 % where it is 10 %, with two 22 %.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any

@@ -5,7 +5,7 @@ encoder errors add to the angles; the seat turns the fixture's slot; the thermom
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +103,6 @@ class Sensitivity:
     scopes: tuple[str, ...]
     dof: tuple[float, ...]
     seen: tuple[bool, ...]
-    names: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True)
@@ -171,22 +170,9 @@ def sensitivity(
     ----------
     scattered : errors of single dwells; each gives two columns per dwell
     """
-    columns: list[Array] = []
-    contributions: list[str] = []
-    scopes: list[str] = []
-    dof: list[float] = []
-    seen: list[bool] = []
-
-    def enter(changes: Array, one: InputQuantity | Scattered) -> None:
-        count = changes.shape[-1]
-        columns.append(changes)
-        contributions.extend([one.contribution] * count)
-        scopes.extend([one.scope] * count)
-        dof.extend([one.dof] * count)
-        seen.extend([one.seen] * count)
-
-    for one in influences:
-        enter(one.u * difference(model, state, one.errors)[..., None], one)
+    entered: list[tuple[Array, InputQuantity | Scattered]] = [
+        (one.u * difference(model, state, one.errors)[..., None], one) for one in influences
+    ]
     for one in scattered:
         for size, errors in ((one.outer, Errors(outer=1.0)), (one.inner, Errors(inner=1.0))):
             if size > 0.0:
@@ -194,12 +180,19 @@ def sensitivity(
                 single = np.zeros((*change.shape, change.shape[-2]))
                 every = np.arange(change.shape[-2])
                 single[..., every, :, every] = np.moveaxis(change, -2, 0)
-                enter(single, one)
-    if columns:
-        changes = np.concatenate(columns, axis=-1)
+                entered.append((single, one))
+    if entered:
+        changes = np.concatenate([columns for columns, _ in entered], axis=-1)
     else:
         changes = np.zeros((*predict(model.effects, state, model.coefficients, model.nonlinear).shape, 0))
-    return Sensitivity(changes, tuple(contributions), tuple(scopes), tuple(dof), tuple(seen))
+    sources = [one for columns, one in entered for _ in range(columns.shape[-1])]
+    return Sensitivity(
+        changes,
+        tuple(one.contribution for one in sources),
+        tuple(one.scope for one in sources),
+        tuple(one.dof for one in sources),
+        tuple(one.seen for one in sources),
+    )
 
 
 def difference(model: MeasurementModel, state: State, errors: Errors) -> Array:

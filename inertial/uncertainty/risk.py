@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
 Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
@@ -85,11 +85,6 @@ def _between(z: Array, ends: tuple[float, float], width: float) -> Array:
     if not width > 0.0:
         return np.asarray((ends[0] <= z) & (z <= ends[1]), dtype=np.float64)
     return np.asarray(ndtr((ends[1] - z) / width) - ndtr((ends[0] - z) / width), dtype=np.float64)
-
-
-def guard_factor(allowed: float) -> float:
-    """Guard band over standard uncertainty with which the specific risk at the acceptance limit is ``allowed``."""
-    return float(-ndtri(allowed))
 
 
 def process_deviation(values: list[float], independent: float) -> float:

@@ -136,7 +136,7 @@ def _size(diagnosis: ShockDiagnosis, name: str, settings: WaveSettings) -> str:
     parameters = one.parameters(settings.duration_s)
     fit = diagnosis.extended
     value, error = fit.coefficients[name] if name in fit.coefficients else fit.parameters[parameters[0].name]
-    return f"{with_uncertainty(value, 2.0 * error)} {one.unit()} (k = 2)"
+    return f"{with_uncertainty(value, 2.0 * error)} {one.unit} (k = 2)"
 
 
 def curves(pair: Pair, duration: float, before_s: float) -> list[dict[str, Any]]:

@@ -67,7 +67,7 @@ def response_point(
     skew = 2.0 * np.pi * frequency * clock[1] * len(own.output) / own.rate_hz / 2.0
     magnitude = float(np.sqrt(noise**2 + transverse**2 + (1e-2 * part.repeatability_percent) ** 2))
     phase = float(np.sqrt(noise**2 + transverse**2 + np.radians(part.repeatability_deg) ** 2 + skew**2))
-    silent = size < SILENT * tone.amplitude_error[0]
+    silent = size <= SILENT * tone.amplitude_error[0]  # an output of constant zero has neither tone nor noise
     clipped = device.at_end(own.output[:, axis]) > 0
     power = 0.5 * size**2
     whole = not silent and not clipped and bool(np.isfinite(ratio))
@@ -82,7 +82,7 @@ def response_point(
         "phase_uncertainty_deg": float(np.degrees(phase)),
         "level_g": level,
         "record_s": len(own.output) / own.rate_hz,
-        "coherence": power / (power + float(tone.sigma[0]) ** 2),
+        "coherence": power / max(power + float(tone.sigma[0]) ** 2, 1e-300),
         "distortion_percent": 100.0
         * float(harmonic_distortion(reference.output[:, [axis]], reference.rate_hz, frequency)[0]),
         "transverse_percent": 100.0 * across,

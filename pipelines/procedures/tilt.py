@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from scipy.stats import norm
 
 from inertial.dynamics.tilt import TiltFit, fit_tilt, left_open
+from inertial.errors import NotIdentified
 from pipelines.drawing.chart import Chart, Plot, PlotAxis, Role, Trace, level
 from pipelines.procedures.base import Evaluated, Part
 from pipelines.procedures.columns import numbers, point_rows, point_table
@@ -102,6 +103,8 @@ class Tilt(Evaluated):
 
     def of_unit(self, part: TiltPart, unit: str, rows: pd.DataFrame, device: Device) -> UnitOutcome:
         """Figures of the axes in the plane, and their largest residuals."""
+        if still := _still(part, rows):
+            raise NotIdentified(f"the output of axis {' and '.join(still)} is constant; check the unit")
         fits = {axis: _fit(part, rows[rows["axis"] == axis]) for axis in _plane(part)}
         linear = {axis: _fit(part, rows[rows["axis"] == axis], orders=1) for axis in _plane(part)}
         # of the whole model: what K2 and K3 leave in a sine's residual is no wander
@@ -120,8 +123,10 @@ class Tilt(Evaluated):
             ("not determined by this plane", f"axis {part.about}, about which the unit turns: {open_out}"),
         ]
 
-    def chart(self, part: TiltPart, points: pd.DataFrame) -> Chart:
+    def chart(self, part: TiltPart, points: pd.DataFrame) -> Chart | None:
         """Residual from bias and scale over the angle."""
+        if _still(part, points):
+            return None
         turn = np.linspace(-np.pi, np.pi, 361)
         traces = [level(np.array([-180.0, 180.0]), 0.0)]
         for axis in _plane(part):
@@ -142,6 +147,13 @@ class Tilt(Evaluated):
 def _plane(part: TiltPart) -> tuple[str, str]:
     """The axes of the fixture in the plane: f = (Rx(outer)·Rz(inner))ᵀ·(0, 0, 1)."""
     return ("y", "z") if part.about == "x" else ("x", "z")
+
+
+def _still(part: TiltPart, rows: pd.DataFrame) -> list[str]:
+    """The axes in the plane whose output is the same at every angle: it has no scale to refer anything to."""
+    return [
+        axis for axis in _plane(part) if np.ptp(rows.loc[rows["axis"] == axis, "value"].to_numpy(dtype=float)) == 0.0
+    ]
 
 
 def _fit(part: TiltPart, rows: pd.DataFrame, orders: int | None = None) -> TiltFit:

@@ -1,7 +1,5 @@
 """Adapters by the family that a profile names: each module in ``families`` has the adapter of the family of its name."""
 
-from __future__ import annotations
-
 import pkgutil
 from functools import cache
 from importlib import import_module

@@ -3,18 +3,14 @@
 The adapter of a drive family defines the meaning of its registers; this module defines a move.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from schemas.errors import LinkLost, OperatorNeeded, StationRefused, StationTimeout
 from schemas.station import Limits
-
-if TYPE_CHECKING:
-    from stations.devices.registers import Registers
+from stations.devices.registers import Registers
 
 SETTLING_DEG = 0.5  # largest distance from the target while an axis settles
 BEGIN_LOOKS = 3  # readings of the drive after which a move that has not started counts as finished

@@ -3,8 +3,6 @@
 The adapter of a controller family defines the meaning of its values; this module defines the functions of a chamber.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from typing import ClassVar

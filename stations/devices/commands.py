@@ -1,15 +1,9 @@
 """Text commands of a device by name: profile and link together."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from schemas.errors import StationRefused
 from schemas.profile import Command, Profile
+from stations.codec import Value
 from stations.links.link import TextLink
-
-if TYPE_CHECKING:
-    from stations.codec import Value
 
 STEP = 0.1  # numbers are written with one decimal
 

@@ -1,7 +1,5 @@
 """Refusal of orders beyond an exciter's displacement, velocity or acceleration, and of references that cannot be right."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +14,7 @@ FLAT_SHARE = (
     5e-4  # of the samples of Gaussian vibration within a thousandth of an extreme: a range of 3.3 σ has so many
 )
 FEWEST_FLAT = 20
+FLAT_SHARE_OF_SINE = 0.1  # of the samples of a sine: it has less
 
 
 def refuse_motion(profile: Profile, name: str, frequency: float, level_g: float) -> None:
@@ -31,10 +30,13 @@ def refuse_random_motion(profile: Profile, name: str, vibration: str, level_g: f
 
 def refuse_clipped_random(driven: Array, name: str) -> None:
     """Refuse Gaussian vibration (n,) whose extremes are flat: the conditioner of the reference clips."""
-    centred = driven - driven.mean()
-    top = float(np.max(np.abs(centred)))
-    flat = int(np.count_nonzero(np.abs(centred) > 0.999 * top))
-    if flat > max(FEWEST_FLAT, FLAT_SHARE * centred.size):
+    refuse_flat(np.abs(driven - driven.mean()), name, max(FEWEST_FLAT, FLAT_SHARE * driven.size))
+
+
+def refuse_flat(size: Array, name: str, most: float, near: float = 0.999) -> None:
+    """Refuse a reference that lies near its largest size (n,) in more than ``most`` samples: its conditioner clips."""
+    top = float(size.max())
+    if int(np.count_nonzero(size > near * top)) > most:
         raise RecordingSpoilt(
             f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
         )

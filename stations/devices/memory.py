@@ -1,19 +1,15 @@
 """Memory of a device under test for its coefficients: two copies in flash, and the offset registers of an ADXL355."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.clock import Clock
-
-if TYPE_CHECKING:
-    from stations.codec import Value
-    from stations.devices.registers import Registers
+from stations.codec import Value
+from stations.devices.registers import Registers
 
 Copy = Literal["a", "b"]
 COPIES: tuple[Copy, Copy] = ("a", "b")

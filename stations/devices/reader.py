@@ -1,7 +1,5 @@
 """The reader of the devices under test: the clock of their samples and the instruments of the fixture."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -126,14 +124,11 @@ class Reader:
 
     def guarded(self) -> Guarded:
         """Door, emergency stop and vibration now, in one request."""
-        values, profile = self._registers.read_group("guard"), self._registers.profile
-        door, stop, vibration = values["door"], values["emergency_stop"], values["vibration"]
-        if not isinstance(door, int) or not isinstance(stop, int) or not isinstance(vibration, int | float):
-            values_read = f"door {door!r}, emergency stop {stop!r}, vibration {vibration!r}"
-            raise StationRefused(f"{self._registers.name}: {values_read}, numbers are needed; check the profile")
-        closed = named(profile.register("door"), door) == "closed"
-        released = named(profile.register("emergency_stop"), stop) == "released"
-        return Guarded(not closed, not released, float(vibration))
+        registers, values = self._registers, self._registers.read_group("guard")
+        numbers = {name: registers.number_in(name, values[name]) for name in ("door", "emergency_stop", "vibration")}
+        closed = named(registers.profile.register("door"), numbers["door"]) == "closed"
+        released = named(registers.profile.register("emergency_stop"), numbers["emergency_stop"]) == "released"
+        return Guarded(not closed, not released, float(numbers["vibration"]))
 
     def since_power(self) -> float:
         """Seconds since power-on of the devices."""

@@ -1,7 +1,5 @@
 """Registers of a device by name: profile, codec and link together."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 
@@ -45,12 +43,15 @@ class Registers:
 
     def number(self, name: str) -> float:
         """The value of a numeric register."""
-        value = self.read(name)
+        return float(self.number_in(name, self.read(name)))
+
+    def number_in(self, name: str, value: Value) -> float:
+        """The number of a register in a value that was read with a group."""
         if not isinstance(value, int | float):
             raise StationRefused(
                 f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
             )
-        return float(value)
+        return value
 
     def numbers(self, name: str) -> list[float]:
         """The numbers of a register with a count."""
@@ -78,10 +79,7 @@ class Registers:
 
     def flags_in(self, name: str, value: Value) -> dict[str, bool]:
         """The named bits of a register in a value that was read with a group."""
-        if not isinstance(value, int | float):
-            raise StationRefused(
-                f"{self.name}: {name} is {value!r}, a number is needed; check profile {self.profile.name}"
-            )
+        value = self.number_in(name, value)
         return {flag: bool(int(value) >> bit & 1) for flag, bit in self.profile.register(name).bits.items()}
 
     def names_in(self, group: str) -> dict[str, str]:

@@ -1,7 +1,5 @@
 """One slot of the reader: identity of its device, and the samples in its memory."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +7,7 @@ from numpy.typing import NDArray
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.clock import Clock
-from stations.codec import SEQUENCE, WORDS_PER_SAMPLE, Packing, Value, named, unpack_samples
+from stations.codec import SEQUENCE, WORDS_PER_SAMPLE, Packing, named, unpack_samples
 from stations.devices.memory import UnitMemory
 from stations.devices.registers import Registers
 
@@ -68,19 +66,19 @@ class Slot:
         return self._identity
 
     def _read_identity(self) -> Identity:
-        values = self._registers.read_group("identity")
-        packing = self._named("packing", values["packing"])
-        unit = self._named("output_unit", values["output_unit"])
-        lsb, full_scale = _number(values["lsb"]), _number(values["full_scale"])
+        registers, values = self._registers, self._registers.read_group("identity")
+        names = ("packing", "output_unit", "lsb", "full_scale", "capacity")
+        numbers = {name: registers.number_in(name, values[name]) for name in names}
+        packing, unit = (named(registers.profile.register(name), numbers[name]) for name in names[:2])
+        lsb, full_scale = numbers["lsb"], numbers["full_scale"]
         possible = lsb > 0.0 and FEWEST_COUNTS <= full_scale / lsb <= MOST_COUNTS
         if packing not in PACKINGS or unit not in UNITS or not possible:
             raise StationRefused(
                 f"{self.name}: packing {packing}, unit {unit}, {lsb:g} per count, full scale {full_scale:g}; known names and a "
                 f"full scale of {FEWEST_COUNTS} to {MOST_COUNTS} counts are needed; check the reader and its word order"
             )
-        return Identity(
-            str(values["serial"]), PACKINGS[packing], UNITS[unit], lsb, full_scale, int(_number(values["capacity"]))
-        )
+        capacity = int(numbers["capacity"])
+        return Identity(str(values["serial"]), PACKINGS[packing], UNITS[unit], lsb, full_scale, capacity)
 
     def holds(self, serial: str) -> bool:
         """Whether the slot holds this unit now; read again at each call."""
@@ -103,13 +101,9 @@ class Slot:
 
     def _progress(self) -> tuple[int, int, bool]:
         """Number of samples made, number acknowledged as read, and whether any were lost."""
-        values = self._registers.read_group("progress")
-        bit = self._registers.profile.register("flags").bits["overflow"]
-        return (
-            int(_number(values["head"])),
-            int(_number(values["tail"])),
-            bool(int(_number(values["flags"])) >> bit & 1),
-        )
+        registers, values = self._registers, self._registers.read_group("progress")
+        head, tail = (int(registers.number_in(name, values[name])) for name in ("head", "tail"))
+        return head, tail, registers.flags_in("flags", values["flags"])["overflow"]
 
     def _acknowledge(self, head: int) -> None:
         """Acknowledges the samples before ``head``; after a lost answer the register is read, and written again if it differs."""
@@ -143,13 +137,3 @@ class Slot:
                 f"{self.name}: sample {first + int(wrong[0])} is out of sequence, the next number is needed; check the reader"
             )
         return counts.astype(np.float64)
-
-    def _named(self, name: str, value: Value) -> str:
-        return named(self._registers.profile.register(name), _number(value))
-
-
-def _number(value: Value) -> float:
-    """The value of a register that is numeric by its profile."""
-    if isinstance(value, int | float):
-        return value
-    raise StationRefused(f"{value!r} is not a number; check the slot's profile")

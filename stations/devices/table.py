@@ -1,7 +1,5 @@
 """The two-axis tilt table: absolute moves, each read back."""
 
-from __future__ import annotations
-
 from schemas.errors import StationTimeout
 from stations.clock import Clock
 from stations.devices.axis import TableAxis

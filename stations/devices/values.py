@@ -1,13 +1,9 @@
 """Interface of adapters to the values of a device, for registers and for text commands."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from schemas.profile import Profile
-
-if TYPE_CHECKING:
-    from stations.codec import Value
+from stations.codec import Value
 
 
 class Values(Protocol):

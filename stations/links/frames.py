@@ -3,8 +3,6 @@
 Source: Modbus Application Protocol 1.1b3, 6.1–6.12 and 7; Modbus over serial line 1.02, 6.2.2 (CRC).
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 
@@ -16,7 +14,6 @@ WRITES = frozenset({WRITE_COIL, WRITE_COILS, WRITE_REGISTERS})
 ON, OFF = 0xFF00, 0x0000
 DIAGNOSTICS, ECHO = 8, 0  # return query data: on a serial line only (6.8)
 EXCEPTION = 0x80
-LONGEST_READ = 125  # registers in one request (6.3)
 BYTE = 8
 
 

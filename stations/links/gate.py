@@ -4,8 +4,6 @@ Writes go only to devices in the station file, and only to registers that their 
 run drives, the run must hold the lease of the station; this is the last check before each write is sent.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

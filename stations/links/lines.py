@@ -1,10 +1,9 @@
 """Text lines over TCP: a query or a command, and one line as the answer."""
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from stations.links.wires import discard_undelivered
@@ -27,15 +26,10 @@ class LineLink:
 
     def ask(self, question: str, what: str) -> str:
         """The answer to a query; after a time-out or a lost connection the query is repeated on a new connection."""
-        for attempt in range(1, self._attempts + 1):
-            try:
+        for _ in range(self._attempts - 1):
+            with suppress(StationTimeout, LinkLost):
                 return self._exchange(question, what)
-            except (StationTimeout, LinkLost):
-                if attempt == self._attempts:
-                    raise
-        raise StationTimeout(
-            f"{self._where}: read_attempts is {self._attempts} for '{question}', 1 or more is needed; raise it in [link]"
-        )
+        return self._exchange(question, what)
 
     def tell(self, order: str, what: str, *, before: Callable[[], None] | None = None) -> str:
         """The answer to a command, sent once: after a failure it is unknown whether the device acted."""

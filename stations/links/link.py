@@ -1,7 +1,5 @@
 """Interface between devices and links; address and protocol belong to the link."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -37,10 +35,6 @@ class Link(Protocol):
         """
         ...
 
-    def close(self) -> None:
-        """Ends the connection."""
-        ...
-
 
 class Carrier(Protocol):
     """The link behind the gate: registers and bits on a wire. ``before`` is the last call before a write is sent."""
@@ -67,22 +61,6 @@ class Carrier(Protocol):
         ...
 
 
-class TextCarrier(Protocol):
-    """The text link behind the gate."""
-
-    def ask(self, question: str, what: str) -> str:
-        """The answer to a query."""
-        ...
-
-    def tell(self, order: str, what: str, *, before: Callable[[], None] | None = None) -> str:
-        """The answer to a command, sent once."""
-        ...
-
-    def close(self) -> None:
-        """Ends the connection."""
-        ...
-
-
 class TextLink(Protocol):
     """Text lines to and from one device; the errors are those of :class:`Link`."""
 
@@ -92,6 +70,14 @@ class TextLink(Protocol):
 
     def tell(self, order: str, what: str) -> str:
         """The answer to a command, sent once."""
+        ...
+
+
+class TextCarrier(TextLink, Protocol):
+    """The text link behind the gate."""
+
+    def tell(self, order: str, what: str, *, before: Callable[[], None] | None = None) -> str:
+        """The answer to a command, sent once; ``before`` is the last call before it is sent."""
         ...
 
     def close(self) -> None:

@@ -1,16 +1,13 @@
 """The links of a station, made from its file: the only place that makes any, and behind each the gate for writes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from schemas.carrier import Carried
 from schemas.errors import RecipeInvalid
 from schemas.profile import Carrier, Profile
 from schemas.station import StationConfig
-from schemas.station_devices import Devices
+from schemas.station_devices import Carried, Devices
 from stations.links.gate import GatedLines, GatedLink, Permit
 from stations.links.lines import LineLink
 from stations.links.modbus import WireLink

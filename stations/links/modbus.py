@@ -3,14 +3,12 @@
 After a failed write it is unknown whether the device acted: the adapter reads back and reports it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from schemas.errors import LinkLost, StationRefused, StationTimeout
 from schemas.profile import Space
 from stations.links.frames import Malformed, Refused, read_request, values_in, write_request
-from stations.links.wires import Broken, Silence, TcpWire, Wire
+from stations.links.wires import Broken, Silence, Wire
 
 GATEWAY = {10, 11}
 REASONS = {
@@ -41,16 +39,14 @@ class WireLink:
         """Words of registers, or bits; after a time-out or a lost connection the read is repeated on a new connection."""
         purpose = f"read {what} ({count} {NAMES[space]} from {address})"
         request = read_request(space, address, count)
-        for attempt in range(1, self._attempts + 1):
+        for _ in range(self._attempts - 1):
             try:
                 return self._ask(device_id, request, purpose)
-            except (StationTimeout, LinkLost) as problem:
-                if attempt == self._attempts or isinstance(problem, _BehindGateway):
-                    raise
-        where = f"{self._wire.where} device {device_id}"
-        raise StationTimeout(
-            f"{where}: read_attempts is {self._attempts} for '{purpose}', 1 or more is needed; raise it in [link]"
-        )
+            except _BehindGateway:
+                raise
+            except (StationTimeout, LinkLost):
+                continue
+        return self._ask(device_id, request, purpose)
 
     def write(
         self,
@@ -86,13 +82,6 @@ class WireLink:
             raise LinkLost(f"{where}: no valid answer to '{purpose}' ({problem}); check gateway and cable") from None
         except Refused as problem:
             raise _refusal(where, purpose, problem.code) from None
-
-
-class ModbusLink(WireLink):
-    """Registers and bits of the devices at one Modbus TCP address."""
-
-    def __init__(self, host: str, port: int, *, timeout_s: float, read_attempts: int) -> None:
-        super().__init__(TcpWire(host, port, timeout_s), read_attempts=read_attempts)
 
 
 class _BehindGateway(StationTimeout):

@@ -1,7 +1,5 @@
 """Modbus over a serial line: frames with a CRC and without a transaction number, on a line shared by several devices."""
 
-from __future__ import annotations
-
 import os
 import termios
 import time

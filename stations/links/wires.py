@@ -8,8 +8,6 @@ Exception: a write without an answer keeps its connection. The next request read
 connection it cannot overtake the write. If that request has no answer either, the connection is closed.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 import ssl

@@ -1,7 +1,5 @@
 """Registers of one simulated device: the profile connected to the values of the plant."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from schemas.profile import Profile, Register, Space

@@ -1,9 +1,8 @@
 """The register banks of the simulated station: the value of the world behind each register."""
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Protocol
 
@@ -11,42 +10,35 @@ from schemas.profile import Profile
 from schemas.station_devices import Device, Devices
 from stations.codec import NotEncodable, Value
 from stations.plant import families
-from stations.plant.bank import Bank, Busy, number
-from stations.plant.memory_bank import MemoryBank
-from stations.plant.table import Axis
+from stations.plant.bank import Bank, Busy, Source, number
+from stations.plant.flash import Flash
 from stations.plant.world import World
 from stations.profile_files import profile_of
 
 UNITS = {"V": "volt", "LSB": "lsb"}
+PART = 64
+PARTS = 3
 
 
-def build_banks(world: World, devices: Devices, equipment: Mapping[str, Device] | None = None) -> dict[int, Bank]:
+def build_banks(world: World, devices: Devices, equipment: Mapping[str, Device]) -> dict[int, Bank]:
     """A bank for every device id of the station that holds registers."""
-    banks = {
-        devices.outer.device_id: axis_bank(world, world.outer, profile_of(devices.outer)),
-        devices.inner.device_id: axis_bank(world, world.inner, profile_of(devices.inner)),
+    banks: dict[int, Bank] = {
+        devices.outer.device_id: simulated(profile_of(devices.outer), world, world.outer),
+        devices.inner.device_id: simulated(profile_of(devices.inner), world, world.inner),
         devices.reader.device_id: _reader(world, profile_of(devices.reader), devices.slots.count),
     }
-    if (chamber := profile_of(devices.chamber)).registers:
-        banks[devices.chamber.device_id] = chamber_bank(world, chamber)
     for unit, slot in enumerate(world.slots):
         banks[devices.slots.device_id + slot] = _slot(world, unit, profile_of(devices.slots))
-    for device in (equipment or {}).values():
-        if (own := profile_of(device)).registers:
-            banks[device.device_id] = chamber_bank(world, own)
+    for device in (devices.chamber, *equipment.values()):
+        if (profile := profile_of(device)).registers:
+            banks[device.device_id] = simulated(profile, world)
     return banks
 
 
-def build_line_devices(
-    world: World, devices: Devices, equipment: Mapping[str, Device] | None = None
-) -> dict[int, LineDevice]:
+def build_line_devices(world: World, devices: Devices, equipment: Mapping[str, Device]) -> "dict[int, LineDevice]":
     """Devices with a text protocol, by device id."""
-    profile = profile_of(devices.chamber)
-    line_devices = {devices.chamber.device_id: chamber_line_device(world, profile)} if profile.commands else {}
-    for device in (equipment or {}).values():
-        if (own := profile_of(device)).commands:
-            line_devices[device.device_id] = chamber_line_device(world, own)
-    return line_devices
+    profiles = {device.device_id: profile_of(device) for device in (devices.chamber, *equipment.values())}
+    return {device_id: simulated(profile, world) for device_id, profile in profiles.items() if profile.commands}
 
 
 def _reader(world: World, profile: Profile, slots: int) -> Bank:
@@ -92,14 +84,11 @@ def _slot(world: World, unit: int, profile: Profile) -> Bank:
 
     def commanded(values: dict[str, Value]) -> None:
         if "tail" in values:
-            taken(values)
+            tail = int(number(values, "tail"))
+            if not sampler.tail[unit] <= tail <= sampler.head:
+                raise NotEncodable(f"tail: {tail}, {sampler.tail[unit]} to {sampler.head} is needed")
+            sampler.tail[unit] = tail
         memory.write({name: value for name, value in values.items() if name != "tail"})
-
-    def taken(values: dict[str, Value]) -> None:
-        tail = int(number(values, "tail"))
-        if not sampler.tail[unit] <= tail <= sampler.head:
-            raise NotEncodable(f"tail: {tail}, {sampler.tail[unit]} to {sampler.head} is needed")
-        sampler.tail[unit] = tail
 
     sources = {
         "serial": lambda: world.serials[world.seats[unit]],
@@ -121,28 +110,14 @@ def family_names() -> list[str]:
     return sorted(module.name for module in pkgutil.iter_modules(families.__path__))
 
 
-def axis_bank(world: World, axis: Axis, profile: Profile) -> Bank:
-    """The registers of the drive with a profile."""
-    return _module(profile).simulated(world, axis, profile)
-
-
-def chamber_bank(world: World, profile: Profile) -> Bank:
-    """The registers of the chamber controller with a profile."""
-    return _module(profile).simulated(world, profile)
-
-
-def chamber_line_device(world: World, profile: Profile) -> LineDevice:
-    """The chamber controller with a profile of text commands."""
-    return _module(profile).simulated(world, profile)
-
-
-def _module(profile: Profile) -> Any:
+def simulated(profile: Profile, *of: object) -> Any:
+    """The simulated controller with a profile, of a world and, for a drive, its axis: its bank, or its line device."""
     if profile.adapter not in family_names():
         raise LookupError(
             f"profile {profile.name}: no simulation of family {profile.adapter}, one is needed; add "
             f"stations/plant/families/{profile.adapter}.py with a function 'simulated'"
         )
-    return import_module(f"{families.__name__}.{profile.adapter}")
+    return import_module(f"{families.__name__}.{profile.adapter}").simulated(*of, profile)
 
 
 class LineDevice(Protocol):
@@ -151,3 +126,61 @@ class LineDevice(Protocol):
     def answer(self, line: str) -> tuple[str, bool]:
         """The answer to a line, and whether the line changed anything."""
         ...
+
+
+@dataclass
+class MemoryBank:
+    """Memory registers of the device in a slot, by the place of the slot."""
+
+    world: World
+    place: int
+
+    @property
+    def unit(self) -> int:
+        """The unit that is seated in the slot."""
+        return self.world.seats[self.place]
+
+    @property
+    def flash(self) -> Flash:
+        """Its memory."""
+        return self.world.flash[self.unit]
+
+    def sources(self) -> dict[str, Source]:
+        """Values of the registers."""
+        sources: dict[str, Source] = {
+            "memory_state": lambda: self.flash.state(self.world.now_us),
+            "memory_command": lambda: 0,
+            "erases_a": lambda: self.flash.erases[0],
+            "erases_b": lambda: self.flash.erases[1],
+            "endurance": lambda: self.flash.endurance,
+            "offset_step": lambda: self.world.preset.offset_step,
+            "offset": lambda: [float(step) for step in self.flash.offsets],
+        }
+        for part in range(PARTS):
+            sources[f"buffer_{part}"] = lambda part=part: _part(self.flash.buffer, part)
+            for copy, name in enumerate("ab"):
+                sources[f"copy_{name}_{part}"] = lambda part=part, copy=copy: _part(
+                    self.flash.read(copy, self.world.now_us), part
+                )
+        return sources
+
+    def write(self, values: dict[str, Value]) -> None:
+        """Applies writes; a device that has no power, or is sampling, refuses them."""
+        if values and (not self.world.powered or self.world.sampler.running):
+            raise Busy("memory")
+        for name, value in values.items():
+            if name.startswith("buffer_") and isinstance(value, list):
+                part = int(name.removeprefix("buffer_"))
+                self.flash.buffer[part * PART : (part + 1) * PART] = [int(word) for word in value]
+            elif name == "offset" and isinstance(value, list):
+                if not self.world.preset.offset_step:
+                    raise NotEncodable("offset: the device has no offset registers")
+                self.world.set_offsets(self.unit, [int(step) for step in value])
+            elif name == "memory_command" and (command := int(number(values, name))):
+                if self.flash.state(self.world.now_us) == 1:
+                    raise Busy("memory")
+                self.world.program_memory(self.unit, command - 1)
+
+
+def _part(words: list[int], part: int) -> list[float]:
+    return [float(word) for word in words[part * PART : (part + 1) * PART]]

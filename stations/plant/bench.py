@@ -4,8 +4,6 @@ It is written independently of the models that are fitted: a response is the pro
 stage and a delay, with a nonlinear spring between, sampled by a clock of the device's own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The thermal chamber: controller, air, walls, compressor and door, stepped once a second."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

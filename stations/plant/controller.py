@@ -1,17 +1,17 @@
-"""Common parts of the simulated chamber controllers: usual registers, and the write of a set point."""
-
-from __future__ import annotations
+"""Common parts of the simulated controllers: usual registers and set points of chambers, the start of a move of drives."""
 
 from collections.abc import Callable, Mapping
 
 from schemas.profile import Profile
 from stations.codec import Value
-from stations.plant.bank import Bank, Sink, Source, number
+from stations.plant.bank import Bank, Busy, Sink, Source, number
 from stations.plant.chamber import Chamber
+from stations.plant.table import Axis
 from stations.plant.world import World
 
 DEFAULT_LIMITS_C = (-100.0, 250.0)  # for profiles without limits
 HUMIDITY_PCT = 40.0
+ABSOLUTE = 1  # type of a move
 
 
 def controller_bank(world: World, profile: Profile, own: Mapping[str, Source], command: Sink) -> Bank:
@@ -42,3 +42,10 @@ def set_by(chamber: Chamber, name: str) -> Callable[[dict[str, Value]], None]:
             chamber.set_point = number(values, name)
 
     return command
+
+
+def start_move(world: World, axis: Axis, profile: Profile, values: dict[str, Value]) -> None:
+    """Starts a move of a drive at rest."""
+    if axis.moving(world.now):
+        raise Busy(profile.name)
+    axis.go(world.now, number(values, "target"), number(values, "speed"), number(values, "acceleration"))

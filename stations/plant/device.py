@@ -1,7 +1,5 @@
 """Devices under test: what is true of each unit, and how force becomes counts."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

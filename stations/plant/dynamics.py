@@ -1,7 +1,5 @@
 """Frequency response of the devices: a spring-mass system, then the low-pass filter of the output stage."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,6 +1,4 @@
-"""The fixture in the chamber: temperatures of air and elements, vibration and supply, in steps of a second."""
-
-from __future__ import annotations
+"""The fixture in the chamber: temperatures of air and elements, vibration, in steps of a second; humidity at any instant."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,12 +10,14 @@ from schemas.simulation import Simulation
 from stations.plant.chamber import STEP_S, Chamber
 from stations.plant.device import stream
 from stations.plant.hidden import HiddenEffect
-from stations.plant.moisture import Moisture
 
 Array = NDArray[np.float64]
 
 AIR_UNREST_K = 0.01
 AIR_UNREST_S = 30.0
+ROOM_HPA = 12.5  # vapour pressure of a room at 23 °C and 45 %
+UNREST = 0.12  # relative amplitude of each variation
+PERIODS_S = (1500.0, 4100.0, 11000.0)  # air conditioning, doors, weather
 
 
 class Fixture:
@@ -33,7 +33,7 @@ class Fixture:
         slots: Sequence[int],
         air: np.random.Generator,
         hidden: Sequence[HiddenEffect],
-        moisture: Moisture,
+        moisture: "Moisture",
     ) -> None:
         place = stream(sim.seed, "fixture")
         low, high = sim.slot_lag_s
@@ -102,3 +102,28 @@ class Grid:
         left = np.minimum(np.floor(steps).astype(np.int64), self.length - 2)
         part = (steps - left).reshape(-1, *(1,) * (self._rows.ndim - 1))
         return self._rows[left] + part * (self._rows[left + 1] - self._rows[left])
+
+
+class Moisture:
+    """Vapour pressure as a function of time; through the port of the chamber it follows that of the room."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._phases = rng.uniform(0.0, 2.0 * np.pi, len(PERIODS_S))
+        self._sizes = UNREST * rng.uniform(0.5, 1.0, len(PERIODS_S))
+
+    def pressure(self, time: Array) -> Array:
+        """Vapour pressure at instants (n,), hPa."""
+        swings = [
+            size * np.sin(2.0 * np.pi * time / period + phase)
+            for size, period, phase in zip(self._sizes, PERIODS_S, self._phases, strict=True)
+        ]
+        return np.asarray(ROOM_HPA * (1.0 + np.sum(swings, axis=0)), dtype=np.float64)
+
+    def relative(self, time: Array, air: Array) -> Array:
+        """Relative humidity (n,), %, at air temperatures (n,), °C; at most 100 %, as the rest condenses."""
+        return np.minimum(100.0 * self.pressure(time) / saturation(air), 100.0)
+
+
+def saturation(air: Array) -> Array:
+    """Saturation vapour pressure over water, hPa: Magnus' formula, coefficients of WMO-No. 8 (2018), annex 4.B."""
+    return np.asarray(6.112 * np.exp(17.62 * air / (243.12 + air)), dtype=np.float64)

@@ -1,7 +1,5 @@
 """Memory of a simulated device: two copies in flash, each with limited erasures, a buffer, and volatile offset registers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 WORDS = 192

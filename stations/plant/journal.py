@@ -3,8 +3,6 @@
 A replay on a new plant gives the same state, bit by bit.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import zlib

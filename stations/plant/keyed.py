@@ -1,7 +1,5 @@
 """Random numbers of an instant: a repeated reading gives the same number, and a reading changes no state."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Server for the devices of the plant with a text protocol, over TCP on loopback."""
 
-from __future__ import annotations
-
 import socketserver
 import threading
 from contextlib import suppress

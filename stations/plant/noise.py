@@ -3,8 +3,6 @@
 Draws are made sample by sample in order, so that a record does not depend on the size of the requests.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """From where the table is to what the converters say: the chain of physics for a run of instants."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

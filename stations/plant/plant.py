@@ -3,8 +3,6 @@
 Clients change it by writes to registers and by lines of text, and by nothing else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 
@@ -115,3 +113,18 @@ class Plant(World):
         if order.serial:
             return self._devices.slots.device_id + self.slots[self.serials.index(order.serial)]
         return 0
+
+
+class PlantClock:
+    """Time of the simulated world in whole microseconds, so that the division of a sleep into parts has no effect."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def now(self) -> float:
+        """Seconds since power-on of the plant."""
+        return self._world.now + self._world.clock_offset_s
+
+    def sleep(self, seconds: float) -> None:
+        """Advances the time of the plant."""
+        self._world.advance(max(0, round(seconds * 1e6)))

@@ -1,7 +1,5 @@
 """Presets: what a data sheet says of a kind of device, and what a simulation must add to it."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Mapping

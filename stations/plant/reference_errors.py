@@ -3,20 +3,18 @@
 Written from the mechanisms, independently of the budget that is to cover them.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from schemas.simulation import ReferenceErrors
-from stations.plant.hidden.base import Array, Untouched
+from stations.plant.hidden.base import Array, HiddenEffect
 
 REFERENCE_C = 25.0
 ORDERS = (1, 2)
 
 
-class StationErrors(Untouched):
+class StationErrors(HiddenEffect):
     """What is wrong with a station and its references until they are recalibrated.
 
     orthogonality : rad, turn about y between the outer and the inner axis

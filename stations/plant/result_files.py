@@ -1,7 +1,5 @@
 """Result files of the simulated equipment, in a folder of their own that goes with the plant."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import weakref

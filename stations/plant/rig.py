@@ -1,7 +1,5 @@
 """What the units and the test equipment of a simulated station really are in frequency."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Sampling of the reader: one clock for all slots, a ring buffer of packed samples per slot."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

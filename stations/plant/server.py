@@ -3,8 +3,6 @@
 An action awaits nothing: pymodbus would otherwise answer one request with the transaction number of the next.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import threading

@@ -1,7 +1,5 @@
 """The two-axis tilt table: motion of each axis as a function of time, and where it turns gravity."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 It knows no register, no fault and no journal: those act on it from outside.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 import threading
@@ -21,11 +19,10 @@ from schemas.station_devices import MOST_SLOTS
 from stations.plant.bench import Bench
 from stations.plant.device import PlantDevices, Truth, draw_truth, rotation, stream
 from stations.plant.dynamics import Dynamics
-from stations.plant.fixture import Fixture
+from stations.plant.fixture import Fixture, Moisture
 from stations.plant.flash import Flash
 from stations.plant.hidden import HiddenEffect, hidden_effect
 from stations.plant.keyed import keyed_normal
-from stations.plant.moisture import Moisture
 from stations.plant.noise import UnitNoise
 from stations.plant.physics import Physics
 from stations.plant.preset import Preset, load_preset
@@ -145,7 +142,7 @@ class World:
         self.now_us = target_us
         self.sampler.advance(target_us)
 
-    def schedule(self, at_s: float, order: int, action: Callable[[World], None]) -> None:
+    def schedule(self, at_s: float, order: int, action: "Callable[[World], None]") -> None:
         """Calls ``action`` with this world at ``at_s`` s; among equal times the smaller ``order`` comes first."""
         heapq.heappush(self._due, (round(at_s * 1e6), order, action))
 

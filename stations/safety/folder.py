@@ -1,7 +1,5 @@
 """The machine's folder of leases, and its log of events at stations that belong to no archive."""
 
-from __future__ import annotations
-
 import json
 import os
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Protection of a station of hardware during a run: leases, heartbeat and watchdog."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Generator

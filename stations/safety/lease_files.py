@@ -1,7 +1,5 @@
 """The notes beside the locks of leases: the holder of each part of a station, written completely or not at all."""
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -1,17 +1,14 @@
 """The parts of a station that are leased, and their addresses."""
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import socket
 import stat
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from schemas.station import StationConfig
-    from schemas.station_devices import Device, Slots
+from schemas.station import StationConfig
+from schemas.station_devices import Device, Slots
 
 Part = Literal[
     "outer", "inner", "chamber", "reader", "exciter", "shock_machine", "centrifuge", "power_supply", "step_generator"

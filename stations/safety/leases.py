@@ -4,8 +4,6 @@ A lease is a file lock, which the system releases when its process ends, and a n
 modification is the heartbeat. Where locks have no effect (a folder shared by machines), the heartbeat alone decides.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import threading

@@ -1,19 +1,15 @@
 """The safe state of a station: axes stopped, sampling stopped, the chamber where the station's file says."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from schemas.errors import StationError
+from schemas.safety import Safety
 from stations.devices.chamber import ThermalChamber
+from stations.devices.reader import Reader
 from stations.devices.table import TableAxis
-
-if TYPE_CHECKING:
-    from schemas.safety import Safety
-    from stations.devices.reader import Reader
 
 AGAIN_S = 1.0
 

@@ -1,7 +1,5 @@
 """Whether a station was left in its safe state, judged from its leases."""
 
-from __future__ import annotations
-
 import fcntl
 import time
 from pathlib import Path

@@ -1,18 +1,14 @@
 """Conditions that pause a run, judged from readings of the station; nothing here accesses a device."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from schemas.errors import OperatorNeeded
-
-if TYPE_CHECKING:
-    from schemas.safety import Suspenders
-    from schemas.station import Soak
-    from stations.devices.reader import Guarded, Instruments
+from schemas.safety import Suspenders
+from schemas.station import Soak
+from stations.devices.reader import Guarded, Instruments
 
 Condition = Literal[
     "door", "vibration", "supply", "chamber", "device", "table", "samples", "link", "clock", "recording"

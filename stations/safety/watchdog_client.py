@@ -1,7 +1,5 @@
 """The run's side of its watchdog: starts the process, checks it with each heartbeat, replaces it where it is gone."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -9,16 +7,18 @@ import sys
 import threading
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 from schemas.errors import StationTimeout
+from schemas.station import StationConfig
 from stations.clock import steady
 from stations.safety.folder import log_event
-from stations.safety.watchdog_protocol import BEAT, DONE, READY
+from stations.safety.leases import Leases
 
-if TYPE_CHECKING:
-    from schemas.station import StationConfig
-    from stations.safety.leases import Leases
+# the messages between a run and its watchdog, one line each
+READY = b"ready\n"  # the watchdog watches
+BEAT = b"here\n"  # sent by the run with each heartbeat, and returned by the watchdog
+DONE = b"done\n"  # the run has left the station safe
 
 START_S = 30.0
 LEAVE_S = 10.0

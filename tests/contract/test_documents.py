@@ -9,11 +9,11 @@ import pytest
 from in_process import given
 from pydantic import TypeAdapter, ValidationError
 from root_process import ROOT
+from second_order import step_response
 
 from deploy.release import unpack
 from docs.documents_page import documents, head_of
-from inertial.dynamics.second_order import transfer
-from inertial.dynamics.settling import step_response
+from inertial.dynamics.spectra import transfer
 from pipelines import cli
 from pipelines.chain import certify as certifying
 from pipelines.cli import COMMANDS

@@ -11,7 +11,7 @@ from scipy import signal
 from stopped_capture import Stopped, Stopping
 
 from docs.procedures_page import page
-from inertial.dynamics import second_order
+from inertial.dynamics import spectra
 from inertial.dynamics.transfer_effects import EFFECTS, Conditions
 from inertial.dynamics.transfer_model import Points, fit_transfer
 from pipelines.archive import Archive
@@ -294,6 +294,6 @@ def test_a_list_without_the_multi_position_test_becomes_a_job_with_a_least_value
 def test_the_band_edge_of_a_plain_second_order_model_is_the_closed_form() -> None:
     f = np.geomspace(10.0, 3000.0, 30)
     one = np.ones(30)
-    points = Points(Conditions(f, one, one, one), -second_order.transfer(f, 1800.0, 0.65), 1e-3 * one, 1e-3 * one)
+    points = Points(Conditions(f, one, one, one), -spectra.transfer(f, 1800.0, 0.65), 1e-3 * one, 1e-3 * one)
     fit = fit_transfer(points, ("second_order",))
-    assert bandwidth_of(fit, fit.values, 3000.0) == pytest.approx(second_order.bandwidth(1800.0, 0.65), rel=1e-4)
+    assert bandwidth_of(fit, fit.values, 3000.0) == pytest.approx(spectra.bandwidth(1800.0, 0.65), rel=1e-4)

@@ -5,6 +5,7 @@ import struct
 
 import pytest
 from each import each
+from plant_wires import tcp_link
 from small_station import lot_of, plant_of
 
 from schemas.errors import RecipeInvalid, StationRefused
@@ -13,7 +14,6 @@ from schemas.station import load_station
 from schemas.station_devices import Device, Equipment
 from stations.codec import NotEncodable, encode
 from stations.devices.registers import Registers
-from stations.links.modbus import ModbusLink
 from stations.plant.preset import load_preset, preset_names
 from stations.plant.server import PlantServer
 from stations.profile_files import load_profile, profile_names
@@ -44,7 +44,7 @@ def test_a_device_answers_as_its_profile_says_and_refuses_what_it_does_not_say(n
     devices = [device_id for device_id, bank in plant.banks.items() if bank.profile.name == name]
     assert devices, "no device of the built-in station answers by it"
     with PlantServer(plant) as server:
-        link = ModbusLink(server.host, server.port, timeout_s=5.0, read_attempts=1)
+        link = tcp_link(server.host, server.port, timeout_s=5.0, read_attempts=1)
         try:
             for device_id in devices:
                 reads_within_its_limits(Registers(name, link, device_id, profile), profile)

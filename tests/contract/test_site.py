@@ -34,7 +34,7 @@ def test_every_page_of_the_documents_is_in_the_navigation(staged: Path) -> None:
 def test_every_module_of_the_science_has_a_page(staged: Path) -> None:
     pages = {path.stem for path in (staged / "docs" / "reference" / "inertial").glob("inertial*.md")}
     assert pages == set(modules())
-    assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.second_order"} <= pages
+    assert {"inertial.effects.third_order", "inertial.noise", "inertial.dynamics.spectra"} <= pages
 
 
 def test_every_relative_link_of_a_staged_page_leads_to_a_file(staged: Path) -> None:

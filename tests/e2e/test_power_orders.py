@@ -25,8 +25,7 @@ from schemas.poses import SoakPart
 from schemas.progress import silent
 from schemas.recipe import Recipe
 from stations.opening import make_plant, open_station, serve_plant
-from stations.plant.hidden.age import StressRelaxation
-from stations.plant.hidden.heat import WarmUp
+from stations.plant.hidden.device import StressRelaxation, WarmUp
 
 READER = 10
 OFF_S = 600.0

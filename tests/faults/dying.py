@@ -8,7 +8,7 @@ from pathlib import Path
 from pipelines.archive import Archive, files
 from pipelines.chain.runner import Runner
 from pipelines.jobs.job import Request
-from stations.plant.clock import PlantClock
+from stations.plant.plant import PlantClock
 
 
 def die() -> None:

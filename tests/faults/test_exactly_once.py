@@ -11,8 +11,8 @@ from stations.devices.adapters import axis_adapter
 from stations.devices.registers import Registers
 from stations.devices.table import TiltTable
 from stations.links.making import Links
-from stations.plant.clock import PlantClock
 from stations.plant.faults.proxy import ChaosProxy, WireAction
+from stations.plant.plant import PlantClock
 from stations.plant.server import PlantServer
 from stations.profile_files import load_profile
 

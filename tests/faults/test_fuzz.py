@@ -8,12 +8,13 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from long_suites import rounds
+from plant_wires import tcp_link
 from small_station import lot_of, plant_of
 
 from schemas.errors import StationError
 from schemas.station import load_station
 from stations.links.frames import crc16
-from stations.links.modbus import ModbusLink, WireLink
+from stations.links.modbus import WireLink
 from stations.links.serial_wire import SerialWire
 from stations.links.wires import TcpWire
 from stations.plant.server import PlantServer
@@ -215,7 +216,7 @@ def test_the_server_survives_malformed_requests_and_takes_no_value_from_them(fra
 
     before = state()
     with PlantServer(plant) as server:
-        sound = ModbusLink(server.host, server.port, timeout_s=5.0, read_attempts=1)
+        sound = tcp_link(server.host, server.port, timeout_s=5.0, read_attempts=1)
         for n in range(frames):
             # a connection each: what follows half a frame would be taken for its end
             with socket.create_connection((server.host, server.port), timeout=5.0) as connection, suppress(OSError):

@@ -16,7 +16,7 @@ from root_process import ROOT
 from pipelines.archive import Archive
 from pipelines.chain.chain import ORDER
 from pipelines.chain.runner import Runner
-from stations.plant.clock import PlantClock
+from stations.plant.plant import PlantClock
 
 PATIENCE_S = 120.0
 RESULTS = ("readings", "history", "verdicts", "dwells", "coefficients", "covariance", "residuals", "verification")

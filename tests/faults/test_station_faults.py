@@ -5,6 +5,7 @@ import threading
 import numpy as np
 import pytest
 from each import each
+from plant_wires import tcp_link
 from pydantic import ValidationError
 from root_process import ROOT
 from small_server import answering
@@ -25,7 +26,6 @@ from schemas.event import MemoryLog
 from schemas.fault import FaultOrder
 from schemas.poses import Pose
 from schemas.station import load_station
-from stations.links.modbus import ModbusLink
 from stations.opening import make_plant, open_station, serve_plant
 from stations.plant.server import PlantServer
 from stations.serving import serve
@@ -129,7 +129,7 @@ def test_a_write_whose_answer_is_lost_is_sent_once():
     plant = make_plant(config, lot)
     plant.inject(FaultOrder(kind="mute", serial="U000"))
     with PlantServer(plant) as server:
-        link = ModbusLink(server.host, server.port, timeout_s=0.6, read_attempts=3)
+        link = tcp_link(server.host, server.port, timeout_s=0.6, read_attempts=3)
         with pytest.raises(StationTimeout, match=r"device 11: no answer to 'write tail"):
             link.write(11, 42, [0, 0], "tail")
         assert link.read(10, 0, 1, "slots") == [8]
@@ -138,7 +138,7 @@ def test_a_write_whose_answer_is_lost_is_sent_once():
 
 def test_a_write_is_sent_once_and_a_read_as_often_as_allowed():
     with answering(lambda _: b"") as (address, heard):
-        link = ModbusLink(*address, timeout_s=0.2, read_attempts=2)
+        link = tcp_link(*address, timeout_s=0.2, read_attempts=2)
         with pytest.raises(StationTimeout, match="no answer"):
             link.write(3, 2782, [0, 0], "set point")
         assert b"".join(heard).count(bytes.fromhex("03100ade0002")) == 1
@@ -152,7 +152,7 @@ def test_a_server_that_is_gone_is_a_lost_link_with_its_address():
     plant = make_plant(load_station(), lot_of(1))
     with PlantServer(plant) as server:
         port = server.port
-        link = ModbusLink(server.host, port, timeout_s=1.0, read_attempts=2)
+        link = tcp_link(server.host, port, timeout_s=1.0, read_attempts=2)
         assert link.read(10, 0, 1, "slots") == [8]
     with pytest.raises((LinkLost, StationTimeout), match=f"127.0.0.1:{port}"):
         link.read(10, 0, 1, "slots")

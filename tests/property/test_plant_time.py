@@ -4,8 +4,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from small_station import lot_of, plant_of, station_of, write
 
-from stations.plant.hidden.heat import HysteresisPlay
-from stations.plant.hidden.springs import Creep
+from stations.plant.hidden.device import Creep, HysteresisPlay
 
 TOTAL_US = 40_000_000
 

@@ -34,7 +34,7 @@ from inertial.uncertainty.period import (
     walk_later,
 )
 from inertial.uncertainty.propagation import fit_design, norm_errors, propagated
-from inertial.uncertainty.risk import guard_factor, lot_risk, outside
+from inertial.uncertainty.risk import lot_risk, outside
 from inertial.uncertainty.rounding import rounded
 from schemas.uncertainty import formula_gravity
 
@@ -327,7 +327,6 @@ def test_specific_risks_and_the_guard_band_of_two_percent() -> None:
     rows = ((485, 275, 1000), (160, 25, 200), (0, 99, 50), (42, 99, 50), (1.0, 0.1, 1.0), (0.8, 0.1, 1.0))
     risks = [outside(value, u, -limit, limit) for value, u, limit in rows]
     assert risks == pytest.approx([0.030553, 0.054799, 0.613523, 0.644166, 0.5, 0.022750], abs=6e-7)
-    assert guard_factor(0.02) == pytest.approx(2.053749, abs=1e-6)
 
 
 def effective_of(u, dof) -> float:

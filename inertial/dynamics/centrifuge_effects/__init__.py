@@ -1,7 +1,5 @@
 """Effects on the output over the acceleration of a centrifuge: each module of this package is one and is found here."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from inertial.dynamics.centrifuge_effects.base import CentrifugeEffect, Spins

@@ -1,7 +1,3 @@
-"""An arm that stretches with the square of the rate: the acceleration is larger than that of the nominal radius."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +15,5 @@ class ArmStretch(CentrifugeEffect):
     breaker: ClassVar[str] = "the radius measured at speed (optically), or the same accelerations at another radius"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         a = points.acceleration
         return np.asarray(a * np.abs(a) * points.radius_m[0] / points.radius_m, dtype=np.float64)

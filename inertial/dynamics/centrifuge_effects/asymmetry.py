@@ -1,7 +1,3 @@
-"""A scale that differs between positive and negative acceleration."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +15,5 @@ class Asymmetry(CentrifugeEffect):
     breaker: ClassVar[str] = "the same accelerations at another radius"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         a = points.acceleration
         return np.asarray(np.abs(a), dtype=np.float64)

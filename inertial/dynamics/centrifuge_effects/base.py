@@ -1,7 +1,5 @@
 """Base class of the effects on a centrifuge test, and the conditions of its points."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
@@ -29,7 +27,7 @@ class Spins:
     slowing: Array
     radius_error_m: float = 0.0
 
-    def picked(self, rows: NDArray[np.bool_]) -> Spins:
+    def picked(self, rows: NDArray[np.bool_]) -> "Spins":
         """The points of the selected rows (n,)."""
         return Spins(
             self.acceleration[rows], self.radius_m[rows], self.order[rows], self.slowing[rows], self.radius_error_m

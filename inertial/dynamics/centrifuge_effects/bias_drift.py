@@ -1,7 +1,3 @@
-"""A bias that drifts during the test."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,5 +15,4 @@ class BiasDrift(CentrifugeEffect):
     breaker: ClassVar[str] = "bias before and after at rest; the speeds in another order"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         return np.asarray(points.order - 0.5, dtype=np.float64)

@@ -1,7 +1,3 @@
-"""An output that differs between rising and falling speed."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +15,5 @@ class Hysteresis(CentrifugeEffect):
     breaker: ClassVar[str] = "the same speeds up and down again"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         a = points.acceleration
         return np.asarray(points.slowing * a, dtype=np.float64)

@@ -1,7 +1,3 @@
-"""An offset of the proof mass from the turning centre of the mounting: the radius changes when the unit is reversed."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +15,5 @@ class MassOffset(CentrifugeEffect):
     breaker: ClassVar[str] = "the same accelerations at another radius"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         a = points.acceleration
         return np.asarray(np.abs(a) * points.radius_m[0] / points.radius_m, dtype=np.float64)

@@ -1,7 +1,3 @@
-"""An odd quadratic nonlinearity: a quadratic term whose sign follows the acceleration."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +15,5 @@ class OddQuadratic(CentrifugeEffect):
     breaker: ClassVar[str] = "the radius measured at speed (optically), or the same accelerations at another radius"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         a = points.acceleration
         return np.asarray(a * np.abs(a), dtype=np.float64)

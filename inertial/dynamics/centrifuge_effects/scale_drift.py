@@ -1,7 +1,3 @@
-"""A sensitivity that drifts during the test, as by the heat of windage."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +15,5 @@ class ScaleDrift(CentrifugeEffect):
     breaker: ClassVar[str] = "the temperature of the unit logged; the speeds in another order"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         a = points.acceleration
         return np.asarray((points.order - 0.5) * a, dtype=np.float64)

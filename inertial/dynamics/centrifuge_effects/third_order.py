@@ -1,7 +1,3 @@
-"""A cubic nonlinearity of the sensing element."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,6 +15,5 @@ class ThirdOrder(CentrifugeEffect):
     breaker: ClassVar[str] = "points at higher accelerations, in both mountings"
 
     def column(self, points: Spins) -> Array:
-        """The term (n,)."""
         a = points.acceleration
         return np.asarray(a**3, dtype=np.float64)

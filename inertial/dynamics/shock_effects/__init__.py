@@ -1,7 +1,5 @@
 """Effects on a shock comparison: each module of this package is one and is found here."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from inertial.dynamics.effect_modules import effects_of

@@ -1,7 +1,3 @@
-"""A reference that is AC-coupled: its peak is low and it undershoots after the pulse, with the time constant RC."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -16,16 +12,12 @@ class AcCoupledReference(ShockEffect):
     id: ClassVar[str] = "ac_coupled_reference"
     equation: ClassVar[str] = "u = r + ∫r dt/RC"
     source: ClassVar[str] = "charge amplifier, IEPE sensor: one-pole high-pass"
+    unit: ClassVar[str] = "s"
     breaker: ClassVar[str] = (
         "shocks in the other direction, and a longer record after the pulse: the output returns with RC"
     )
 
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
-        return "s"
-
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (
             Parameter(
                 "coupling_s",
@@ -38,6 +30,5 @@ class AcCoupledReference(ShockEffect):
         )
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
-        """The waveform (n,)."""
         whole = np.concatenate([[0.0], np.cumsum(0.5 * (wave[1:] + wave[:-1]))]) / rate_hz
         return np.asarray(wave + whole / values[0])

@@ -1,8 +1,5 @@
 """Base class of the effects on a shock comparison."""
 
-from __future__ import annotations
-
-from abc import ABC, abstractmethod
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -15,17 +12,19 @@ from inertial.dynamics.transfer_effects.base import Parameter
 Array = NDArray[np.float64]
 
 
-class ShockEffect(ABC):
+class ShockEffect:
     """How the unit's waveform departs from that of the reference. Every module of this package defines one class.
 
     A waveform effect changes the reference's waveform; an added effect adds a waveform with a linear coefficient.
 
     id : name of the module · equation, source : text for reports · breaker : measurement that separates it from other effects
+    unit : of the coefficient, or of the first parameter
     """
 
     id: ClassVar[str]
     equation: ClassVar[str]
     source: ClassVar[str]
+    unit: ClassVar[str]
     breaker: ClassVar[str]
 
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
@@ -39,10 +38,6 @@ class ShockEffect(ABC):
     def added(self, wave: Array, rate_hz: float) -> Array | None:
         """The waveform (n,) that is added with a coefficient of its own; None for an effect on the waveform."""
         return None
-
-    @abstractmethod
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
 
 
 def corner(name: str, duration_s: float) -> Parameter:

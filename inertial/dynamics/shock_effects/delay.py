@@ -1,7 +1,3 @@
-"""A delay between the channels: converter, linear-phase filter, time base."""
-
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import ClassVar
 
@@ -18,18 +14,13 @@ class Delay(ShockEffect):
     id: ClassVar[str] = "delay"
     equation: ClassVar[str] = "u(t) = r(t − τ)"
     source: ClassVar[str] = "time base"
+    unit: ClassVar[str] = "s"
     breaker: ClassVar[str] = "a shared trigger edge on both channels"
 
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
-        return "s"
-
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (Parameter("delay_s", "s", -0.3 * duration_s, 0.3 * duration_s, (0.0,)),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
-        """The waveform (n,)."""
         time = np.arange(len(wave)) / rate_hz
         return np.asarray(_spline(wave.tobytes(), rate_hz)(np.clip(time - values[0], time[0], time[-1])))
 

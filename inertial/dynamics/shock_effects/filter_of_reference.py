@@ -1,7 +1,3 @@
-"""A low-pass on the channel of the reference that the unit does not have: filters that do not match."""
-
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import ClassVar
 
@@ -18,18 +14,13 @@ class FilterOfReference(ShockEffect):
     id: ClassVar[str] = "filter_of_reference"
     equation: ClassVar[str] = "two-pole Butterworth at f_c behind the reference"
     source: ClassVar[str] = "SAE J211; equal filters on both channels"
+    unit: ClassVar[str] = "Hz"
     breaker: ClassVar[str] = "equal filters on both channels, with a corner of 2/D or more"
 
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
-        return "Hz"
-
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (corner("reference_filter_hz", duration_s),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
-        """The waveform (n,)."""
         w = 2.0 * np.pi * float(values[0])
         first, second = _derivatives(wave.tobytes(), rate_hz)
         return np.asarray(wave + np.sqrt(2.0) / w * first + second / w**2)

@@ -1,7 +1,3 @@
-"""A low-pass on the channel of the unit that the reference does not have: filters that do not match."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -16,17 +12,12 @@ class FilterOfUnit(ShockEffect):
     id: ClassVar[str] = "filter_of_unit"
     equation: ClassVar[str] = "two-pole Butterworth at f_c behind the unit"
     source: ClassVar[str] = "SAE J211; equal filters on both channels"
+    unit: ClassVar[str] = "Hz"
     breaker: ClassVar[str] = "equal filters on both channels, with a corner of 2/D or more"
 
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
-        return "Hz"
-
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (corner("filter_hz", duration_s),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
-        """The waveform (n,)."""
         w = 2.0 * np.pi * float(values[0])
         return through(wave, rate_hz, [1.0], [1.0 / w**2, np.sqrt(2.0) / w, 1.0])

@@ -1,7 +1,3 @@
-"""A resonance of the mounting between the reference and the unit."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -16,14 +12,10 @@ class MountingResonance(ShockEffect):
     id: ClassVar[str] = "mounting_resonance"
     equation: ClassVar[str] = "(1 + 2jζr)/(1 − r² + 2jζr), r = f/f_m"
     source: ClassVar[str] = "sprung mass on its mounting"
+    unit: ClassVar[str] = "Hz"
     breaker: ClassVar[str] = "another torque, adhesive or fixture"
 
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
-        return "Hz"
-
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (
             Parameter(
                 "mounting_hz",
@@ -37,6 +29,5 @@ class MountingResonance(ShockEffect):
         )
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
-        """The waveform (n,)."""
         w, z = 2.0 * np.pi * float(values[0]), float(values[1])
         return through(wave, rate_hz, [2.0 * z / w, 1.0], [1.0 / w**2, 2.0 * z / w, 1.0])

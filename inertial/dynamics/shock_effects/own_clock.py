@@ -1,7 +1,3 @@
-"""A clock of the device that departs from that of the reference: the pulse is stretched."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -17,18 +13,13 @@ class OwnClock(ShockEffect):
     id: ClassVar[str] = "own_clock"
     equation: ClassVar[str] = "u(t) = r(t·(1 + ε))"
     source: ClassVar[str] = "time base"
+    unit: ClassVar[str] = "share"
     breaker: ClassVar[str] = "a sweep, or a shared sample clock"
 
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
-        return "share"
-
     def parameters(self, duration_s: float) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (Parameter("clock_share", "1", -0.05, 0.05, (0.0,)),)
 
     def changed(self, wave: Array, rate_hz: float, values: Array) -> Array:
-        """The waveform (n,)."""
         time = np.arange(len(wave)) / rate_hz
         middle = time[int(np.argmax(np.abs(wave)))]
         at = np.clip(middle + (time - middle) * (1.0 + values[0]), time[0], time[-1])

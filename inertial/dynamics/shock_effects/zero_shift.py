@@ -1,7 +1,3 @@
-"""A zero of the unit that shifts with the pulse and stays, with one sign for shocks of both directions."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -15,13 +11,9 @@ class ZeroShift(ShockEffect):
     id: ClassVar[str] = "zero_shift"
     equation: ClassVar[str] = "z·∫|r|dt, of its final value"
     source: ClassVar[str] = "mechanism: change of stress in the sensing element or its mounting"
+    unit: ClassVar[str] = "g"
     breaker: ClassVar[str] = "shocks in the other direction, and a longer record after the pulse: the shift stays"
 
-    def unit(self) -> str:
-        """Unit of the coefficient or of the first parameter."""
-        return "g"
-
     def added(self, wave: Array, rate_hz: float) -> Array:
-        """The waveform (n,) of a coefficient of 1."""
         whole = np.cumsum(np.abs(wave))
         return np.asarray(whole / whole[-1])

@@ -1,7 +1,3 @@
-"""A sensitivity that depends on the amplitude: cubic nonlinearity seen by a sine."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,12 +14,10 @@ class Amplitude(TransferEffect):
     breaker: ClassVar[str] = "one frequency at several levels"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(points.level.max())
         return (Parameter("cubic_share_g2", "1/g²", -0.5 / top**2, 0.5 / top**2, (0.0,)),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         return np.asarray(1.0 + 0.75 * values[0] * points.level**2, dtype=np.complex128)
 
     def seen(self, points: Conditions) -> bool:

@@ -1,7 +1,5 @@
 """What an effect on a transfer function is, and the conditions of the points of a sweep."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
@@ -39,7 +37,7 @@ class Conditions:
     temperature: Array
     record_s: Array
 
-    def picked(self, rows: NDArray[np.bool_]) -> Conditions:
+    def picked(self, rows: NDArray[np.bool_]) -> "Conditions":
         """Some of the points."""
         return Conditions(self.frequency[rows], self.level[rows], self.temperature[rows], self.record_s[rows])
 

@@ -1,7 +1,3 @@
-"""A delay that is the same at all frequencies: linear-phase filter, converter, time base."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,10 +14,8 @@ class Delay(TransferEffect):
     breaker: ClassVar[str] = "a shared trigger edge on both channels"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         reach = 2.0 / float(points.frequency.max())
         return (Parameter("delay_s", "s", -reach, 10.0 * reach, (0.0, 0.05 * reach)),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         return np.asarray(np.exp(-2j * np.pi * points.frequency * values[0]), dtype=np.complex128)

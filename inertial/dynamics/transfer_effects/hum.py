@@ -1,7 +1,3 @@
-"""Mains hum by a cable or ground loop, on the points within the resolution of its lines."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,14 +14,12 @@ class Hum(TransferEffect):
     breaker: ClassVar[str] = "move the points away from the mains lines; record with the exciter off"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (
             Parameter("hum_real_g", "g", -100.0, 100.0, (0.0,)),
             Parameter("hum_imaginary_g", "g", -100.0, 100.0, (0.0,)),
         )
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         hit = _near_mains(points)
         return np.asarray(1.0 + hit * (values[0] + 1j * values[1]) / points.level, dtype=np.complex128)
 

@@ -1,7 +1,3 @@
-"""A resonance of the mounting between the reference and the device."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,14 +14,12 @@ class MountingResonance(TransferEffect):
     breaker: ClassVar[str] = "another torque, adhesive or fixture"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         return (
             Parameter("mount_hz", "Hz", *_reach(points), _starts(points), log=True),
             Parameter("mount_damping", "1", 2e-3, 0.5, (0.03,), log=True),
         )
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         ratio = points.frequency / values[0]
         return np.asarray(
             (1.0 + 2j * values[1] * ratio) / (1.0 - ratio**2 + 2j * values[1] * ratio), dtype=np.complex128

@@ -1,7 +1,3 @@
-"""A moving average of length T, as of a decimating filter: linear phase."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,12 +15,10 @@ class MovingAverage(TransferEffect):
     in_every_device: ClassVar[bool] = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(points.frequency.max())
         starts = tuple(share / top for share in (0.1, 0.4, 0.8, 1.3, 1.8, 2.6, 3.6))
         return (Parameter("average_s", "s", 1e-3 / top, 5.0 / top, starts, log=True),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         turn = points.frequency * values[0]
         return np.asarray(np.sinc(turn) * np.exp(-1j * np.pi * turn), dtype=np.complex128)

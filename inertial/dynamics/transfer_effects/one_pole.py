@@ -1,7 +1,3 @@
-"""A one-pole low-pass behind the sensing element: RC filter of the output."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,10 +15,8 @@ class OnePole(TransferEffect):
     in_every_device: ClassVar[bool] = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(points.frequency.max())
         return (Parameter("one_pole_hz", "Hz", 0.05 * top, 200.0 * top, (0.5 * top, 2.0 * top, 10.0 * top), log=True),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         return np.asarray(1.0 / (1.0 + 1j * points.frequency / values[0]), dtype=np.complex128)

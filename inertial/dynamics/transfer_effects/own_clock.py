@@ -1,7 +1,3 @@
-"""A clock of the device that departs from the reference, where the fit was made at the given frequency."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,12 +14,10 @@ class OwnClock(TransferEffect):
     breaker: ClassVar[str] = "fit the frequency too, or share a clock or sync edge"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(np.max(points.frequency * points.record_s))
         return (Parameter("clock_share", "1", 1e-3 / top, 0.95 / top, (0.1 / top, 0.4 / top), log=True),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         return np.asarray(np.sinc(values[0] * points.frequency * points.record_s), dtype=np.complex128)
 
     def seen(self, points: Conditions) -> bool:

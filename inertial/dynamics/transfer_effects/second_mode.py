@@ -1,7 +1,3 @@
-"""A second mode: a resonance of fixture or case that adds to the motion of the sensing element."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,7 +14,6 @@ class SecondMode(TransferEffect):
     breaker: ClassVar[str] = "turn the unit about its axis, or move it on the fixture"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(points.frequency.max())
         starts = tuple(float(top * share) for share in np.geomspace(0.1, 0.98, 14))
         return (
@@ -28,7 +23,6 @@ class SecondMode(TransferEffect):
         )
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         ratio = points.frequency / values[0]
         mode = ratio**2 / (1.0 - ratio**2 + 2j * values[1] * ratio)
         return np.asarray(1.0 + values[2] * mode, dtype=np.complex128)

@@ -1,7 +1,3 @@
-"""A sprung mass: second-order response of the sensing element."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,7 +14,6 @@ class SecondOrder(TransferEffect):
     breaker: ClassVar[str] = "points beyond the natural frequency"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         low, top = float(points.frequency.min()), float(points.frequency.max())
         starts = tuple(float(f) for f in np.geomspace(max(low, 0.05 * top), 4.0 * top, 9))
         return (
@@ -27,6 +22,5 @@ class SecondOrder(TransferEffect):
         )
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         ratio = points.frequency / values[0]
         return np.asarray(1.0 / (1.0 - ratio**2 + 2.0j * values[1] * ratio), dtype=np.complex128)

@@ -1,7 +1,3 @@
-"""A sensitivity that follows the temperature during the sweep."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -18,12 +14,10 @@ class Temperature(TransferEffect):
     breaker: ClassVar[str] = "the same frequencies at another temperature"
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         span = float(np.ptp(points.temperature))
         return (Parameter("tempco_per_K", "1/K", -0.2 / span, 0.2 / span, (0.0,)),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         return np.asarray(1.0 + values[0] * (points.temperature - points.temperature.mean()), dtype=np.complex128)
 
     def seen(self, points: Conditions) -> bool:

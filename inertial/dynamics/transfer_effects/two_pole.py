@@ -1,7 +1,3 @@
-"""A two-pole Butterworth low-pass behind the sensing element."""
-
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
@@ -19,11 +15,9 @@ class TwoPole(TransferEffect):
     in_every_device: ClassVar[bool] = True
 
     def parameters(self, points: Conditions) -> tuple[Parameter, ...]:
-        """The parameters."""
         top = float(points.frequency.max())
         return (Parameter("two_pole_hz", "Hz", 0.05 * top, 100.0 * top, (0.6 * top, 1.5 * top, 5.0 * top), log=True),)
 
     def factor(self, points: Conditions, values: Array) -> Complex:
-        """The factor (n,) at the points."""
         ratio = points.frequency / values[0]
         return np.asarray(1.0 / (1.0 - ratio**2 + 1j * np.sqrt(2.0) * ratio), dtype=np.complex128)

@@ -1,15 +1,11 @@
 """Centrifuges and rate tables that speak as the ACUTROL 3000, with a recorder that leaves a result file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from pathlib import Path
 from typing import ClassVar
 
 from schemas.errors import OperatorNeeded, StationTimeout
-from stations.devices.equipment import Equipment
+from stations.devices.equipment import RecordingEquipment
 from stations.devices.recording import Recording, RecordingSpoilt
-from stations.devices.result_files import read_recording
 
 POLL_S = 0.5
 PATIENCE_S = 600.0
@@ -19,19 +15,12 @@ SAME_MOUNTING = 1e-5  # m, or of the direction
 OVERSPEED = 1.02  # of the larger of the rate at the start and the ordered one, and a degree a second
 
 
-class Acutrol(Equipment):
+class Acutrol(RecordingEquipment):
     """Absolute rates, each read back; standing means below 0.01 °/s, then the interlock opens."""
 
     needs: ClassVar[tuple[str, ...]] = (
-        "rate",
-        "interlock",
-        "mode",
-        "rate_read",
-        "fault",
-        "record",
-        "direction",
-        "file",
-    )
+        "rate", "interlock", "mode", "rate_read", "fault", "record", "direction", "file",
+    )  # fmt: skip
 
     def spin(
         self, rate_deg_s: float, direction: int, seconds: float, slots: Sequence[int], radius_m: float | None = None
@@ -51,9 +40,7 @@ class Acutrol(Equipment):
         """
         self._require_no_fault()
         self._mount({"direction": float(direction)} | self._radius(radius_m))
-        self.values.write("interlock", "close 1")
-        self.values.write("mode", "rate 1")
-        self.values.write("rate", rate_deg_s)
+        self.write_all(interlock="close 1", mode="rate 1", rate=rate_deg_s)
         self._wait(rate_deg_s, REACHED * max(rate_deg_s, 1.0))
         before = self.values.text("file")
         self.values.write("record", seconds)
@@ -65,10 +52,7 @@ class Acutrol(Equipment):
             raise RecordingSpoilt(
                 f"{self.name}: {rate:g} °/s after the record, {rate_deg_s:g} °/s is needed; check the drive"
             )
-        path = self.values.text("file")
-        if path in {before, "NONE"}:
-            raise RecordingSpoilt(f"{self.name}: no recording, the trigger was missed; check the recorder")
-        return read_recording(Path(path), list(slots), self.name)
+        return self.recorded(before, slots)
 
     def _radius(self, radius_m: float | None) -> dict[str, float]:
         return {} if radius_m is None or not self.values.has("radius") else {"radius": radius_m}
@@ -78,8 +62,7 @@ class Acutrol(Equipment):
         if self._mounted(wanted):
             return
         self.stop()
-        for name, value in wanted.items():
-            self.values.write(name, value)
+        self.write_all(**wanted)
         end = self.clock.now() + PATIENCE_S
         while not self._mounted(wanted):
             if self.clock.now() > end:

@@ -1,38 +1,26 @@
 """Shock machines with arm, release and guard door, and a triggered recorder that leaves a result file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from schemas.errors import OperatorNeeded, StationTimeout
-from stations.devices.equipment import Equipment
+from schemas.errors import OperatorNeeded
+from stations.devices.equipment import RecordingEquipment
+from stations.devices.exciter_limits import FEWEST_FLAT, refuse_flat
 from stations.devices.recording import Recording, RecordingSpoilt
-from stations.devices.result_files import read_recording
 
 POLL_S = 0.2
 PATIENCE_S = 60.0
 PEAK_SHARE = 0.2  # IEC 60068-2-27: peak within ± 20 %
 
 
-class ShockMachine(Equipment):
+class ShockMachine(RecordingEquipment):
     """One shock an order: set, armed, released; the machine disarms itself after the shock."""
 
     needs: ClassVar[tuple[str, ...]] = (
-        "peak",
-        "duration",
-        "axis",
-        "direction",
-        "arm",
-        "release",
-        "door",
-        "state",
-        "file",
-    )
-
+        "peak", "duration", "axis", "direction", "arm", "release", "door", "state", "file",
+    )  # fmt: skip
     on: ClassVar[str | int] = "ON"  # what is written, in the form of the controller
     off: ClassVar[str | int] = "OFF"
     now: ClassVar[str | int] = "NOW"
@@ -51,16 +39,12 @@ class ShockMachine(Equipment):
             raise OperatorNeeded(
                 f"{self.name}: the guard door is open, closed is needed; close it and give the command again"
             )
-        for name, value in (
-            ("peak", peak),
-            ("duration", 1e3 * seconds),
-            ("axis", float(axis)),
-            ("direction", float(direction)),
-        ):
-            self.values.write(name, value)
+        self.write_all(peak=peak, duration=1e3 * seconds, axis=float(axis), direction=float(direction))
         before = self.values.text("file")
         try:
-            state = self._released()
+            self.write_all(arm=self.on, release=self.now)
+            late = f"no shock within {PATIENCE_S:g} s of the release; check the machine"
+            state = self.ended(PATIENCE_S, POLL_S, late)
         except BaseException:
             self.make_safe()  # armed, and nobody waits for the shock
             raise
@@ -69,23 +53,9 @@ class ShockMachine(Equipment):
             raise OperatorNeeded(
                 f"{self.name}: the guard door was opened, the shock was not released; close it, then again"
             )
-        path = self.values.text("file")
-        if path in {before, "NONE"}:
-            raise RecordingSpoilt(f"{self.name}: no recording of the shock, the trigger was missed; check the recorder")
-        recording = read_recording(Path(path), list(slots), self.name)
+        recording = self.recorded(before, slots, "recording of the shock")
         _refuse_wrong_pulse(recording.reference[:, axis] * direction, peak, self.name)
         return recording
-
-    def _released(self) -> str:
-        """Arms and releases; the machine's state after the shock."""
-        self.values.write("arm", self.on)
-        self.values.write("release", self.now)
-        end = self.clock.now() + PATIENCE_S
-        while (state := self.values.text("state")) == "RUN":
-            if self.clock.now() > end:
-                raise StationTimeout(f"{self.name}: no shock within {PATIENCE_S:g} s of the release; check the machine")
-            self.clock.sleep(POLL_S)
-        return state
 
     def make_safe(self) -> None:
         """Disarms the machine."""
@@ -95,10 +65,6 @@ class ShockMachine(Equipment):
 def _refuse_wrong_pulse(driven: np.ndarray, peak: float, name: str) -> None:
     """Refuse a reference that is clipped, or a peak that was not reached."""
     reached = float(driven.max())
-    flat = int(np.count_nonzero(driven > 0.9999 * reached))
-    if flat > max(20, 0.02 * int(np.count_nonzero(driven > 0.1 * reached))):
-        raise RecordingSpoilt(
-            f"{name}: the reference is clipped at {reached:.4g} g; choose a larger range of its conditioner"
-        )
+    refuse_flat(driven, name, max(FEWEST_FLAT, 0.02 * int(np.count_nonzero(driven > 0.1 * reached))), 0.9999)
     if not abs(reached / peak - 1.0) <= PEAK_SHARE:
         raise RecordingSpoilt(f"{name}: peak {reached:.4g} g, {peak:g} g ± 20 % was ordered; check height or pressure")

@@ -1,7 +1,5 @@
 """Binder MB1 and MB2."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.devices.chamber import AUTOMATIC, ThermalChamber, refuse_program

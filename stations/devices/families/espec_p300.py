@@ -1,7 +1,5 @@
 """ESPEC P300."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from schemas.errors import OperatorNeeded

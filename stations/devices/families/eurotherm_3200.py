@@ -1,7 +1,5 @@
 """Eurotherm 3200."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.devices.chamber import AUTOMATIC, ThermalChamber, refuse_program

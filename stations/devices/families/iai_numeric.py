@@ -1,7 +1,5 @@
 """IAI ROBO Cylinder controllers in direct numerical mode: the low word of the target starts the move."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.devices.axis import DriveState, TableAxis

@@ -1,7 +1,5 @@
 """Shock machines whose controller holds registers, with a triggered recorder that leaves a result file."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.devices.families import arm_release_shock

@@ -1,7 +1,5 @@
 """Oriental Motor AZ drives in direct data operation: one request holds the whole move with its trigger."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.devices.axis import DriveState, TableAxis

@@ -1,18 +1,14 @@
 """Function generator with a multichannel recorder, by SCPI: before an exciter's amplifier, or at the self-test inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from schemas.errors import OperatorNeeded, StationRefused, StationTimeout
-from stations.devices.equipment import Equipment
-from stations.devices.exciter_limits import refuse_motion, tone_level
-from stations.devices.recording import Recording, RecordingSpoilt
-from stations.devices.result_files import STANDARD_GRAVITY, read_recording
+from schemas.errors import OperatorNeeded
+from stations.devices.equipment import RecordingEquipment
+from stations.devices.exciter_limits import FLAT_SHARE_OF_SINE, refuse_flat, refuse_motion, tone_level
+from stations.devices.recording import STANDARD_GRAVITY, Recording, RecordingSpoilt
 
 POLL_S = 0.05
 GRACE_S = 30.0
@@ -23,32 +19,20 @@ FOLLOWS = 2.0  # factor by which the level may depart from the drive times the g
 SEEN = 6.0  # standard uncertainties by which a tone must exceed the noise of the reference
 ROUNDS = 7
 LEVEL_SHARE = 0.05  # by which the level may depart from the order when the loop ends
-FLAT_SHARE = 0.1  # of the samples within a thousandth of the extremes: a sine has less
 TRY_S = 0.1
 VOLT = {"V": 1.0}
 SHARE_OF_DRIVE = 0.2
 
 
-class ScpiGenerator(Equipment):
+class ScpiGenerator(RecordingEquipment):
     """Bursts of a finite number of cycles, so that an exciter that is left alone stops; the recorder is triggered by the burst.
 
     The generator runs open loop: the adapter finds the amplitude from the level that the reference shows.
     """
 
     needs: ClassVar[tuple[str, ...]] = (
-        "function",
-        "frequency",
-        "amplitude",
-        "cycles",
-        "output",
-        "length",
-        "before",
-        "axis",
-        "start",
-        "state",
-        "error",
-        "file",
-    )
+        "function", "frequency", "amplitude", "cycles", "output", "length", "before", "axis", "start", "state", "error", "file",
+    )  # fmt: skip
 
     def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
@@ -62,10 +46,7 @@ class ScpiGenerator(Equipment):
             largest amplitude of the generator.
         """
         refuse_motion(self.values.profile, self.name, frequency, level)
-        self.values.write("function", "SIN")
-        self.values.write("frequency", frequency)
-        self.values.write("axis", float(axis))
-        self.values.write("before", 0.0)
+        self.write_all(function="SIN", frequency=frequency, axis=float(axis), before=0.0)
         volts = self._drive_volts(frequency, level, axis, slots)
         recording = self._record(volts, frequency, seconds, slots)
         reached = self._level(recording, axis, frequency)
@@ -120,9 +101,7 @@ class ScpiGenerator(Equipment):
         RecordingSpoilt
             Missed trigger, or a drive that did not reach its voltage.
         """
-        self.values.write("function", "SQU")
-        self.values.write("frequency", 0.5 / hold_s)
-        self.values.write("before", before_s)
+        self.write_all(function="SQU", frequency=0.5 / hold_s, before=before_s)
         recording = self._record(volts, 0.5 / hold_s, before_s + 1.5 * hold_s, slots, cycles=1.0)
         driven = float(np.ptp(recording.reference[:, 0]))
         if not abs(driven / volts - 1.0) <= SHARE_OF_DRIVE:
@@ -139,9 +118,8 @@ class ScpiGenerator(Equipment):
         self, volts: float, frequency: float, seconds: float, slots: Sequence[int], cycles: float = 0.0
     ) -> Recording:
         before = self.values.text("file")
-        self.values.write("amplitude", volts)
-        self.values.write("length", seconds)
-        self.values.write("cycles", cycles or float(np.ceil(frequency * (seconds + 0.5)) + 1.0))
+        cycles = cycles or float(np.ceil(frequency * (seconds + 0.5)) + 1.0)
+        self.write_all(amplitude=volts, length=seconds, cycles=cycles)
         try:
             state = self._burst(volts, frequency, seconds)
         finally:
@@ -150,23 +128,14 @@ class ScpiGenerator(Equipment):
             raise OperatorNeeded(
                 f"{self.name}: the amplifier reports a fault; remove its cause, reset it, and give the command again"
             )
-        path = self.values.text("file")
-        if path in {before, "NONE"}:
-            raise RecordingSpoilt(f"{self.name}: no recording, the trigger was missed; check the recorder")
         units = VOLT if self.values.profile.kind == "step_generator" else STANDARD_GRAVITY
-        return read_recording(Path(path), list(slots), self.name, units)
+        return self.recorded(before, slots, units=units)
 
     def _burst(self, volts: float, frequency: float, seconds: float) -> str:
         """Starts a burst and waits for its end: the recorder's last state. The caller switches the output off."""
-        self.values.write("output", "ON")
-        self.values.write("start", "NOW")
-        self._refuse_error(f"{volts:.4g} V at {frequency:.4g} Hz")
-        end = self.clock.now() + seconds + GRACE_S
-        while (state := self.values.text("state")) == "RUN":
-            if self.clock.now() > end:
-                raise StationTimeout(f"{self.name}: still records {GRACE_S:g} s after the end; check the recorder")
-            self.clock.sleep(POLL_S)
-        return state
+        self.write_all(output="ON", start="NOW")
+        self.refuse_error(f"{volts:.4g} V at {frequency:.4g} Hz", "check its ranges")
+        return self.ended(seconds + GRACE_S, POLL_S, f"still records {GRACE_S:g} s after the end; check the recorder")
 
     def _level(self, recording: Recording, axis: int, frequency: float) -> float:
         """Peak level in g of the tone in the reference, 0 where noise hides it; a clipped reference is refused."""
@@ -174,15 +143,5 @@ class ScpiGenerator(Equipment):
         level, noise = tone_level(driven, recording.reference_rate_hz, frequency)
         if level <= SEEN * noise * np.sqrt(2.0 / driven.size):
             return 0.0
-        top = float(np.max(np.abs(driven)))
-        if float(np.mean(np.abs(driven) > 0.999 * top)) > FLAT_SHARE:
-            raise RecordingSpoilt(
-                f"{self.name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
-            )
+        refuse_flat(np.abs(driven), self.name, FLAT_SHARE_OF_SINE * driven.size)
         return level
-
-    def _refuse_error(self, what: str) -> None:
-        code = self.values.number("error")
-        if code != 0.0:
-            self.make_safe()
-            raise StationRefused(f"{self.name}: error {code:.0f} at {what}, none is needed; check its ranges")

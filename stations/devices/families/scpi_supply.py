@@ -1,7 +1,5 @@
 """Programmable power supplies that speak SCPI; the nominal setting of the devices is in the supply's memory 1."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from schemas.errors import OperatorNeeded, StationRefused
@@ -14,6 +12,7 @@ SETTLE_S = 1.0
 FARTHEST = 0.5  # share of the nominal voltage by which an order may differ from it, as procedures may ask
 ABOVE = 0.2  # share above it where the station's file states no absolute maximum
 QUEUE = 50  # errors that are read out of a supply before its first order; the queues of real ones hold 10 to 30
+REMEDY = "check limits and memory 1 of the supply"
 REACHED = 0.01  # share of the order by which the measured voltage may differ
 
 
@@ -66,7 +65,7 @@ class ScpiSupply(Equipment):
             )
         self._changed = True
         self.values.write("voltage", volt)
-        self._refuse_error(f"{volt:g} V")
+        self.refuse_error(f"{volt:g} V", REMEDY)
         self.clock.sleep(SETTLE_S)
         measured = self.values.number("measured")
         if not abs(measured - volt) <= REACHED * volt:
@@ -87,9 +86,8 @@ class ScpiSupply(Equipment):
         self._recall()
 
     def _recall(self) -> None:
-        self.values.write("recall", NOMINAL)
-        self.values.write("output", "ON")
-        self._refuse_error("the nominal setting")
+        self.write_all(recall=NOMINAL, output="ON")
+        self.refuse_error("the nominal setting", REMEDY)
         self._changed = False
 
     def _forget_errors(self) -> None:
@@ -100,10 +98,3 @@ class ScpiSupply(Equipment):
         raise StationRefused(
             f"{self.name}: {QUEUE} errors were read and its queue is not empty, an end is needed; restart the supply"
         )
-
-    def _refuse_error(self, what: str) -> None:
-        code = self.values.number("error")
-        if code != 0.0:
-            raise StationRefused(
-                f"{self.name}: error {code:.0f} at {what}, none is needed; check limits and memory 1 of the supply"
-            )

@@ -1,7 +1,5 @@
 """A controller with a set point only, such as the Watlow EZ-ZONE PM."""
 
-from __future__ import annotations
-
 from stations.devices.chamber import AUTOMATIC, ThermalChamber
 
 

@@ -1,7 +1,5 @@
 """SMC LEC controllers: coils enable the drive, step data are read back, then the start register is written alone."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.devices.axis import DriveState, TableAxis

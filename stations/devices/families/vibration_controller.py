@@ -1,39 +1,32 @@
 """Vibration controllers that a host selects, starts and reads over lines of text, with the recording in a result file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from schemas.errors import OperatorNeeded, StationTimeout
-from stations.devices.equipment import Equipment
-from stations.devices.exciter_limits import refuse_clipped_random, refuse_motion, refuse_random_motion
+from stations.devices.equipment import RecordingEquipment
+from stations.devices.exciter_limits import (
+    FLAT_SHARE_OF_SINE,
+    refuse_clipped_random,
+    refuse_flat,
+    refuse_motion,
+    refuse_random_motion,
+)
 from stations.devices.recording import Recording, RecordingSpoilt
-from stations.devices.result_files import read_recording
 
 POLL_S = 0.5
 GRACE_S = 30.0
 LEVEL_SHARE = 0.3  # by which the level that was reached may depart from the order
 
 
-class VibrationController(Equipment):
+class VibrationController(RecordingEquipment):
     """Runs its own closed loop; the host orders finite tests, so that an exciter that is left alone stops by itself."""
 
     needs: ClassVar[tuple[str, ...]] = (
-        "frequency",
-        "level",
-        "duration",
-        "axis",
-        "turn",
-        "start",
-        "stop",
-        "state",
-        "reason",
-        "file",
-    )
+        "frequency", "level", "duration", "axis", "turn", "start", "stop", "state", "reason", "file",
+    )  # fmt: skip
 
     def sine(self, frequency: float, level: float, axis: int, seconds: float, slots: Sequence[int]) -> Recording:
         """A dwell at one frequency in Hz with a peak level in g, along an axis (0 to 2) of the units.
@@ -46,8 +39,7 @@ class VibrationController(Equipment):
             The controller has aborted: its interlock or a limit must be looked after first; or the order is beyond the exciter.
         """
         refuse_motion(self.values.profile, self.name, frequency, level)
-        for name, value in (("frequency", frequency), ("level", level), ("duration", seconds), ("axis", float(axis))):
-            self.values.write(name, value)
+        self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis))
         recording = self._run("SINE", seconds, slots)
         refuse_wrong_sine(recording.reference[:, axis], frequency, level, self.name)
         return recording
@@ -65,9 +57,7 @@ class VibrationController(Equipment):
             As for :meth:`sine`.
         """
         refuse_motion(self.values.profile, self.name, frequency, level)
-        for name, value in (("frequency", frequency), ("level", level), ("duration", seconds), ("axis", float(axis))):
-            self.values.write(name, value)
-        self.values.write("turn", angle_deg)
+        self.write_all(frequency=frequency, level=level, duration=seconds, axis=float(axis), turn=angle_deg)
         recording = self._run("ACROSS", seconds, slots)
         turn = np.radians(angle_deg)
         moved = recording.reference[:, (axis + 1) % 3] * np.cos(turn) + recording.reference[:, (axis + 2) % 3] * np.sin(
@@ -85,9 +75,7 @@ class VibrationController(Equipment):
             As for :meth:`sine`; the exciter must follow peaks of three sigma.
         """
         refuse_random_motion(self.values.profile, self.name, profile, level)
-        self.values.write("profile", profile)
-        for name, value in (("level", level), ("duration", seconds), ("axis", float(axis))):
-            self.values.write(name, value)
+        self.write_all(profile=profile, level=level, duration=seconds, axis=float(axis))
         recording = self._run("RANDOM", seconds, slots)
         driven = recording.reference[:, axis]
         n = len(driven)
@@ -106,34 +94,24 @@ class VibrationController(Equipment):
     def _run(self, kind: str, seconds: float, slots: Sequence[int]) -> Recording:
         before = self.values.text("file")
         self.values.write("start", kind)
-        end = self.clock.now() + seconds + GRACE_S
-        while (state := self.values.text("state")) == "RUN":
-            if self.clock.now() > end:
-                self.make_safe()
-                raise StationTimeout(
-                    f"{self.name}: still runs {GRACE_S:g} s after the end of the test; check the controller"
-                )
-            self.clock.sleep(min(POLL_S, max(0.02, seconds)))
+        late = f"still runs {GRACE_S:g} s after the end of the test; check the controller"
+        try:
+            state = self.ended(seconds + GRACE_S, min(POLL_S, max(0.02, seconds)), late)
+        except StationTimeout:
+            self.make_safe()
+            raise
         if state == "ABORT":
             raise OperatorNeeded(
                 f"{self.name}: aborted the test ({self.values.text('reason')}); remove the cause, reset the controller, and give "
                 "the command again"
             )
-        path = self.values.text("file")
-        if path in {before, "NONE"}:
-            raise RecordingSpoilt(f"{self.name}: no recording of the test, the trigger was missed; check the recorder")
-        return read_recording(Path(path), list(slots), self.name)
+        return self.recorded(before, slots, "recording of the test")
 
 
 def refuse_wrong_sine(reference: np.ndarray, frequency: float, level: float, name: str) -> None:
     """Refuse a reference (n,) in g whose extremes are flat, or whose level is not the one that was ordered."""
     driven = reference - reference.mean()
-    top = float(np.max(np.abs(driven)))
-    share = float(np.mean(np.abs(driven) > 0.999 * top))
-    if share > 0.1:
-        raise RecordingSpoilt(
-            f"{name}: the reference is clipped at {top:.4g} g; choose a larger range of its conditioner"
-        )
+    refuse_flat(np.abs(driven), name, FLAT_SHARE_OF_SINE * driven.size)
     reached = float(np.sqrt(2.0 * np.mean(driven**2)))
     if not abs(reached / level - 1.0) <= LEVEL_SHARE:
         raise RecordingSpoilt(

@@ -1,7 +1,5 @@
 """Watlow F4."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.devices.chamber import AUTOMATIC, CELSIUS, RUNNING, ThermalChamber, refuse_program

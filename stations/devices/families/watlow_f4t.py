@@ -1,7 +1,5 @@
 """Watlow F4T."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from schemas.errors import OperatorNeeded

@@ -1,7 +1,5 @@
 """The simulated centrifuge behind an ACUTROL 3000: mountings at several radii, arm stretch, proof masses, a recorder."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -21,7 +19,7 @@ RECORD_HZ = 200.0
 IDLE_S = 900.0  # without a line for so long the machine stops by itself
 
 
-def simulated(world: World, profile: Profile) -> Centrifuge:
+def simulated(world: World, profile: Profile) -> "Centrifuge":
     """A centrifuge in front of the world's bench; its input axis is z, radial."""
     return Centrifuge(world)
 

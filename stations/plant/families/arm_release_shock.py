@@ -1,7 +1,5 @@
 """The simulated shock machine with recorder and reference sensor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from schemas.profile import Profile
@@ -15,7 +13,7 @@ BEFORE_S, AFTER_S = 0.06, 0.12
 JITTER = 0.03
 
 
-def simulated(world: World, profile: Profile) -> Machine:
+def simulated(world: World, profile: Profile) -> "Machine":
     """A machine in front of the world's bench."""
     return Machine(world)
 

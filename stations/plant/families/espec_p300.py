@@ -1,7 +1,5 @@
 """The simulated ESPEC P300, a controller with a text protocol."""
 
-from __future__ import annotations
-
 import re
 
 from schemas.profile import Profile
@@ -12,7 +10,7 @@ MODES = {"CONSTANT": True, "STANDBY": False, "OFF": False}
 UNKNOWN, OUTSIDE, WRONG = "NA:CMD ERR", "NA:DATA OUT OF RANGE", "NA:PARA ERR"
 
 
-def simulated(world: World, profile: Profile) -> P300:
+def simulated(world: World, profile: Profile) -> "P300":
     """A P300 that controls the simulated chamber."""
     return P300(world, profile)
 

@@ -1,7 +1,5 @@
 """The simulated Eurotherm 3200."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
 from stations.codec import Value
 from stations.plant.bank import Bank, Source, number

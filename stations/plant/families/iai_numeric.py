@@ -1,13 +1,11 @@
 """The simulated IAI ROBO Cylinder controller."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from schemas.profile import Profile
 from stations.codec import Value
 from stations.plant.bank import Bank, Busy
-from stations.plant.drive import start_move
+from stations.plant.controller import start_move
 from stations.plant.table import Axis
 from stations.plant.world import World
 

@@ -1,7 +1,5 @@
 """The simulated shock machine behind registers: the same machine as the one with lines of text."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from schemas.profile import Profile

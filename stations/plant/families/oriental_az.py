@@ -1,11 +1,9 @@
 """The simulated Oriental Motor AZ drive."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank, number
-from stations.plant.drive import ABSOLUTE, start_move
+from stations.plant.controller import ABSOLUTE, start_move
 from stations.plant.table import Axis
 from stations.plant.world import World
 

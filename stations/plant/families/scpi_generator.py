@@ -1,17 +1,13 @@
 """The simulated generator with recorder, before an exciter with its amplifier, or at the self-test inputs of the devices."""
 
-from __future__ import annotations
-
 import math
 
 from schemas.profile import Profile
 from stations.plant.bench import Waveforms
 from stations.plant.result_files import ResultFiles
+from stations.plant.scpi import DONE, UNDEFINED, ScpiDevice
 from stations.plant.world import World
 
-DONE = "1"
-OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
-TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}
 SETTLE_S = 0.3
 MOST_V = 10.0
 GAIN_G_V, SUSPENSION_HZ, SUSPENSION_DAMPING = 10.0, 12.0, 0.4
@@ -27,7 +23,7 @@ NUMBERS = {
 }
 
 
-def simulated(world: World, profile: Profile) -> Generator:
+def simulated(world: World, profile: Profile) -> "Generator":
     """A generator in front of the world's bench, in the role of its profile."""
     return Generator(world, steps=profile.kind == "step_generator")
 
@@ -38,15 +34,16 @@ def exciter_gain(frequency: float) -> float:
     return GAIN_G_V * r2 / math.hypot(1.0 - r2, 2.0 * SUSPENSION_DAMPING * math.sqrt(r2))
 
 
-class Generator:
+class Generator(ScpiDevice):
     """Finite bursts; a burst that is not ended is over after its cycles."""
 
     def __init__(self, world: World, *, steps: bool) -> None:
+        super().__init__()
         self._world, self._steps = world, steps
         self._set = {
             "SOUR1:FREQ": 160.0, "SOUR1:VOLT": 0.0, "SOUR1:BURS:NCYC": 1.0, "ACQ:LENG": 0.1, "ACQ:BEF": 0.0, "ROUT:AXIS": 2.0,
         }  # fmt: skip
-        self._function, self._on, self._error = "SIN", False, 0
+        self._function, self._on = "SIN", False
         self._number, self._start_us, self._until_us, self._fault = 0, 0, 0, False
         self._there, self._conditions = False, frozenset[str]()
         self._files = ResultFiles()
@@ -57,7 +54,8 @@ class Generator:
             return self._report(line[:-1])
         head, _, value = line.removesuffix(";*OPC?").partition(" ")
         if head in NUMBERS:
-            self._number_order(head, value)
+            number = self.ordered(value, *NUMBERS[head])
+            self._set[head] = self._set[head] if number is None else number
         elif head == "SOUR1:FUNC" and value in {"SIN", "SQU"}:
             self._function = value
         elif head == "OUTP1" and value in {"ON", "OFF"}:
@@ -67,26 +65,13 @@ class Generator:
         elif head == "INIT":
             self._begin()
         else:
-            self._error = UNDEFINED
+            self.error = UNDEFINED
         return DONE, True
-
-    def _number_order(self, head: str, value: str) -> None:
-        low, high = NUMBERS[head]
-        try:
-            number = float(value)
-        except ValueError:
-            self._error = UNDEFINED
-            return
-        if low <= number <= high:
-            self._set[head] = number
-        else:
-            self._error = OUT_OF_RANGE
 
     def _report(self, head: str) -> tuple[str, bool]:
         world = self._world
         if head == "SYST:ERR":
-            code, self._error = self._error, 0
-            return f'{code},"{TEXTS[code]}"', code != 0
+            return self.told_error()
         if head == "ACQ:STAT":
             return ("FAULT" if self._fault else "RUN" if world.now_us < self._until_us else "DONE"), False
         if head == "ACQ:FILE":

@@ -1,30 +1,26 @@
 """The simulated programmable power supply of the devices."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
+from stations.plant.scpi import DONE, UNDEFINED, ScpiDevice
 from stations.plant.world import World
 
-DONE = "1"
-OUT_OF_RANGE, UNDEFINED = -222, -113  # SCPI-99, 21.8.10 and 21.8.9
-TEXTS = {0: "No error", OUT_OF_RANGE: "Data out of range", UNDEFINED: "Undefined header"}
 DROP = 0.9  # of the set voltage, where the current limit holds it
 
 
-def simulated(world: World, profile: Profile) -> Supply:
+def simulated(world: World, profile: Profile) -> "Supply":
     """A supply of all devices of the world."""
     return Supply(world, profile)
 
 
-class Supply:
+class Supply(ScpiDevice):
     """Follows its setting at once; in its current limit the voltage is lower."""
 
     def __init__(self, world: World, profile: Profile) -> None:
+        super().__init__()
         self._world = world
         self._nominal = world.preset.supply_V
         self._set = self._nominal
         self._on = True
-        self._error = 0
         command = profile.command("voltage")
         self._range = (command.minimum or 0.0, command.maximum or 60.0)
 
@@ -38,29 +34,18 @@ class Supply:
         if line == "OUTP?":
             return str(int(self._on)), False
         if line == "SYST:ERR?":
-            code, self._error = self._error, 0
-            return f'{code},"{TEXTS[code]}"', code != 0
+            return self.told_error()
         if head == "VOLT":
-            self._order(value)
+            volt = self.ordered(value, *self._range)
+            self._set = self._set if volt is None else volt
         elif head == "OUTP" and value in {"ON", "OFF"}:
             self._on = value == "ON"
         elif head == "*RCL" and value == "1":
             self._set = self._nominal
         elif line != "*OPC?":
-            self._error = UNDEFINED
+            self.error = UNDEFINED
         self._apply()
         return DONE, line != "*OPC?"
-
-    def _order(self, value: str) -> None:
-        try:
-            volt = float(value)
-        except ValueError:
-            self._error = UNDEFINED
-            return
-        if not self._range[0] <= volt <= self._range[1]:
-            self._error = OUT_OF_RANGE
-            return
-        self._set = volt
 
     def _voltage(self) -> float:
         limited = "current_limit" in self._world.bench.conditions and self._set > self._nominal

@@ -1,7 +1,5 @@
 """A simulated controller with a set point only."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
 from stations.plant.bank import Bank
 from stations.plant.controller import controller_bank, set_by

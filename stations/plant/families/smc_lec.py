@@ -1,13 +1,11 @@
 """The simulated SMC LEC controller."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value
 from stations.plant.bank import Bank
-from stations.plant.drive import ABSOLUTE, start_move
+from stations.plant.controller import ABSOLUTE, start_move
 from stations.plant.table import Axis
 from stations.plant.world import World
 

@@ -1,7 +1,5 @@
 """The simulated vibration controller with exciter, recorder and reference sensor."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +21,7 @@ REST_S = 1.0
 RAMP_S = 0.05
 
 
-def simulated(world: World, profile: Profile) -> Controller:
+def simulated(world: World, profile: Profile) -> "Controller":
     """A controller in front of the world's bench."""
     return Controller(world, profile)
 

@@ -1,7 +1,5 @@
 """The simulated Watlow F4."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
 from stations.plant.bank import Bank, Source
 from stations.plant.controller import controller_bank, set_by

@@ -1,7 +1,5 @@
 """The simulated Watlow F4T."""
 
-from __future__ import annotations
-
 from schemas.profile import Profile
 from stations.codec import NotEncodable, Value, named
 from stations.plant.bank import Bank, Source, number

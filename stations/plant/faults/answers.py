@@ -1,14 +1,10 @@
 """Faults of a device's answers: exceptions, no answer, writes that are ignored or incomplete."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from stations.plant.faults.base import AXES, DEVICES, MUTE, UNIT, Fault
-from stations.plant.faults.proxy import WireAction
-from stations.plant.faults.wire import WireFault
 
 
 @dataclass
@@ -43,13 +39,7 @@ class Mute(Fault):
 
     kind: ClassVar[str] = "mute"
     targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
-
-    def answers(self) -> int:
-        """No answer."""
-        return MUTE
-
-
-NO_RESPONSE = 11  # gateway target device failed to respond (Modbus Application Protocol 1.1b3, 7)
+    exception: ClassVar[int] = MUTE
 
 
 @dataclass
@@ -58,24 +48,7 @@ class Silent(Fault):
 
     kind: ClassVar[str] = "silent"
     targets: ClassVar[tuple[str, ...]] = (UNIT, *DEVICES)
-
-    def answers(self) -> int:
-        """The gateway's exception."""
-        return NO_RESPONSE
-
-
-@dataclass
-class TimeOut(WireFault):
-    """The answer to a request is lost: the device has acted, and the client cannot know it."""
-
-    kind: ClassVar[str] = "time_out"
-
-    def wire_action(self) -> WireAction:
-        """Drops the answer."""
-        return WireAction("drop")
-
-
-FAILURE = 4
+    exception: ClassVar[int] = 11  # gateway target device failed to respond (Modbus Application Protocol 1.1b3, 7)
 
 
 @dataclass
@@ -93,4 +66,4 @@ class PartialWrite(Fault):
         if held is not None:
             half = len(words) // 2
             write(words[:half] + held[half:])
-        return FAILURE
+        return 4  # server device failure

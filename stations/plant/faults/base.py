@@ -1,13 +1,10 @@
 """The base class of the kinds of faults; each kind overrides what it changes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from schemas.fault import FaultOrder
-from stations.plant.faults.proxy import WireAction
 from stations.plant.table import Axis
 from stations.plant.world import World
 
@@ -28,6 +25,7 @@ class Fault:
 
     kind: ClassVar[str] = ""
     targets: ClassVar[tuple[str, ...]] = ()
+    exception: ClassVar[int] = 0
 
     order: FaultOrder = field(init=False, repr=False)
     device_id: int = field(init=False, default=0, repr=False)
@@ -41,7 +39,7 @@ class Fault:
 
     def answers(self) -> int:
         """The exception code with which the device answers every request; 0 where it answers normally."""
-        return 0
+        return self.exception
 
     def on_read(self, now_us: int, address: int, words: list[int]) -> list[int]:
         """The words that the device reports in place of ``words``."""
@@ -58,10 +56,6 @@ class Fault:
         """
         write(words)
         return 0
-
-    def wire_action(self) -> WireAction | None:
-        """What happens to a frame on the wire; None where it passes unchanged."""
-        return None
 
     def axis(self, world: World) -> Axis:
         """The axis that has the fault."""

@@ -1,7 +1,5 @@
 """The kinds of faults: every class with a kind in a module of this folder."""
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Mapping, Sequence
 from dataclasses import fields

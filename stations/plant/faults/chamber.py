@@ -1,75 +1,86 @@
 """Faults of the chamber, the emergency stop and vibration."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from stations.plant.chamber import Chamber
 from stations.plant.faults.base import Fault
 from stations.plant.world import World
 
 
+class _ChamberFault(Fault):
+    """A fault that sets one attribute of the simulated chamber while it lasts."""
+
+    attribute: ClassVar[str]
+
+    def setting(self) -> Any:
+        """What the attribute is meanwhile."""
+        return True
+
+    def begins(self, world: World) -> None:
+        """Sets the attribute."""
+        setattr(world.fixture.chamber, self.attribute, self.setting())
+
+    def ends(self, world: World) -> None:
+        """Sets it to what it is in a sound chamber."""
+        setattr(world.fixture.chamber, self.attribute, getattr(Chamber, self.attribute))
+
+
 @dataclass
-class ChamberOvershoot(Fault):
+class ChamberOvershoot(_ChamberFault):
     """Integral wind-up: the controller integrates while its actuator is saturated, and the air overshoots the set point."""
 
     kind: ClassVar[str] = "chamber_overshoot"
-
-    def begins(self, world: World) -> None:
-        """Switches anti-windup off."""
-        world.fixture.chamber.winds_up = True
-
-    def ends(self, world: World) -> None:
-        """Switches anti-windup on."""
-        world.fixture.chamber.winds_up = False
+    attribute: ClassVar[str] = "winds_up"
 
 
 @dataclass
-class ChamberPower(Fault):
+class ChamberPower(_ChamberFault):
     """The chamber loses the power for heating and cooling; its controller still answers."""
 
     kind: ClassVar[str] = "chamber_power"
+    attribute: ClassVar[str] = "powered"
 
-    def begins(self, world: World) -> None:
-        """Switches the power off."""
-        world.fixture.chamber.powered = False
-
-    def ends(self, world: World) -> None:
-        """Switches the power on."""
-        world.fixture.chamber.powered = True
+    def setting(self) -> bool:
+        """Without power."""
+        return False
 
 
 @dataclass
-class ChamberUnsettled(Fault):
+class ChamberUnsettled(_ChamberFault):
     """The controller hunts: its working set point oscillates by ±``swing_K`` with a period of ``period_s``."""
 
     kind: ClassVar[str] = "chamber_unsettled"
+    attribute: ClassVar[str] = "hunting"
 
     swing_K: float = 6.0
     period_s: float = 900.0
 
-    def begins(self, world: World) -> None:
-        """Starts the oscillation."""
-        world.fixture.chamber.hunting = (self.swing_K, self.period_s)
-
-    def ends(self, world: World) -> None:
-        """Ends the oscillation."""
-        world.fixture.chamber.hunting = (0.0, 1.0)
+    def setting(self) -> tuple[float, float]:
+        """Swing and period."""
+        return self.swing_K, self.period_s
 
 
 @dataclass
-class Door(Fault):
+class Door(_ChamberFault):
     """The chamber's door is opened."""
 
     kind: ClassVar[str] = "door"
+    attribute: ClassVar[str] = "door_open"
 
-    def begins(self, world: World) -> None:
-        """Opens the door."""
-        world.fixture.chamber.door_open = True
 
-    def ends(self, world: World) -> None:
-        """Closes the door."""
-        world.fixture.chamber.door_open = False
+@dataclass
+class Vibration(_ChamberFault):
+    """External vibration of the fixture, ``rms_g`` g rms: a fork-lift, a press nearby."""
+
+    kind: ClassVar[str] = "vibration"
+    attribute: ClassVar[str] = "shaken_g"
+
+    rms_g: float = 0.02
+
+    def setting(self) -> float:
+        """The vibration, g rms."""
+        return self.rms_g
 
 
 @dataclass
@@ -89,20 +100,3 @@ class EmergencyStop(Fault):
         world.emergency_stop = False
         for axis in (world.outer, world.inner):
             axis.release(world.now, resumes=False)
-
-
-@dataclass
-class Vibration(Fault):
-    """External vibration of the fixture, ``rms_g`` g rms: a fork-lift, a press nearby."""
-
-    kind: ClassVar[str] = "vibration"
-
-    rms_g: float = 0.02
-
-    def begins(self, world: World) -> None:
-        """Starts the vibration."""
-        world.fixture.chamber.shaken_g = self.rms_g
-
-    def ends(self, world: World) -> None:
-        """Ends the vibration."""
-        world.fixture.chamber.shaken_g = 0.0

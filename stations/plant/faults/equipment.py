@@ -1,7 +1,5 @@
 """Faults of test equipment: exciter, shock machine and centrifuge with their recorder."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from stations.plant.faults.base import UNIT, Fault
@@ -20,40 +18,32 @@ class _BenchCondition(Fault):
         world.bench.conditions.discard(self.kind)
 
 
-class MissedTrigger(_BenchCondition):
-    """The recorder misses its trigger: the test leaves no recording."""
-
-    kind: ClassVar[str] = "missed_trigger"
-
-
-class ClippedReference(_BenchCondition):
-    """The conditioner of the reference sensor clips."""
-
-    kind: ClassVar[str] = "clipped_reference"
+def _condition(kind: str, meaning: str) -> type[Fault]:
+    """The fault that sets a condition of the bench."""
+    return type(kind, (_BenchCondition,), {"kind": kind, "__doc__": meaning})
 
 
-class ControllerAbort(_BenchCondition):
-    """The controller aborts every test: its interlock is open."""
-
-    kind: ClassVar[str] = "controller_abort"
-
-
-class LevelNotReached(_BenchCondition):
-    """The exciter reaches a third of its level, the shock machine a third of its peak."""
-
-    kind: ClassVar[str] = "level_not_reached"
-
-
-class GuardDoor(_BenchCondition):
-    """The guard door of shock machine or centrifuge is open: it does not start, and stops."""
-
-    kind: ClassVar[str] = "guard_door"
-
-
-class Overspeed(_BenchCondition):
-    """The centrifuge's speed monitor trips."""
-
-    kind: ClassVar[str] = "overspeed"
+MissedTrigger = _condition("missed_trigger", "The recorder misses its trigger: the test leaves no recording.")
+ClippedReference = _condition("clipped_reference", "The conditioner of the reference sensor clips.")
+ControllerAbort = _condition("controller_abort", "The controller aborts every test: its interlock is open.")
+LevelNotReached = _condition(
+    "level_not_reached", "The exciter reaches a third of its level, the shock machine a third of its peak."
+)
+GuardDoor = _condition(
+    "guard_door", "The guard door of shock machine or centrifuge is open: it does not start, and stops."
+)
+Overspeed = _condition("overspeed", "The centrifuge's speed monitor trips.")
+CurrentLimit = _condition(
+    "current_limit", "The current limit of the power supply holds a raised voltage a tenth too low."
+)
+ReferenceCableOff = _condition(
+    "reference_cable_off",
+    "The cable of the reference sensor on the exciter or shock machine is loose: its channel shows noise alone.",
+)
+DriveRunaway = _condition(
+    "drive_runaway",
+    "The drive of the centrifuge turns half as fast again as it is told, and its speed monitor does not trip.",
+)
 
 
 class CableOff(Fault):
@@ -69,21 +59,3 @@ class CableOff(Fault):
     def ends(self, world: World) -> None:
         """Puts the cable back."""
         world.bench.cable_off.discard(self.unit)
-
-
-class CurrentLimit(_BenchCondition):
-    """The current limit of the power supply holds a raised voltage a tenth too low."""
-
-    kind: ClassVar[str] = "current_limit"
-
-
-class ReferenceCableOff(_BenchCondition):
-    """The cable of the reference sensor on the exciter or shock machine is loose: its channel shows noise alone."""
-
-    kind: ClassVar[str] = "reference_cable_off"
-
-
-class DriveRunaway(_BenchCondition):
-    """The drive of the centrifuge turns half as fast again as it is told, and its speed monitor does not trip."""
-
-    kind: ClassVar[str] = "drive_runaway"

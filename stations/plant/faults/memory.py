@@ -1,7 +1,5 @@
 """Faults of the memory of a unit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -4,8 +4,6 @@ It works on real sockets and in wall time, frame by frame (MBAP header, Modbus M
 client under test is the production one.
 """
 
-from __future__ import annotations
-
 import select
 import socket
 import struct

@@ -1,7 +1,5 @@
 """Faults of the tilt table's axes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Faults of units, of the reader and its sensors, and of the computer's clock."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Faults of the wire, and the script by which a proxy in front of the plant's server carries them out."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
@@ -11,15 +9,21 @@ from typing import ClassVar
 import numpy as np
 
 from stations.plant.faults.base import DEVICES, UNIT, Fault
-from stations.plant.faults.proxy import ChaosProxy, Script, Way, WireAction
+from stations.plant.faults.proxy import ActionKind, ChaosProxy, Script, Way, WireAction
 from stations.plant.world import World
 
 
 @dataclass
 class WireFault(Fault):
-    """A fault of the next ``frames`` answers of the station, whichever device sends them."""
+    """A fault of the next ``frames`` answers of the station, whichever device sends them; ``action`` is what happens to each."""
+
+    action: ClassVar[ActionKind]
 
     frames: float = 1.0
+
+    def wire_action(self) -> WireAction:
+        """What happens to an answer; a kind with figures adds them."""
+        return WireAction(self.action)
 
 
 @contextmanager
@@ -48,7 +52,7 @@ def script_of(world: World, faults: Sequence[Fault]) -> Script | None:
         for number, wire in enumerate(wires):
             action = wire.wire_action()
             due = wire.order.at_s <= world.now < wire.order.until_s and spent[number] < wire.frames
-            if action is not None and due and action.way == way:
+            if due and action.way == way:
                 spent[number] += 1
                 return action
         return None
@@ -61,12 +65,13 @@ class ByteGarbage(WireFault):
     """Some bytes of an answer change in transit; Modbus TCP has no checksum of its own."""
 
     kind: ClassVar[str] = "byte_garbage"
+    action: ClassVar[ActionKind] = "garble"
 
     size: float = 2.0
 
     def wire_action(self) -> WireAction:
-        """Changes ``size`` bytes."""
-        return WireAction("garble", size=int(self.size))
+        """Its action with its figure."""
+        return WireAction(self.action, size=int(self.size))
 
 
 @dataclass
@@ -74,12 +79,13 @@ class Delay(WireFault):
     """An answer, and all that follow it, are delayed by ``delay_s`` of wall time."""
 
     kind: ClassVar[str] = "delay"
+    action: ClassVar[ActionKind] = "delay"
 
     delay_s: float = 0.2
 
     def wire_action(self) -> WireAction:
-        """Delays the answer."""
-        return WireAction("delay", delay_s=self.delay_s)
+        """Its action with its figure."""
+        return WireAction(self.action, delay_s=self.delay_s)
 
 
 @dataclass
@@ -100,10 +106,7 @@ class HalfOpen(WireFault):
     """The connection stays open and passes nothing: the device lost its power and could not close it."""
 
     kind: ClassVar[str] = "half_open"
-
-    def wire_action(self) -> WireAction:
-        """Passes nothing from here on."""
-        return WireAction("half_open")
+    action: ClassVar[ActionKind] = "half_open"
 
 
 @dataclass
@@ -111,10 +114,7 @@ class LateReply(WireFault):
     """An answer arrives late, in front of the next one, with its own older transaction id."""
 
     kind: ClassVar[str] = "late_reply"
-
-    def wire_action(self) -> WireAction:
-        """Delivers the answer in front of the next one."""
-        return WireAction("late")
+    action: ClassVar[ActionKind] = "late"
 
 
 @dataclass
@@ -122,10 +122,7 @@ class OtherTransaction(WireFault):
     """An answer arrives with a transaction id that no request had."""
 
     kind: ClassVar[str] = "other_transaction"
-
-    def wire_action(self) -> WireAction:
-        """Changes the transaction id."""
-        return WireAction("retag", size=1)
+    action: ClassVar[ActionKind] = "retag"
 
 
 @dataclass
@@ -133,10 +130,7 @@ class Reset(WireFault):
     """The connection is reset in place of an answer: a switch restarts, a cable is moved."""
 
     kind: ClassVar[str] = "reset"
-
-    def wire_action(self) -> WireAction:
-        """Resets the connection."""
-        return WireAction("reset")
+    action: ClassVar[ActionKind] = "reset"
 
 
 @dataclass
@@ -153,13 +147,22 @@ class SwappedWords(Fault):
 
 
 @dataclass
+class TimeOut(WireFault):
+    """The answer to a request is lost: the device has acted, and the client cannot know it."""
+
+    kind: ClassVar[str] = "time_out"
+    action: ClassVar[ActionKind] = "drop"
+
+
+@dataclass
 class Truncated(WireFault):
     """An answer ends too early, and the connection is closed."""
 
     kind: ClassVar[str] = "truncated"
+    action: ClassVar[ActionKind] = "truncate"
 
     size: float = 3.0
 
     def wire_action(self) -> WireAction:
-        """Removes the last ``size`` bytes and closes the connection."""
-        return WireAction("truncate", size=int(self.size))
+        """Its action with its figure."""
+        return WireAction(self.action, size=int(self.size))

@@ -1,26 +1,31 @@
 """Hidden effects: physical effects of a station or device that no register reports.
 
 Each effect is modelled from its mechanism, independently of the columns in ``inertial.effects``: a truth made of the columns of
-the fit would prove nothing. A new effect is a class with the methods of :class:`HiddenEffect`, listed here; it inherits the
-methods that it does not need from :class:`Untouched`.
+the fit would prove nothing. A new effect is a subclass of :class:`HiddenEffect`, listed here.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 
 from schemas.errors import RecipeInvalid, did_you_mean
-from stations.plant.hidden.age import StepChange, StressRelaxation
-from stations.plant.hidden.base import Block, HiddenEffect, Untouched
-from stations.plant.hidden.heat import ElementLag, HysteresisPlay, WarmUp
-from stations.plant.hidden.moisture import MoistureSwelling
-from stations.plant.hidden.springs import Creep, CubicTransfer, PendulousMass, VibrationRectification
+from stations.plant.hidden.base import Block, HiddenEffect
+from stations.plant.hidden.device import (
+    Creep,
+    CubicTransfer,
+    ElementLag,
+    HysteresisPlay,
+    MoistureSwelling,
+    PendulousMass,
+    StepChange,
+    StressRelaxation,
+    VibrationRectification,
+    WarmUp,
+)
 from stations.plant.hidden.table import EncoderHarmonic, LevelError, SlotRotation
 
-__all__ = ["HIDDEN", "Block", "HiddenEffect", "Untouched", "hidden_effect"]
+__all__ = ["HIDDEN", "Block", "HiddenEffect", "hidden_effect"]
 
-HIDDEN: Mapping[str, Callable[..., HiddenEffect]] = {
+HIDDEN: Mapping[str, type[HiddenEffect]] = {
     "cubic_transfer": CubicTransfer,
     "pendulous_mass": PendulousMass,
     "hysteresis_play": HysteresisPlay,
@@ -44,7 +49,7 @@ def hidden_effect(kind: str, figures: Mapping[str, float]) -> HiddenEffect:
             f"simulation.hidden: no effect '{kind}'; {did_you_mean(kind, HIDDEN)}", key="simulation.hidden"
         )
     make = HIDDEN[kind]
-    known = [f.name for f in fields(make) if f.init] if isinstance(make, type) else list(figures)  # pyright: ignore[reportArgumentType]
+    known = [f.name for f in fields(make) if f.init]  # pyright: ignore[reportArgumentType] - all are dataclasses
     for name in figures:
         if name not in known:
             raise RecipeInvalid(

@@ -1,9 +1,6 @@
 """Interface of the hidden effects, and the quantities at their instants."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,63 +27,31 @@ class Block:
     humidity: Array
 
 
-class HiddenEffect(Protocol):
-    """A hidden effect. Forces and outputs in g, angles in rad, temperatures in °C."""
+class HiddenEffect:
+    """A hidden effect, and the base class of all: each method here does nothing. Forces and outputs in g, angles in rad, °C."""
 
     def begin(self, units: int, stream: np.random.Generator) -> None:
         """Draws the parameters of each unit; called once."""
-        ...
 
     def table(self, outer: Array, inner: Array) -> tuple[Array, Array]:
         """True angles of the table (n,) where the encoders read ``outer`` and ``inner``."""
-        ...
-
-    def up(self, direction: Array) -> Array:
-        """Direction (3,) of the specific force at rest in the frame of the table base."""
-        ...
-
-    def force(self, force: Array) -> Array:
-        """True specific force on every unit, (n, s, 3), after table and slot."""
-        ...
-
-    def slow(self, temperature: Array, force: Array, step: float) -> Array:
-        """Memory of the effect (s, 3) after ``step`` seconds at ``temperature`` (s,) and ``force`` (s, 3)."""
-        ...
-
-    def power(self, now: float, *, on: bool) -> None:
-        """The supply of the devices is switched at ``now`` s; it is on at the start."""
-        ...
-
-    def output(self, force: Array, block: Block) -> Array | float:
-        """Addition to the outputs, (n, s, 3), g, under ``force`` (n, s, 3)."""
-        ...
-
-
-class Untouched:
-    """An effect without action; the base class of the effects."""
-
-    def begin(self, units: int, stream: np.random.Generator) -> None:
-        """No parameters."""
-
-    def table(self, outer: Array, inner: Array) -> tuple[Array, Array]:
-        """The angles unchanged."""
         return outer, inner
 
     def up(self, direction: Array) -> Array:
-        """The direction unchanged."""
+        """Direction (3,) of the specific force at rest in the frame of the table base."""
         return direction
 
     def force(self, force: Array) -> Array:
-        """The force unchanged."""
+        """True specific force on every unit, (n, s, 3), after table and slot."""
         return force
 
     def slow(self, temperature: Array, force: Array, step: float) -> Array:
-        """No memory."""
+        """Memory of the effect (s, 3) after ``step`` seconds at ``temperature`` (s,) and ``force`` (s, 3)."""
         return np.zeros_like(force)
 
     def power(self, now: float, *, on: bool) -> None:
-        """No effect."""
+        """The supply of the devices is switched at ``now`` s; it is on at the start."""
 
     def output(self, force: Array, block: Block) -> Array | float:
-        """No addition."""
+        """Addition to the outputs, (n, s, 3), g, under ``force`` (n, s, 3)."""
         return 0.0

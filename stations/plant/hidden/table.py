@@ -1,21 +1,15 @@
 """Errors of table, encoder and fixture: the same for every device, or for every device in a slot."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from stations.plant.hidden.base import Untouched
-
-if TYPE_CHECKING:
-    from stations.plant.hidden.base import Array
+from stations.plant.hidden.base import Array, HiddenEffect
 
 
 @dataclass
-class LevelError(Untouched):
+class LevelError(HiddenEffect):
     """Level error of the table base."""
 
     about_x: float = 200e-6  # rad
@@ -36,7 +30,7 @@ class LevelError(Untouched):
 
 
 @dataclass
-class EncoderHarmonic(Untouched):
+class EncoderHarmonic(HiddenEffect):
     """An eccentric encoder disc: the angle error of the outer encoder is a sine over the turn."""
 
     size: float = 200e-6  # rad
@@ -49,7 +43,7 @@ class EncoderHarmonic(Untouched):
 
 
 @dataclass
-class SlotRotation(Untouched):
+class SlotRotation(HiddenEffect):
     """Misaligned fixture: every slot is rotated by its own small vector."""
 
     size: float = 1e-3  # rad

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from pandera.errors import SchemaError
 
 from schemas import table_check, tables
-from schemas.columns import Seen, all_different
 from schemas.errors import DataRejected
 
 
@@ -77,7 +76,7 @@ def test_rows_said_to_be_different_are(rows: list[tuple[str, int, float, bool]])
         {"text": "str", "whole": "int64", "number": "float64", "flag": "bool"}
     )
     for names in (["text"], ["whole"], ["text", "number"], ["flag", "text", "whole", "number"]):
-        said = all_different([Seen.of(frame[name]) for name in names])
+        said = table_check.all_different([table_check.Seen.of(frame[name]) for name in names])
         spread = int(frame["whole"].max()) - int(frame["whole"].min()) if len(frame) else 0
         if "whole" in names and spread > 2**50:  # too many to number: then it is not said
             assert not (said and frame.duplicated(names).any())

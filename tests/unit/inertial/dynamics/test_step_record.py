@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from scipy import signal
+from second_order import step_response
 
-from inertial.dynamics import settling
-from inertial.dynamics.settling import step_response
 from inertial.dynamics.step_record import aligned, step_figures
 from inertial.errors import NotIdentified
 
@@ -61,7 +60,6 @@ def test_settling_and_overshoot_of_a_record_are_the_published_ones(zeta: float, 
     figures = step_figures(time, out, np.full(len(time), 1e-6), band=band)
     assert figures.settling_s * 2.0 * np.pi * FAST == pytest.approx(PUBLISHED[zeta][which], abs=0.012)
     assert 100.0 * figures.overshoot == pytest.approx(PUBLISHED[zeta][3], abs=0.06)
-    assert settling.damping_from_overshoot(figures.overshoot) == pytest.approx(zeta, abs=0.002)
 
 
 def test_the_pulls_of_the_figures_have_unit_variance() -> None:
@@ -107,13 +105,13 @@ def test_alignment_removes_the_blur_of_a_sampled_edge(rng: np.random.Generator) 
     times, outs, late = [], [], rng.uniform(-1.0, 1.0, 16) * 10e-6
     for one in late:
         time = np.arange(-100, 900) / 50e3
-        outs.append(settling.step_response(time + one, 2000.0, 0.7))
+        outs.append(step_response(time + one, 2000.0, 0.7))
         times.append(time)
     joined = np.concatenate(aligned(times, outs))
     order = np.argsort(joined)
-    true = settling.step_response(joined[order] + late.mean(), 2000.0, 0.7)
+    true = step_response(joined[order] + late.mean(), 2000.0, 0.7)
     assert np.max(np.abs(np.concatenate(outs)[order] - true)) < 0.004
-    blurred = np.concatenate([settling.step_response(t + late.mean(), 2000.0, 0.7) for t in times])
+    blurred = np.concatenate([step_response(t + late.mean(), 2000.0, 0.7) for t in times])
     assert np.max(np.abs(np.concatenate(outs) - blurred)) > 0.03
 
 
@@ -121,13 +119,13 @@ def test_the_rise_time_is_right_where_the_points_lie_unevenly_about_the_crossing
     """Means over half a sample interval, as a procedure makes them of sixteen steps: the first above a level lies behind it."""
     rate, natural, zeta = 51.2e3, 1000.0, 0.7
     fine = np.linspace(0.0, 1e-3, 1_000_001)
-    ten, ninety = np.interp([0.1, 0.9], settling.step_response(fine, natural, zeta), fine)
+    ten, ninety = np.interp([0.1, 0.9], step_response(fine, natural, zeta), fine)
     errors = []
     for _ in range(24):
         times = np.concatenate([np.arange(-100, 900) / rate + late for late in rng.uniform(0.0, 1.0, 16) / rate])
         place = np.floor(times * rate * 2.0).astype(int) + 300
         count = np.bincount(place)
-        sums = (np.bincount(place, weights=one) for one in (times, settling.step_response(times, natural, zeta)))
+        sums = (np.bincount(place, weights=one) for one in (times, step_response(times, natural, zeta)))
         middle, value = (one[count > 0] / count[count > 0] for one in sums)
         figures = step_figures(middle, value, np.full(middle.size, 1e-3), band=0.02, bin_s=0.5 / rate)
         errors.append(figures.rise_s / (ninety - ten) - 1.0)

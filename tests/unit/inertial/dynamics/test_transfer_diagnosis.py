@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from inertial.dynamics.second_order import transfer
+from inertial.dynamics.spectra import transfer
 from inertial.dynamics.transfer_diagnosis import diagnose_transfer
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points, fit_transfer

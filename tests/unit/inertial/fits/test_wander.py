@@ -1,5 +1,6 @@
 """A lot whose outputs wander between dwells: the errors of the coefficients are what they say."""
 
+import made_noise as generate
 import numpy as np
 import pytest
 from posed import posed
@@ -9,7 +10,6 @@ from inertial.errors import NotIdentified
 from inertial.fits.linear import fit_lot
 from inertial.fits.wander import fit_lot_with_wander, lack_of_fit
 from inertial.frames import force_from_angles
-from inertial.noise import generate
 from inertial.noise.dwells import DwellNoise, dwell_covariance
 from inertial.state import State
 

@@ -1,10 +1,10 @@
 """Overlapping Allan deviation: values against a peer, degrees of freedom, coverage of the intervals, refusals."""
 
 import allantools
+import made_noise as generate
 import numpy as np
 import pytest
 
-from inertial.noise import generate
 from inertial.noise.allan import decades, octaves, overlapping
 from inertial.noise.covariance import sums
 from inertial.noise.mixture import basis

@@ -1,10 +1,10 @@
 """The bias filter's figures against closed forms, facts and noise that is not of the filter's own making."""
 
+import made_noise as generate
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from inertial.noise import generate
 from inertial.noise.allan import overlapping
 from inertial.noise.bias_filter import BiasFilter, consistency, track
 from inertial.noise.gauss_markov import (

@@ -1,5 +1,6 @@
 """The one kernel of 1/f wander: its spectrum, its sums, and the two estimators that use it."""
 
+import made_noise as generate
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,7 +9,6 @@ from scipy.integrate import quad
 
 from inertial import poses
 from inertial.frames import force_from_angles
-from inertial.noise import generate
 from inertial.noise.flicker import constants_of_means, flicker_kernel, flicker_of_means, summed, time_constants
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.stages.fit import fit

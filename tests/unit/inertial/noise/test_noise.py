@@ -1,11 +1,11 @@
 """Small modules of the noise: spectrum, dwell means, measurands of a bias, and Gauss-Markov processes."""
 
+import made_noise as generate
 import numpy as np
 import pytest
 from scipy import signal
 from scipy.integrate import dblquad
 
-from inertial.noise import generate
 from inertial.noise.allan import overlapping
 from inertial.noise.dwells import DwellNoise, dwell_covariance, whitener
 from inertial.noise.gauss_markov import (

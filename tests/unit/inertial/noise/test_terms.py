@@ -1,10 +1,10 @@
 """Noise coefficients come back from records made independently, with limits where the data say nothing."""
 
 import independent_noise as made
+import made_noise as generate
 import numpy as np
 import pytest
 
-from inertial.noise import generate
 from inertial.noise.allan import overlapping
 from inertial.noise.terms import FLICKER_FLOOR, fit_terms, model_deviation
 from pipelines.stages.noise import limits_where_unexplained

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from scipy.stats import chi2
 
-from inertial.dynamics.sine_fit import fit_tone_and_frequency, frequency_error_of
+from inertial.dynamics.sine_fit import fit_tone_and_frequency
 from inertial.dynamics.stability import short_noise
 from inertial.dynamics.transfer_effects import Conditions
 from inertial.dynamics.transfer_model import Points
@@ -37,7 +37,7 @@ def test_distortion_of_the_exciter_is_not_noise_of_a_frequency(distortion: float
     for _ in range(200):
         wave = shaken(rng, distortion, 1e-3, 100.03)[:, None]
         tone = fit_tone_and_frequency(wave, RATE, CYCLES_HZ, harmonics=5)
-        assert tone.frequency_error == pytest.approx(frequency_error_of(1e-3, 1.0, 0.2, len(wave)), rel=0.1)
+        assert tone.frequency_error == pytest.approx(np.sqrt(6.0 / len(wave)) / np.pi * 1e-3 / 0.2, rel=0.1)
         errors.append((tone.frequency - 100.03) / tone.frequency_error)
     low, high = np.sqrt(chi2.ppf([0.005, 0.995], 200) / 200)
     assert low < np.sqrt(np.mean(np.square(errors))) < high

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import allantools
+import made_noise as generate
 import numpy as np
 import pytest
 
-from inertial.noise import generate
 from inertial.noise.allan import overlapping
 from inertial.noise.mixture import basis
 from inertial.noise.terms import fit_terms

@@ -1,6 +1,7 @@
 """The fit stage: noise between dwells, nonlinear parameters, and what it says where it cannot find the noise."""
 
 import independent_lots as lots
+import made_noise as generate
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,7 +9,6 @@ from lots import dwell_rows
 
 from inertial import poses
 from inertial.frames import force_from_angles
-from inertial.noise import generate
 from pipelines.stages.fit import fit
 from pipelines.stages.verify import verify
 from pipelines.tables.calibration import read_calibration

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pipelines.jobs.recipes import read_limits, sample_names
 from pipelines.stages.figures import UNITS
 from pipelines.stages.grade import _of_procedures
-from schemas.decisions import GRADES, decide, grade_of
+from schemas.decisions import GRADES, decide, grade_with
 from schemas.errors import RecipeInvalid
 from schemas.limits import Limits, parse_limits
 
@@ -64,10 +64,10 @@ def test_refuses_limits_by_what_is_wrong_in_them(row: tuple[str, str, str]) -> N
 @given(st.floats(0.0, 3000.0), st.floats(0.0, 500.0))
 def test_uncertainty_never_raises_a_grade(value: float, expanded: float) -> None:
     order = [*GRADES, None]
-    sure, unsure = (grade_of(value, u, "guarded_acceptance") for u in (0.0, expanded))
+    sure, unsure = (grade_with(value, u) for u in (0.0, expanded))
     assert order.index(unsure) >= order.index(sure)
     for bias, grade in ((30.0, "navigation"), (150.0, "industrial"), (700.0, "consumer"), (1500.0, None)):
-        assert grade_of(bias, 0.0, "guarded_acceptance") == grade
+        assert grade_with(bias, 0.0) == grade
     assert set(sample_names("limits-")) - {"production"} == set(GRADES)
 
 

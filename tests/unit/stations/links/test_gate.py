@@ -23,7 +23,7 @@ from stations.links.making import Links
 from stations.opening import serve_devices
 from stations.profile_files import load_profile, profile_names
 
-CARRIERS = {"TcpWire", "SerialWire", "WireLink", "ModbusLink", "LineLink"}
+CARRIERS = {"TcpWire", "SerialWire", "WireLink", "LineLink"}
 WITH_REGISTERS = [name for name in profile_names() if load_profile(name).registers]
 
 
@@ -95,7 +95,6 @@ def test_one_module_makes_links_and_hands_them_out_gated_alone():
             calls = [node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)]
             if any(getattr(call.func, "id", getattr(call.func, "attr", "")) in CARRIERS for call in calls):
                 makers.add(path.relative_to(ROOT).as_posix())
-    makers -= {"stations/links/modbus.py"}  # where ModbusLink puts itself on a TcpWire
     assert makers == {"stations/links/making.py"}
     plant = plant_of(load_station(), lot_of(1))
     with serve_devices(load_station(), plant) as links:

@@ -9,8 +9,8 @@ from schemas.errors import RecipeInvalid, WrongUse
 from schemas.lot import Lot, Unit
 from stations.codec import unpack_samples
 from stations.plant.chamber import Chamber
+from stations.plant.fixture import Moisture
 from stations.plant.hidden import HIDDEN, hidden_effect
-from stations.plant.moisture import Moisture
 from stations.plant.preset import load_preset
 from stations.plant.table import Axis, Move, turn
 

@@ -1,4 +1,4 @@
-"""Records of noise, made from physics and not from the model that the analysis fits. Truth for tests and the plant."""
+"""Records of noise, made from physics and not from the model that the analysis fits. Truth for tests and benchmarks."""
 
 import numpy as np
 from numpy.random import Generator
