@@ -7,24 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    PageOption,
-    PlotOption,
-    RateOption,
-    SeriesArgument,
-    SeriesColumnsOption,
-    SeriesUnitOption,
-    StretchOption,
-    TimeColumnOption,
-    TimeUnitOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, say, short
 from schemas.errors import WrongUse, did_you_mean
 
 PART = "Results"
@@ -41,12 +25,12 @@ STATISTICS = ("allan", "modified", "hadamard", "total", "time", "tie", "mtie")
 
 
 def command(
-    source: SeriesArgument,
-    columns: SeriesColumnsOption = "",
-    time: TimeColumnOption = "",
-    time_unit: TimeUnitOption = "s",
-    rate: RateOption = None,
-    unit: SeriesUnitOption = "",
+    source: options.SeriesArgument,
+    columns: options.SeriesColumnsOption = "",
+    time: options.TimeColumnOption = "",
+    time_unit: options.TimeUnitOption = "s",
+    rate: options.RateOption = None,
+    unit: options.SeriesUnitOption = "",
     spacing: Annotated[
         str,
         typer.Option("--spacing", metavar="octave|decade", help="Averaging times: 1, 2, 4 … or 1, 2, 5, 10 … samples."),
@@ -60,12 +44,12 @@ def command(
             "interval error.",
         ),
     ] = STATISTICS[0],
-    stretch: StretchOption = None,
-    plot: PlotOption = None,
-    page: PageOption = None,
-    archive: ArchiveOption = None,
+    stretch: options.StretchOption = None,
+    plot: options.PlotOption = None,
+    page: options.PageOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compute the overlapping Allan deviation of a record at rest, and the terms Q, N, B, K and R that explain it.
 
@@ -99,14 +83,13 @@ def command(
 
 
 def _print(document: dict[str, Any]) -> None:
-    out = console()
     span = document["samples"] / document["rate_hz"]
-    out.print(
+    say(
         f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, {short(span)} s",
     )
     _print_terms(document) if document["statistic"] == STATISTICS[0] else _print_curves(document)
     for note in document["notes"]:
-        out.print(note, style="yellow")
+        say(note, style="yellow")
 
 
 def _print_terms(document: dict[str, Any]) -> None:

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of, size_text
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, say
 
 PART = "Certificates, trace, audit"
 ORDER = 460
@@ -49,12 +50,12 @@ app = typer.Typer(
 
 @app.command()
 def clean(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     only_look: Annotated[
         bool, typer.Option("--dry-run", help="Show what would be removed, and change nothing.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Remove temporary files of killed writers and add finished runs to the chain; files in use are not touched."""
     from pipelines.archive import Archive
@@ -66,17 +67,16 @@ def clean(
     if as_json:
         print_json({"archive": str(store.root), "only_looked": only_look, **asdict(done)})
         return
-    out = console()
     for place in done.removed:
-        out.print(f"{'found' if only_look else 'removed'}  {place}")
+        say(f"{'found' if only_look else 'removed'}  {place}")
     for place in dict.fromkeys(done.busy):
-        out.print(f"in use   {place}")
+        say(f"in use   {place}")
     for run in done.sealed:
-        out.print(f"sealed   {run}")
+        say(f"sealed   {run}")
     word = "found" if only_look else "removed"
-    out.print(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({size_text(done.bytes)})")
+    say(f"{number_of(len(done.removed), 'leftover')} of killed writers {word} ({size_text(done.bytes)})")
     if done.anchored:
-        out.print(f"{number_of(done.anchored, 'calibration')} added to the chain")
+        say(f"{number_of(done.anchored, 'calibration')} added to the chain")
 
 
 @app.command()
@@ -91,7 +91,7 @@ def key(
     public: Annotated[
         bool, typer.Option("--public", help="Show the public key of the existing key; make no key.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Make the key that signs manifests, outside the archive, and show its public key."""
     from pipelines.archive import signatures
@@ -116,12 +116,11 @@ def key(
     if as_json:
         print_json({"name": signatures.name_of(made), "public": hexadecimal, "private_file": str(place)})
         return
-    out = console()
-    out.print(f"key      {signatures.name_of(made)}")
-    out.print(f"public   {hexadecimal}")
-    out.print(f"private  {place}")
+    say(f"key      {signatures.name_of(made)}")
+    say(f"public   {hexadecimal}")
+    say(f"private  {place}")
     if output is not None and not public:
-        out.print(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}")
+        say(f"to sign with this key, set TUMBLELINE_SIGNING_KEY={place}")
 
 
 @app.command()
@@ -129,14 +128,14 @@ def backup(
     target: Annotated[
         str, typer.Argument(metavar="COPY", help="Folder or address of the copy: empty, or an earlier copy.")
     ],
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     database: Annotated[
         Path | None,
         typer.Option("--database", metavar="DIR", help="Also copy the database of the orchestrator into this folder."),
     ] = None,
     keep: Annotated[int, typer.Option("--keep", min=1, help="Number of copies of the database to keep.")] = 14,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Copy the archive to another disk or store, also during runs; a repeated copy adds only what is new.
 
@@ -154,21 +153,20 @@ def backup(
         file = None if made is None else str(made)
         print_json({"archive": str(source.root), "copy": str(copy.root), "database": file, **asdict(done)})
         return
-    out = console()
     counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)}), {done.present} already there"
-    out.print(counted)
+    say(counted)
     if made is not None:
-        out.print(f"database  {made}")
+        say(f"database  {made}")
 
 
 @app.command()
 def compact(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     before: Annotated[
         str, typer.Option("--before", metavar="DATE", help="Only runs that began before this day; default: all.")
     ] = "",
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Put the files of finished runs, their captures and the calibrations into a few large files, one for each month.
 
@@ -193,21 +191,20 @@ def compact(
     if as_json:
         print_json({"archive": str(store.root), **asdict(done)})
         return
-    out = console()
     for name in done.packs:
-        out.print(f"written  packed/{name}")
+        say(f"written  packed/{name}")
     for name in done.kept:
-        out.print(f"kept     {name}: changed, or in use; the next compaction packs it")
+        say(f"kept     {name}: changed, or in use; the next compaction packs it")
     for name in done.unfinished:
-        out.print(f"open     {name}: not finished, left as it is")
+        say(f"open     {name}: not finished, left as it is")
     packed = f"{number_of(done.packed, 'file')} packed ({size_text(done.bytes)})"
-    out.print(f"{packed}, {number_of(done.freed, 'single file')} removed")
+    say(f"{packed}, {number_of(done.freed, 'single file')} removed")
 
 
 @app.command()
 def restore(
     source: Annotated[str, typer.Argument(metavar="COPY", help="Folder or address of the copy.")],
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     database: Annotated[
         Path | None,
         typer.Option(
@@ -215,7 +212,7 @@ def restore(
         ),
     ] = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Copy an archive back into an empty folder and verify it; exit 1 where the verification has findings.
 
@@ -237,9 +234,8 @@ def restore(
         place = {"archive": str(target.root), "copy": str(copy.root), "whole": report.whole, "head": report.head}
         print_json({**place, **asdict(done)})
     else:
-        out = console()
         counted = f"{number_of(done.files, 'file')} copied ({size_text(done.bytes)})"
-        out.print(f"{counted}, {done.present} already there")
+        say(f"{counted}, {done.present} already there")
         state = "nothing is wrong" if report.whole else "run 'tumbleline verify' for the findings"
-        out.print(f"verified: {number_of(report.runs, 'run')}, {state}")
+        say(f"verified: {number_of(report.runs, 'run')}, {state}")
     raise typer.Exit(DONE if report.whole else PART_FAILED)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json, short
+from pipelines.cli import options
+from pipelines.cli.printing import console, print_json, remark, say, short
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ SHOWN = 12  # findings of one kind
 
 
 def command(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     since: Annotated[
         str,
         typer.Option("--since", metavar="DATE", help="Changes, signals and figures from this day on; all by default."),
@@ -52,7 +53,7 @@ def command(
         int | None, typer.Option("--workers", min=1, help="Processes that read runs; as many as cores by default.")
     ] = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
     from pipelines.archive import Archive
@@ -127,7 +128,7 @@ def _show(audited: Audit, audit_findings: list[AuditFinding], page: Path | None)
     if not audit_findings:
         out.print("no action is needed")
     if page is not None:
-        error_console().print(f"page    {page}")
+        remark(f"page    {page}")
 
 
 _BEGINNING = -700000.0  # days before any calibration
@@ -143,13 +144,13 @@ def _certificates(audited: Audit) -> str:
 
 def _show_kind(own: list[AuditFinding]) -> None:
     for finding in own[:SHOWN]:
-        console().print(f"  · {finding.message}")
+        say(f"  · {finding.message}")
     if len(own) > SHOWN:
-        console().print(f"  · … {len(own) - SHOWN} more of this kind; --json and --page list all", style="dim")
+        say(f"  · … {len(own) - SHOWN} more of this kind; --json and --page list all", style="dim")
 
 
 def _show_yield(audited: Audit) -> None:
     shares: list[Any] = [share for share in audited.yields if share.of in {"all", "station"}]
     parts = [f"{share.name} {short(100.0 * share.interval.value)} %" for share in shares if share.total]
     if parts:
-        console().print(f"yield   {', '.join(parts)}")
+        say(f"yield   {', '.join(parts)}")

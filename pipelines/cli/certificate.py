@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, remark, say
 
 if TYPE_CHECKING:
     from pipelines.certificates.document.issue import Issued
@@ -44,9 +45,9 @@ def command(
     address: Annotated[
         str, typer.Option("--address", metavar="URL", help="Print a QR code of this address; {number} is filled in.")
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write, for every certified unit, SERIAL_N.pdf and SERIAL_N.xml with the content of ISO/IEC 17025, 7.8.2 and 7.8.4.
 
@@ -68,9 +69,9 @@ def command(
         print_json(_document(done))
     else:
         for one in done.written:
-            console().print(f"certificate {one.number}: {one.pdf}, {one.xml}")
+            say(f"certificate {one.number}: {one.pdf}, {one.xml}")
     for serial, why in done.left_out.items():
-        error_console().print(f"certificate: {serial}: {why}")
+        remark(f"certificate: {serial}: {why}")
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
 

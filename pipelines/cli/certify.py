@@ -8,15 +8,8 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Run
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RunArgument,
-    console,
-    error_console,
-    give,
-    print_table,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import give, print_table, remark, say
 
 if TYPE_CHECKING:
     from pipelines.chain.certify import Certified
@@ -31,7 +24,7 @@ EXAMPLES = (
 
 
 def command(
-    run: RunArgument = "latest",
+    run: options.RunArgument = "latest",
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…", help="Certify only these units; default: all that passed.")
     ] = "",
@@ -54,12 +47,12 @@ def command(
             "--key", metavar="FILE|HEX", help="Another public key that is accepted for the signatures of the run."
         ),
     ] = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     supersede: Annotated[
         bool, typer.Option("--supersede", help="Also end calibrations that begin later and overlap.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Certify the units of a run that passed, with first and last day of validity.
 
@@ -89,7 +82,7 @@ def command(
 
             make_imported_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
-        error_console().print(f"certify: the report was not made again: {problem}")
+        remark(f"certify: the report was not made again: {problem}")
     give(_document(source.id, done), lambda _: _print(source.id, done), as_json=as_json)
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
@@ -106,7 +99,7 @@ def _print_run(run: Run) -> None:
         *library_remarks(run),
     ]
     for line in lines:
-        error_console().print(f"certify: {line}")
+        remark(f"certify: {line}")
 
 
 def _document(run: str, done: Certified) -> dict[str, Any]:
@@ -135,12 +128,12 @@ def _print(run: str, done: Certified) -> None:
     ]
     if lines:
         print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {run}")
-        console().print(
+        say(
             f"The documents: tumbleline certificate {run} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
             style="dim",
         )
     for serial, why in done.left_out.items():
-        console().print(f"  {serial} not certified: {why}")
+        say(f"  {serial} not certified: {why}")
 
 
 def _ended(sequences: tuple[int, ...]) -> str:

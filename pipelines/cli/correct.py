@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RateOption,
-    TimeColumnOption,
-    console,
-    error_console,
-    give,
-    short,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import console, error_console, give, short
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -50,8 +42,8 @@ def command(
     columns: Annotated[
         str, typer.Option("--columns", metavar="x,y,z", help="Columns of the output; x,y,z or out_x,… by default.")
     ] = "",
-    time: TimeColumnOption = "",
-    rate: RateOption = None,
+    time: options.TimeColumnOption = "",
+    rate: options.RateOption = None,
     force: Annotated[
         str, typer.Option("--force", metavar="X,Y,Z", help="True specific force, g, the same for all samples.")
     ] = "",
@@ -73,14 +65,14 @@ def command(
     step: Annotated[
         float, typer.Option("--step", metavar="S", min=1e-3, help="Time between updates of the bias.")
     ] = 1.0,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     at_rest: Annotated[
         bool, typer.Option("--at-rest", help="Find where the unit is at rest and use the magnitude of gravity there.")
     ] = False,
     failed: Annotated[bool, typer.Option("--failed", help="Also use a unit that failed its limits.")] = False,
     revoked: Annotated[bool, typer.Option("--revoked", help="Also use a revoked calibration.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Correct a recording: a = K⁻¹(ã − b) with all effects of the model, and the covariance of each sample.
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, error_console, print_json, print_table, short
+from pipelines.cli import options
+from pipelines.cli.printing import console, error_console, print_json, print_table, say, short
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def command(
     by_hand: Annotated[
         bool, typer.Option("--by-hand", help="Only measure and write the files; continue with the commands yourself.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Hide an effect in the simulated station and find it from the measurements: compare, diagnose, extend, compare.
 
@@ -93,12 +94,11 @@ def _hand_over(folder: Path, hidden: Scene, *, as_json: bool) -> None:
     if as_json:
         print_json({"folder": str(folder), "files": [f"{n}.parquet" for n in names], "effects": list(hidden.model)})
         return
-    out = console()
-    out.print(
+    say(
         f"The lot was measured twice, with one hidden effect. Files in {folder}: {', '.join(f'{n}.parquet' for n in names)}.",
     )
-    out.print("Begin with")
-    out.print(f"  {_command('diagnose', folder, hidden.model)}")
+    say("Begin with")
+    say(f"  {_command('diagnose', folder, hidden.model)}")
 
 
 def _command(name: str, folder: Path, model: tuple[str, ...] | None) -> str:
@@ -198,27 +198,26 @@ class _Game:
         if self.quiet:
             return
         self._step("5. What was hidden?", "")
-        out = console()
-        out.print(
+        say(
             f"{self.hidden.truth} ({self.hidden.kind}): {self.hidden.effect}",
             style="bold",
         )
         named = ", ".join(" or ".join(group) for group in document["classes"]) or "nothing"
         if document["told_apart"]:
-            out.print(f"The diagnosis named {named}. Found.", style="bold green")
+            say(f"The diagnosis named {named}. Found.", style="bold green")
         elif document["found"]:
             self._one_of_a_class(document, named)
         elif self.hidden.effect in document["unseen"]:
             text = f"The diagnosis named {named}, and listed {self.hidden.effect} as not visible under this plan."
-            out.print(text, style="bold yellow", soft_wrap=True)
+            say(text, style="bold yellow")
         else:
-            out.print(f"The diagnosis named {named}. Not found.", style="bold red")
+            say(f"The diagnosis named {named}. Not found.", style="bold red")
         lines = [
             [when, *(short(document[key][f]) for f in ("rms_ug", "fresh_rms_ug"))]
             for when, key in (("before", "before"), ("extended", "after"))
         ]
         print_table(["model", "residual, µg", "fresh run, µg"], lines)
-        out.print(f"Everything is in {self.folder}: dwells, model.toml and report.html.")
+        say(f"Everything is in {self.folder}: dwells, model.toml and report.html.")
 
     def _one_of_a_class(self, document: dict[str, Any], named: str) -> None:
         """The result if the hidden effect is in a class with others, and the measurement that separates them."""
@@ -250,13 +249,13 @@ class _Game:
         if self.asks:
             typer.prompt("\nPress Enter to continue", default="", show_default=False, prompt_suffix=" ")
         if not self.quiet:
-            console().print(f"\n{title}", style="bold cyan")
+            say(f"\n{title}", style="bold cyan")
             if line:
-                console().print(f"  {line}", style="dim")
+                say(f"  {line}", style="dim")
 
     def _say(self, text: str) -> None:
         if not self.quiet:
-            console().print(text)
+            say(text)
 
 
 def _errors(document: dict[str, Any]) -> dict[str, Any]:

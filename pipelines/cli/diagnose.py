@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    DwellsArgument,
-    EffectFileOption,
-    EffectsOption,
-    FormulaOption,
-    HistoryOption,
-    JsonOption,
-    LeaveOutOption,
-    ModelOption,
-    error_console,
-    print_json,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, print_json, remark
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -39,13 +28,13 @@ EXAMPLES = (
 
 
 def command(
-    dwells: DwellsArgument,
-    effects: EffectsOption = "",
-    model: ModelOption = None,
-    history: HistoryOption = "",
-    effect_file: EffectFileOption = None,
-    formula: FormulaOption = None,
-    leave_out: LeaveOutOption = "",
+    dwells: options.DwellsArgument,
+    effects: options.EffectsOption = "",
+    model: options.ModelOption = None,
+    history: options.HistoryOption = "",
+    effect_file: options.EffectFileOption = None,
+    formula: options.FormulaOption = None,
+    leave_out: options.LeaveOutOption = "",
     report: Annotated[
         Path | None,
         typer.Option(
@@ -62,27 +51,20 @@ def command(
             "--recipe", metavar="RECIPE", help="Recipe of the dwells, for --next; a run of the archive has its own."
         ),
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Judge whether a model is adequate, where it fails, and which physical effect is missing.
 
     Exit status 0: the model is adequate. 1: it is not, it cannot be judged, or every unit has a data fault. 2: the input cannot
     be used.
     """
-    from pipelines.cli.inputs import (
-        add_effect_files,
-        add_formulas,
-        dwells_and_history,
-        judged_effects,
-        without_dwells,
-    )
-    from pipelines.diagnosis.inputs import history_beside
+    from pipelines.cli.inputs import add_effects, dwells_and_history, without_dwells
+    from pipelines.diagnosis.inputs import history_beside, judged_effects
     from pipelines.importers.files import is_file
 
-    add_effect_files(effect_file)
-    add_formulas(formula, "diagnose")
+    add_effects(effect_file, formula, "diagnose")
     base = measured_recipe(dwells, recipe, archive) if following is not None else None
     judged = judged_effects(dwells, archive, effects, model, "diagnose")
     table, temperatures = dwells_and_history(dwells, history, archive)
@@ -200,4 +182,4 @@ def write_report(path: Path, text: str) -> None:
     from pipelines.archive import files
 
     files.publish(path, text.encode(), "report", files.ELSEWHERE)
-    error_console().print(f"report: {path}")
+    remark(f"report: {path}")

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.archive import Run
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, error_console
+from pipelines.cli import options
+from pipelines.cli.printing import remark
 
 PART = "Results"
 ORDER = 340
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    run: RunArgument = "latest",
+    run: options.RunArgument = "latest",
     form: Annotated[str, typer.Option("--format", help=f"{', '.join(_FORMATS)}; described below.")] = "json",
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…", help="Export only these units; default: all that passed.")
@@ -78,13 +79,13 @@ def command(
         ),
     ] = None,
     counts_per_g: Annotated[int, typer.Option("--counts-per-g", help="betaflight: counts of 1 g (acc_1G).")] = 2048,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     failed: Annotated[bool, typer.Option("--failed", help="Also export units that failed their limits.")] = False,
     revoked: Annotated[
         bool, typer.Option("--revoked", help="Also export units whose calibration was revoked.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write coefficients: bias b and response K as polynomials in temperature, to apply as a = K⁻¹(ã − b).
 
@@ -138,7 +139,7 @@ def _write(files: dict[str, bytes], output: Path | None) -> None:
             f"export: {output} cannot be written ({problem.strerror}); give another file with --output"
         ) from None
     if folder:
-        error_console().print(f"export: {len(files)} files in {output}")
+        remark(f"export: {len(files)} files in {output}")
 
 
 def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Sequence[str]) -> None:
@@ -162,4 +163,4 @@ def _print_certificates(run: Run, chosen: Sequence[UnitCalibration], signers: Se
         lines.append(f"not certified: {', '.join(bare)}; 'tumbleline certify {run.id}' gives them a period of validity")
     lines += [*library_remarks(run), *signers]
     for line in lines:
-        error_console().print(f"export: {line}")
+        remark(f"export: {line}")

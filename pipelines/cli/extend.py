@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ByOption, EffectFileOption, JsonOption, console, error_console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import console, error_console, print_json
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def command(
     why: Annotated[
         str, typer.Option("--why", metavar="TEXT", help="Reason for the change; needed with --remove.")
     ] = "",
-    by: ByOption = "",
+    by: options.ByOption = "",
     run: Annotated[str, typer.Option("--run", metavar="RUN", help="Run or file with the evidence.")] = "",
     output: Annotated[
         Path | None,
@@ -57,22 +58,22 @@ def command(
             "--effects", metavar="a,b,c", help="The starting model of a new file; default: bias to scale_temperature."
         ),
     ] = "",
-    effect_file: EffectFileOption = None,
+    effect_file: options.EffectFileOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write the next version of a model with one effect more or less, and who changed it, when and why.
 
     A MODEL that does not exist is created: version 1 has the starting model, version 2 the effect. A removed effect stays in the
     history of the file, with the reason.
     """
-    from pipelines.cli.inputs import add_effect_files
+    from pipelines.cli.inputs import add_effects
     from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.jobs.model_files import extended, model_step, publish_model, reduced
 
     printed = is_standard_output(output, "extend", as_json=as_json)
     _refuse_contradiction(model, effect, remove, why)
-    add_effect_files(effect_file)
+    add_effects(effect_file)
     step = model_step(remove or effect, why, by, run)
     text, begun = _start(model, effects, step)
     new, after = (reduced if remove else extended)(text, step, f"model {model.name}")

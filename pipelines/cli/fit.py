@@ -7,17 +7,8 @@ from pathlib import Path
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    LeaveOutOption,
-    ModelOption,
-    OtherEffectsOption,
-    OtherLimitsOption,
-    RunArgument,
-    error_console,
-    print_json,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, remark
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 
@@ -31,14 +22,14 @@ EXAMPLES = (
 
 
 def command(
-    run: RunArgument = "latest",
-    effects: OtherEffectsOption = "",
-    model: ModelOption = None,
-    limits: OtherLimitsOption = "",
-    leave_out: LeaveOutOption = "",
-    archive: ArchiveOption = None,
+    run: options.RunArgument = "latest",
+    effects: options.OtherEffectsOption = "",
+    model: options.ModelOption = None,
+    limits: options.OtherLimitsOption = "",
+    leave_out: options.LeaveOutOption = "",
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Fit a model to archived data again; the result is a new run on the same capture; the old run is kept.
 
@@ -70,7 +61,7 @@ def command(
     runner = Runner(job, store)
     try:
         for done in runner.all():
-            error_console().print(f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}")
+            remark(f"{done.stage:<9} {'was there' if done.reused else f'{done.seconds:.1f} s'}")
     except Exception:
         runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
         raise

@@ -6,15 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.archive import Run
-from pipelines.cli.options import console, error_console, give
+from pipelines.cli.printing import error_console, give, say
+from pipelines.cli.text.verdict_text import print_verdict_of_fit
 from schemas.errors import DONE, PART_FAILED
 from schemas.units import AXES
-
-VERDICTS = {
-    True: ("adequate", "bold green"),
-    False: ("NOT ADEQUATE: this model does not describe these data", "bold red"),
-    None: ("CANNOT BE JUDGED: see above", "bold yellow"),
-}
 
 
 def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *, as_json: bool) -> int:
@@ -107,14 +102,12 @@ def _known_poses(dwells: Any, past: Any, effects: list[str]) -> dict[str, Any]:
 
 
 def _print(document: dict[str, Any]) -> None:
-    out = console()
     left = f", without {', '.join(document['left_out'])}" if document["left_out"] else ""
     model = ", ".join(document["effects"]) or "axes in the plane"
-    out.print(f"{model}{left}: kept as run {document['run']}")
+    say(f"{model}{left}: kept as run {document['run']}")
     for line in document["lines"]:
-        out.print(f"  {line}")
+        say(f"  {line}")
     for unit in document["units"]:
         reasons = f" ({unit['reasons']})" if unit["reasons"] else ""
-        out.print(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}")
-    text, style = VERDICTS[document["adequate"]]
-    out.print(f"  {text}", style=style)
+        say(f"  {unit['unit']}: {unit['outcome']}, grade {unit['grade']}{reasons}")
+    print_verdict_of_fit(document["adequate"], "this model does not describe these data")

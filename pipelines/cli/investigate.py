@@ -10,19 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RecipeArgument,
-    RepeatOption,
-    SeedOption,
-    StationOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, remark, say, short
 from pipelines.cli.run import shown
 from pipelines.inquiry.joint_diagnosis import JointDiagnosis
 from schemas.errors import DONE, PART_FAILED
@@ -44,14 +33,14 @@ SETTLED = frozenset({"adequate", "told_apart"})
 
 
 def command(
-    recipe: RecipeArgument = "production",
-    station: StationOption = None,
+    recipe: options.RecipeArgument = "production",
+    station: options.StationOption = None,
     units: Annotated[
         str, typer.Option("--units", metavar="SN,…|FILE", help="Serial numbers slot by slot, or a slot map.")
     ] = "",
-    archive: ArchiveOption = None,
-    seed: SeedOption = None,
-    repeat: RepeatOption = 0,
+    archive: options.ArchiveOption = None,
+    seed: options.SeedOption = None,
+    repeat: options.RepeatOption = 0,
     effects: Annotated[
         str,
         typer.Option("--effects", metavar="a,b,c", help="Effects of the model to diagnose; the recipe's by default."),
@@ -78,7 +67,7 @@ def command(
         typer.Option("--unseen", help="Also measure follow-ups for effects that are not visible in the first run."),
     ] = False,
     direct: Annotated[bool, typer.Option("--direct", help="Run without the orchestrator.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Measure a lot, diagnose it, and measure follow-ups that discriminate between the effects that may be missing.
 
@@ -173,7 +162,7 @@ def _print_diagnosis(joint: JointDiagnosis) -> None:
 
     runs = len(joint.lineage.runs)
     text = f"diagnosis of {runs} run{'s' if runs > 1 else ''}: {verdict(joint.document)}"
-    error_console().print(text)
+    remark(text)
 
 
 def _continue_command() -> str:
@@ -190,17 +179,16 @@ def print_inquiry(document: dict[str, Any], archive: str | None = None) -> None:
     from pipelines.cli.text.diagnosis_text import print_findings, print_next_measurement
     from pipelines.diagnosis.sentences import verdict
 
-    out = console()
     good = document["ended"] in {"adequate", "told_apart"}
-    out.print(verdict(document), style="bold green" if document["adequate"] else "bold red")
+    say(verdict(document), style="bold green" if document["adequate"] else "bold red")
     _rounds(document)
     print_findings(document)
-    out.print(f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow")
+    say(f"{document['text'][:1].upper()}{document['text'][1:]}.", style="green" if good else "yellow")
     if document["ended"] in {"asked", "declined"}:
         print_next_measurement(document["next_measurements"])
-        print_next(out, [document["command"]])
+        print_next([document["command"]])
     else:
-        print_extension(out, document, partial(judged_data, document["run"], "", archive), None)
+        print_extension(document, partial(judged_data, document["run"], "", archive), None)
 
 
 def _rounds(document: dict[str, Any]) -> None:
@@ -210,7 +198,7 @@ def _rounds(document: dict[str, Any]) -> None:
         f"Station time: {first} min first run ({document['run']}), {further} min follow-ups "
         f"({100.0 * minutes['share']:.0f} %), {short(minutes['budget'])} min budget."
     )
-    console().print(text)
+    say(text)
     if document["rounds"]:
         lines = [[r["run"], short(r["minutes"]), "\n".join(r["why"])] for r in document["rounds"]]
         print_table(["run", "station time, min", "reason"], lines, title="Follow-ups")

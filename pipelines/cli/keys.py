@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.cli.options import JsonOption, console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, say
 
 PART = "Measure"
 ORDER = 190
@@ -26,7 +27,7 @@ def command(
         ),
     ] = "",
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """List what a recipe, limits or station file may contain, what --fault and demo accept, and the names of files.
 
@@ -46,7 +47,7 @@ def command(
         return
     _print(document["rows"])
     if not subject:
-        console().print("tumbleline keys SUBJECT shows a list")
+        say("tumbleline keys SUBJECT shows a list")
 
 
 def _print(rows: list[dict[str, str]]) -> None:

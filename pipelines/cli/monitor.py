@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, say
 from pipelines.monitoring.alerts import Poster
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ PORT = 9464
 
 
 def command(
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     queue: Annotated[
         list[str] | None,
         typer.Option("--queue", metavar="NAME", help="A queue that must have a worker online; may be repeated."),
@@ -50,7 +51,7 @@ def command(
         bool, typer.Option("--metrics", help="Print the numbers in the format of Prometheus, and exit.")
     ] = False,
     serve: Annotated[bool, typer.Option("--serve", help="Serve /metrics, /healthz and /livez until stopped.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Report whether the line is healthy; exit status 1 if it is not.
 
@@ -82,8 +83,8 @@ def command(
         print_json(document)
     else:
         for problem in document["problems"]:
-            console().print(problem)
-        console().print("healthy" if document["ok"] else f"{len(document['problems'])} problems")
+            say(problem)
+        say("healthy" if document["ok"] else f"{len(document['problems'])} problems")
     raise typer.Exit(DONE if document["ok"] else PART_FAILED)
 
 
@@ -99,7 +100,7 @@ def _serve(monitor: Monitor, host: str, port: int, poster: Poster | None, audits
     from pipelines.serving.listening import listening_socket
 
     place = listening_socket(host, port, "monitor")
-    console().print(f"http://{host}:{place.getsockname()[1]}/healthz")
+    say(f"http://{host}:{place.getsockname()[1]}/healthz")
     sys.stdout.flush()  # a program that started it waits for the address
     config = uvicorn.Config(
         TimedRequests(application(monitor), place.connections), log_level="warning", access_log=False, server_header=False,

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, say
 
 if TYPE_CHECKING:
     from pipelines.chain.attendance import Answer
@@ -25,13 +26,13 @@ def command(
     run: Annotated[
         str, typer.Argument(metavar="[FLOW-RUN]", help="The run to answer: the beginning of its name or id.")
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
     go: Annotated[bool, typer.Option("--go", help="Confirm: the run continues.")] = False,
     stop: Annotated[
         bool, typer.Option("--stop", help="Stop the run; the same 'tumbleline run' continues it later.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the runs that wait for the operator and their questions; answer with --go or --stop."""
     from schemas.errors import WrongUse
@@ -49,11 +50,11 @@ def command(
     if as_json:
         print_json({"waiting": [vars(one) for one in matches], "answered": "go" if go else "stop" if stop else None})
     elif go or stop:
-        console().print(f"{matches[0].name}: {'continues' if go else 'stops'}")
+        say(f"{matches[0].name}: {'continues' if go else 'stops'}")
     elif matches:
         print_table(["run", "asks"], [[one.name, one.question] for one in matches])
     else:
-        console().print("no run waits for the operator")
+        say("no run waits for the operator")
 
 
 def _answer(*, go: bool) -> Answer:

@@ -8,17 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    ModelOption,
-    RecipeArgument,
-    StationOption,
-    error_console,
-    give,
-    print_json,
-)
+from pipelines.cli import options
 from pipelines.cli.plan_files import save, write_page, write_pictures
+from pipelines.cli.printing import give, print_json, remark
 from pipelines.cli.text.plan_text import print_plan, print_procedures
 from schemas.errors import PART_FAILED
 from schemas.limits import Limits
@@ -101,11 +93,11 @@ app = typer.Typer(
 
 @app.command(RECIPE)
 def command(
-    recipe: RecipeArgument = "production",
+    recipe: options.RecipeArgument = "production",
     device: DeviceOption = "",
-    station: StationOption = None,
+    station: options.StationOption = None,
     effects: EffectsOption = "",
-    model: ModelOption = None,
+    model: options.ModelOption = None,
     noise: NoiseOption = None,
     wander: WanderOption = None,
     pose: Annotated[
@@ -118,13 +110,13 @@ def command(
         ),
     ] = None,
     page: PageOption = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     pictures: Annotated[
         Path | None,
         typer.Option("--pictures", metavar="DIR", help="Also write the pictures to this folder, as RECIPE-NAME.svg."),
     ] = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show station time, expected errors, and for every effect its visibility, detection floor and confounded effects.
 
@@ -145,7 +137,7 @@ def command(
         with_model(recipe, effects, model, archive, config.name), moves_of(pose or (), "plan"), "plan"
     )
     for message in refused_by_run(planned_recipe, config, folder_of(recipe)):
-        error_console().print(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
+        remark(f"warning: 'tumbleline run' refuses this recipe: {message}", style="yellow")
     limits = _limits(planned_recipe, folder_of(recipe))
     if not planned_recipe.tumbles and page is None and pictures is None:
         document = plan_of_procedures(planned_recipe, config, limits)
@@ -186,9 +178,9 @@ def optimise(
         ),
     ] = None,
     device: DeviceOption = "",
-    station: StationOption = None,
+    station: options.StationOption = None,
     effects: EffectsOption = "",
-    model: ModelOption = None,
+    model: options.ModelOption = None,
     see: Annotated[
         str,
         typer.Option(
@@ -255,9 +247,9 @@ def optimise(
     noise: NoiseOption = None,
     wander: WanderOption = None,
     page: PageOption = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write the recipe with the least station time that reaches the required errors.
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive
-from pipelines.cli.options import ArchiveOption, EffectFileOption, JsonOption, console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -29,14 +30,14 @@ def command(
     device: Annotated[str, typer.Option("--device", metavar="KIND", help="For this kind of device only.")] = "",
     station: Annotated[str, typer.Option("--station", metavar="NAME", help="For this station only.")] = "",
     reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for the release.")] = "",
-    effect_file: EffectFileOption = None,
-    archive: ArchiveOption = None,
+    effect_file: options.EffectFileOption = None,
+    archive: options.ArchiveOption = None,
     *,
     force: Annotated[
         bool, typer.Option("--force", help="Release the model without a what-if with the verdict 'better'.")
     ] = False,
     listed: Annotated[bool, typer.Option("--list", help="List the releases.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Release a model to the line from a date, or list the releases.
 
@@ -54,12 +55,11 @@ def command(
     if as_json:
         print_json({"archive": str(store.root), **_document(record)})
         return
-    out = console()
-    out.print(
+    say(
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
     )
-    out.print(f"  {', '.join(record.effects)}")
-    out.print(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}")
+    say(f"  {', '.join(record.effects)}")
+    say(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}")
 
 
 def _released(
@@ -98,7 +98,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
         print_json({"archive": str(store.root), "releases": rows})
         return
     if not records:
-        console().print(f"no model is released in {store.root}; release one with 'tumbleline release'")
+        say(f"no model is released in {store.root}; release one with 'tumbleline release'")
         return
     lines = [
         [
@@ -113,7 +113,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
     ]
     print_table(["no.", "model", "for", "from", "in use", "by"], lines, whole=4)
     for one in records:
-        console().print(f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}")
+        say(f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}")
 
 
 def _name(record: Release) -> str:

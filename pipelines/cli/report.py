@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, RunArgument, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import print_json
 
 PART = "Results"
 ORDER = 330
@@ -15,7 +16,9 @@ EXAMPLES = (
 )
 
 
-def command(run: RunArgument = "latest", archive: ArchiveOption = None, *, as_json: JsonOption = False) -> None:
+def command(
+    run: options.RunArgument = "latest", archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False
+) -> None:
     """Print the path of a run's report; write the report if it is missing or older than the run's tables."""
     from pipelines.archive import Archive
     from pipelines.report import make_report

@@ -10,21 +10,8 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli.options import (
-    ArchiveOption,
-    DaskOption,
-    EffectFileOption,
-    JsonOption,
-    ModelOption,
-    OtherEffectsOption,
-    OtherLimitsOption,
-    SelectionArgument,
-    WorkersOption,
-    console,
-    error_console,
-    give,
-    print_table,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, say
 
 if TYPE_CHECKING:
     from pipelines.jobs.model_change import ModelChange
@@ -43,20 +30,20 @@ SHOWN = 40
 
 
 def command(
-    selection: SelectionArgument,
-    effects: OtherEffectsOption = "",
-    model: ModelOption = None,
-    limits: OtherLimitsOption = "",
-    effect_file: EffectFileOption = None,
-    archive: ArchiveOption = None,
-    dask: DaskOption = "",
-    workers: WorkersOption = None,
+    selection: options.SelectionArgument,
+    effects: options.OtherEffectsOption = "",
+    model: options.ModelOption = None,
+    limits: options.OtherLimitsOption = "",
+    effect_file: options.EffectFileOption = None,
+    archive: options.ArchiveOption = None,
+    dask: options.DaskOption = "",
+    workers: options.WorkersOption = None,
     *,
     check: Annotated[
         bool, typer.Option("--check", help="Write nothing; check that every table is reproduced byte for byte.")
     ] = False,
     report: Annotated[bool, typer.Option("--report", help="Also make the report of every re-run.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Re-analyse archived runs with the present code, another model or other limits; only stages with a changed key are computed.
 
@@ -142,20 +129,19 @@ def _print(outcomes: list[RerunOutcome], document: dict[str, Any], archive: str 
     lines = [_line(one) for one in outcomes[:SHOWN] if not one.error]
     if lines:
         print_table(["run", "re-run", "changed", "stages computed"], lines, whole=2)
-    out = console()
     if len(outcomes) > SHOWN:
-        out.print(f"… and {len(outcomes) - SHOWN} more; --json lists all", style="dim")
+        say(f"… and {len(outcomes) - SHOWN} more; --json lists all", style="dim")
     for one in outcomes:
         if one.error:
-            out.print(f"  {one.run}: {one.error}", style="bold red")
-    out.print(
+            say(f"  {one.run}: {one.error}", style="bold red")
+    say(
         f"{document['selected']} selected: {document['rerun']} re-analysed, {document['unchanged']} unchanged, "
         f"{document['failed']} failed"
     )
     from pipelines.cli.next_commands import archive_words, command_line, print_next
 
     anew = [one for one in outcomes if one.new and one.new != one.run and not one.error]
-    print_next(out, [command_line("diff", one.run, one.new, *archive_words(archive)) for one in anew[:DIFFERENCES]])
+    print_next([command_line("diff", one.run, one.new, *archive_words(archive)) for one in anew[:DIFFERENCES]])
 
 
 def _line(one: RerunOutcome) -> list[str]:
@@ -180,31 +166,28 @@ def _check(store: Archive, runs: list[str], change: ModelChange, how: tuple[str,
 
 
 def _print_check(results: list[Reproduction]) -> None:
-    out = console()
     tables = 0
     for one in results:
         tables += sum(how == "same bytes" for how in one.tables.values())
         for line in [one.error] if one.error else one.differences:
-            out.print(f"  {one.run}: {line}", style="bold red")
+            say(f"  {one.run}: {line}", style="bold red")
         if one.differences:
             why = (
                 ", ".join(one.changed)
                 or "neither code nor libraries; the computer differs or the stored file is damaged"
             )
-            out.print(f"    changed since: {why}")
+            say(f"    changed since: {why}")
     left = sum(how == "not checked" for one in results for how in one.tables.values())
     same = sum(one.same for one in results)
-    out.print(
+    say(
         f"{same} of {number_of(len(results), 'run')} reproduced: {number_of(tables, 'table')} with the same bytes",
         style="bold",
     )
     if left:
-        out.print(
-            f"{number_of(left, 'table')} not checked: the raw samples for them are not in the archive", style="dim"
-        )
+        say(f"{number_of(left, 'table')} not checked: the raw samples for them are not in the archive", style="dim")
     changes = sorted({change for one in results if one.same for change in one.changed})
     if changes:
-        out.print(
+        say(
             f"changed since, without effect on the tables: {', '.join(changes)}",
             style="dim",
         )

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from pipelines.cli.options import ArchiveOption, JsonOption, console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, say
 
 PART = "Certificates, trace, audit"
 ORDER = 420
@@ -32,9 +33,9 @@ def command(
             "--certificate", min=0, help="Number after the serial; default: all that are valid today or later."
         ),
     ] = 0,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
     from pipelines.archive import Archive, Run
@@ -51,4 +52,4 @@ def command(
     if as_json:
         print_json({"unit": serial, "revoked": ended, **event.document()})
     else:
-        console().print(f"revoked {', '.join(ended)} from {event.start} on: {event.reason}")
+        say(f"revoked {', '.join(ended)} from {event.start} on: {event.reason}")

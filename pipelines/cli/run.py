@@ -9,17 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Archive, Run
-from pipelines.cli.options import (
-    ArchiveOption,
-    JsonOption,
-    RecipeArgument,
-    RepeatOption,
-    SeedOption,
-    StationOption,
-    console,
-    error_console,
-    print_json,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, print_json, remark
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -36,8 +27,8 @@ EXAMPLES = (
 
 
 def command(
-    recipe: RecipeArgument = "production",
-    station: StationOption = None,
+    recipe: options.RecipeArgument = "production",
+    station: options.StationOption = None,
     units: Annotated[
         str,
         typer.Option(
@@ -46,9 +37,9 @@ def command(
             help="Serial numbers in the order of the slots, a slot map (CSV or TOML), or 'scan' to scan them.",
         ),
     ] = "",
-    archive: ArchiveOption = None,
-    seed: SeedOption = None,
-    repeat: RepeatOption = 0,
+    archive: options.ArchiveOption = None,
+    seed: options.SeedOption = None,
+    repeat: options.RepeatOption = 0,
     fault: Annotated[
         list[str] | None,
         typer.Option("--fault", metavar="KIND[:KEY=VALUE…]", help="Fault of the simulated station; may be repeated."),
@@ -61,7 +52,7 @@ def command(
         ),
     ] = None,
     direct: Annotated[bool, typer.Option("--direct", help="Run the same chain without the orchestrator.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Measure and calibrate a lot, from recipe to report: the main job.
 
@@ -99,7 +90,7 @@ def command(
         for request, job in zip(requests, jobs, strict=True)
     ]
     for line in (line for run in runs for line in library_remarks(run)):
-        error_console().print(f"run: {line}")
+        remark(f"run: {line}")
     documents = [judged(summary(run), run) for run in runs]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
@@ -109,7 +100,6 @@ def command(
             print_adequacy(document["adequacy"])
             print_references(document["references"])
         print_next(
-            console(),
             [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
         )
     raise typer.Exit(max(exit_status(document) for document in documents))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.cli.options import error_console
+from pipelines.cli.printing import error_console, remark
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | Non
     if plot is not None:
         refuse_ending(plot, "--plot")
         files.publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot", files.ELSEWHERE)
-        error_console().print(f"plot: {plot}")
+        remark(f"plot: {plot}")
     if page is not None:
         files.publish(page, noise_page(document).encode(), "page", files.ELSEWHERE)
-        error_console().print(f"page: {page}")
+        remark(f"page: {page}")

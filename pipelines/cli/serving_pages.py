@@ -8,7 +8,7 @@ import socket
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from pipelines.cli.options import error_console
+from pipelines.cli.printing import remark
 
 if TYPE_CHECKING:
     import uvicorn
@@ -20,7 +20,7 @@ def run_until_stopped(server: uvicorn.Server, place: socket.socket, command: str
     try:
         with suppress(KeyboardInterrupt):  # the server has ended by it, and mostly raises it again
             server.run(sockets=[place])
-        error_console().print(f"{command}: ended")
+        remark(f"{command}: ended")
     finally:
         logging.getLogger("uvicorn.error").removeFilter(_not_cancelled)
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, StationOption, console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, say
 from pipelines.cli.station_check import check
 from pipelines.cli.station_log import log
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
@@ -70,7 +71,7 @@ app.command()(watch)
 
 @app.command()
 def serve(
-    station: StationOption = None,
+    station: options.StationOption = None,
     host: Annotated[str, typer.Option("--host", help="Interface to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="TCP port; 0: any free port.")] = 5020,
     speed: Annotated[
@@ -86,7 +87,7 @@ def serve(
         ),
     ] = 30.0,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Serve the simulated station over Modbus TCP until interrupted, for any Modbus client."""
     import signal
@@ -109,7 +110,7 @@ def serve(
             print_table(
                 ["device", "id", "profile"], lines, title=f"{config.name} on {at}:{port_found}, speed {speed:g}"
             )
-            console().print("stop with Ctrl-C")
+            say("stop with Ctrl-C")
 
     run(
         config,
@@ -127,7 +128,7 @@ def serve(
 def profiles(
     name: Annotated[str, typer.Argument(metavar="[PROFILE]", help="Show the registers of this profile.")] = "",
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """List the register-map profiles, or the registers of one profile."""
     from stations.profile_files import load_profile, profile_names
@@ -173,7 +174,7 @@ def _print_disputed(profile: Profile) -> None:
     """Registers on which sources disagree, one line each."""
     for register in profile.registers:
         if register.disputed:
-            console().print(f"disputed  {register.name}: {register.disputed}")
+            say(f"disputed  {register.name}: {register.disputed}")
 
 
 def _where(device: Served) -> dict[str, object]:

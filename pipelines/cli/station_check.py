@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import JsonOption, StationOption, error_console, print_json, print_table
+from pipelines.cli import options
+from pipelines.cli.printing import print_json, print_table, remark
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 
 if TYPE_CHECKING:
@@ -19,12 +20,12 @@ if TYPE_CHECKING:
 
 
 def check(
-    station: StationOption = None,
+    station: options.StationOption = None,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
     *,
     registers: Annotated[bool, typer.Option("--registers", help="Only read every register once; no motion.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Test a station before a shift: registers, instruments, moves, noise of every slot, a check standard.
 
@@ -47,7 +48,7 @@ def check(
     else:
         _print(readings, findings, registers=registers)
         for message in failed:
-            error_console().print(message)
+            remark(message)
     raise typer.Exit(STATION if failed else 0)
 
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.cli.options import JsonOption, StationOption, console, error_console, print_json
+from pipelines.cli import options
+from pipelines.cli.printing import console, print_json, remark, say
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
 
 if TYPE_CHECKING:
@@ -19,13 +20,13 @@ GOOD, BAD = "green", "bold red"
 
 
 def status(
-    station: StationOption = None,
+    station: options.StationOption = None,
     device: DeviceOption = "ADXL355",
     units: UnitsOption = 8,
     every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings with --watch.")] = 1.0,
     *,
     watch: Annotated[bool, typer.Option("--watch", help="Repeat until Ctrl-C.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show angles, temperatures, states, slots and the run that drives the station.
 
@@ -45,10 +46,10 @@ def status(
         elif watch:
             now = _live(look, every)
         else:
-            console().print(picture(now))
+            say(picture(now))
     if not as_json:
         for fault in now.faults.values():
-            error_console().print(fault)
+            remark(fault)
     raise typer.Exit(STATION if now.faults else 0)
 
 

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.archive import Records
+from pipelines.cli import options
 from pipelines.cli.chart import Line, chart, clock
-from pipelines.cli.options import ArchiveOption, JsonOption, StationOption, console, print_json
+from pipelines.cli.printing import console, print_json, say
 from pipelines.cli.station_lot import made_up
 
 if TYPE_CHECKING:
@@ -52,22 +53,22 @@ class ChartData:
 
 def watch(
     run: Annotated[str, typer.Argument(metavar="[RUN]", help="A run of the archive; default: the newest.")] = "latest",
-    station: StationOption = None,
-    archive: ArchiveOption = None,
+    station: options.StationOption = None,
+    archive: options.ArchiveOption = None,
     minutes: Annotated[
         float, typer.Option("--minutes", min=0.1, help="Time span, minutes before now; default: the whole run.")
     ] = math.inf,
     every: Annotated[float, typer.Option("--every", min=0.1, help="Seconds between two readings.")] = 1.0,
     *,
     once: Annotated[bool, typer.Option("--once", help="Draw once and exit.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Draw temperatures and angles over time, live: of a run in the archive, or with --station of a station."""
     with _source(run, station, archive) as look:
         if as_json:
             print_json(look().document())
         elif once or not sys.stdout.isatty():
-            console().print(picture(look(), minutes))
+            say(picture(look(), minutes))
         else:
             _live(look, minutes, every)
 

@@ -9,7 +9,7 @@ import pandas as pd
 from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.capture.interruptions import Interruptions, interruptions
-from pipelines.cli.options import STYLES, console, print_table, short
+from pipelines.cli.printing import STYLES, print_table, say, short
 from pipelines.tables.frames import rows_of
 from pipelines.tables.json_values import json_value
 from schemas.errors import DONE, PART_FAILED
@@ -95,23 +95,22 @@ def print_summary(document: dict[str, Any]) -> None:
         outcome = Text(unit["outcome"], style=STYLES[unit["outcome"]])
         lines.append([str(unit["slot"]), unit["unit"], outcome, unit["grade"], *values])
     print_table(["slot", "unit", "result", "grade", *(title for _, title in shown)], lines)
-    out = console()
     if calibrated:
-        out.print(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim")
+        say(" · ".join(LEGEND[name] for name, _ in shown if name in LEGEND), style="dim")
         if any(name == "velocity_random_walk_ug_rtHz" for name, _ in shown):
-            out.print(NOISE_LEGEND, style="dim")
+            say(NOISE_LEGEND, style="dim")
     for unit in document["units"]:
         if unit["reasons"]:
-            out.print(f"  {unit['unit']}: {unit['reasons']}")
-    out.print(f"  decided by {document['rule']}", style="dim")
+            say(f"  {unit['unit']}: {unit['reasons']}")
+    say(f"  decided by {document['rule']}", style="dim")
     if any(unit.get("basis") != "budget" for unit in document["units"]):
-        out.print(f"  {NOISE_ONLY}", style="dim")
+        say(f"  {NOISE_ONLY}", style="dim")
     for line in _interrupted(document["interruptions"]):
-        out.print(line)
+        say(line)
     total = len(document["units"])
-    out.print(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
-    out.print(f"run     {document['run']}")
-    out.print(f"report  {document['report']}")
+    say(f"{document['passed']} of {total} passed, {document['failed']} failed, {document['refused']} refused")
+    say(f"run     {document['run']}")
+    say(f"report  {document['report']}")
 
 
 def _listed(document: dict[str, Any]) -> list[tuple[str, str]]:

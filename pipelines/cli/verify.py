@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of
-from pipelines.cli.options import ArchiveOption, JsonOption, console, error_console, give
+from pipelines.cli import options
+from pipelines.cli.printing import console, error_console, give
 from pipelines.integrity import Report
 from schemas.errors import DONE, PART_FAILED
 
@@ -60,9 +61,9 @@ def command(
         str,
         typer.Option("--head", metavar="HASH", help="Hash of an entry of the chain from an earlier verification."),
     ] = "",
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Compute every hash again: find changed bytes, missing files, edited manifests, foreign tables, false signatures.
 

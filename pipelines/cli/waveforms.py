@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.archive import Run
-from pipelines.cli.options import ArchiveOption, RunArgument, console
+from pipelines.cli import options
+from pipelines.cli.printing import say
 
 if TYPE_CHECKING:
     from pipelines.export.waveforms import Channel
@@ -27,7 +28,7 @@ _NAMES = ", ".join(found.name for found in iter_modules([str(_FOLDER)]) if found
 
 
 def command(
-    run: RunArgument = "latest",
+    run: options.RunArgument = "latest",
     record: Annotated[int, typer.Option("--record", metavar="N", help="Number of the record, from 0.")] = 0,
     unit: Annotated[
         str, typer.Option("--unit", metavar="SN", help="Serial number; default: the first unit of the record.")
@@ -42,7 +43,7 @@ def command(
             help="File to write; - prints a text; named after run and record.",
         ),
     ] = None,
-    archive: ArchiveOption = None,
+    archive: options.ArchiveOption = None,
 ) -> None:
     """Write the channels of a unit and of the reference sensor with unit and sample interval.
 
@@ -62,7 +63,7 @@ def command(
         return
     place = output or Path(f"{stored.id[:12]}-record{record}{WRITERS[form].SUFFIX}")
     for path in write_waveforms(form, channels, place):
-        console().print(f"{path}: {', '.join(one.name for one in channels)}")
+        say(f"{path}: {', '.join(one.name for one in channels)}")
 
 
 def _one_text(form: str, channels: list[Channel]) -> str:

@@ -9,19 +9,8 @@ import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
-from pipelines.cli.options import (
-    ArchiveOption,
-    DaskOption,
-    EffectFileOption,
-    JsonOption,
-    OtherLimitsOption,
-    WorkersOption,
-    console,
-    error_console,
-    give,
-    print_table,
-    short,
-)
+from pipelines.cli import options
+from pipelines.cli.printing import error_console, give, print_table, say, short
 
 if TYPE_CHECKING:
     from pipelines.jobs.model_change import ModelChange
@@ -43,13 +32,13 @@ def command(
         list[str] | None,
         typer.Argument(metavar="[SELECTION…]", help="Runs as for 'tumbleline rerun'; default: all."),
     ] = None,
-    limits: OtherLimitsOption = "",
-    effect_file: EffectFileOption = None,
-    archive: ArchiveOption = None,
-    dask: DaskOption = "",
-    workers: WorkersOption = None,
+    limits: options.OtherLimitsOption = "",
+    effect_file: options.EffectFileOption = None,
+    archive: options.ArchiveOption = None,
+    dask: options.DaskOption = "",
+    workers: options.WorkersOption = None,
     *,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Show the effect of a model on the lots of the archive: yield, errors, and errors on later runs, with old and new model.
 
@@ -84,7 +73,6 @@ def _evaluated(store: Archive, runs: list[str], change: ModelChange, dask: str, 
 
 
 def _print(document: dict[str, Any]) -> None:
-    out = console()
     title = f"{document['name']} version {document['version']} on {number_of(document['lots'], 'lot')}"
     rows = [(f"{row['device']} on {row['station']}", row) for row in document["groups"]]
     lines = [line for name, row in [*rows, ("all", document["total"])] for line in _lines(name, row)]
@@ -93,14 +81,14 @@ def _print(document: dict[str, Any]) -> None:
     for key, outcome in (("to_fail", "fail with the new model only"), ("to_pass", "pass with the new model only")):
         rows = document["flips"][key]
         if rows:
-            out.print(f"{number_of(len(rows), 'unit')}: {outcome}")
+            say(f"{number_of(len(rows), 'unit')}: {outcome}")
             for row in rows[:SHOWN]:
-                out.print(f"  {row['unit']} in {row['run']}: {row['reasons']}", style="dim")
+                say(f"  {row['unit']} in {row['run']}: {row['reasons']}", style="dim")
     for row in document["failed"]:
-        out.print(f"  {row['run']}: {row['error']}", style="bold red")
+        say(f"  {row['run']}: {row['error']}", style="bold red")
     style = {"better": "bold green", "worse": "bold red"}.get(document["verdict"], "bold")
-    out.print(f"{document['verdict']}: {document['words']}", style=style)
-    out.print(f"evidence  {document['evidence']}")
+    say(f"{document['verdict']}: {document['words']}", style=style)
+    say(f"evidence  {document['evidence']}")
 
 
 def _lines(name: str, row: dict[str, Any]) -> list[list[str]]:

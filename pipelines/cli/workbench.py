@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from pipelines.cli.options import console, error_console
+from pipelines.cli.printing import remark, say
 from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
@@ -98,9 +98,9 @@ def command(
         )  # fmt: skip
         servers: list[uvicorn.Server] = []
         app = create_app(settings, ending=lambda: any(server.should_exit for server in servers))
-        console().print(f"{settings.address}/?token={settings.token}")
+        say(f"{settings.address}/?token={settings.token}")
         sys.stdout.flush()  # a program that started it waits for the address
-        error_console().print("Open the address above; Ctrl-C ends the workbench.")
+        remark("Open the address above; Ctrl-C ends the workbench.")
         config = uvicorn.Config(
             TimedRequests(app, place.connections), host=host, port=listening, log_level="warning", access_log=False,
             server_header=False, ws="none", timeout_graceful_shutdown=PATIENCE_S,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pipelines.cli.options import console, print_table, short
+from pipelines.cli.printing import print_table, say, short
 from schemas.decisions import LARGEST_ERROR
 
 RAISED = 3.0
@@ -15,13 +15,12 @@ RAISED = 3.0
 def print_plan(document: dict[str, Any]) -> None:
     """Print a plan."""
     minutes, error = document["minutes"], document["dwell_error_ug"]
-    out = console()
-    out.print(
+    say(
         f"{document['recipe']} with {document['device']} on station {document['station']}: "
         f"{document['dwells']} dwells in {document['poses']} poses at {_soaks(len(document['temperatures_C']))}"
     )
-    out.print(_time(minutes))
-    out.print(
+    say(_time(minutes))
+    say(
         f"error of a dwell (1σ): {short(error['together'])} µg; white {short(error['white'])}, wander {short(error['wander'])}"
         f"{_longer(document['dwell_s'])}"
     )
@@ -32,7 +31,7 @@ def print_plan(document: dict[str, Any]) -> None:
         again = (
             "no repeatability is stated" if bias["switch_on_u_ug"] is None else f"{short(bias['switch_on_u_ug'])} µg"
         )
-        out.print(
+        say(
             f"bias, 1σ of the worst axis: as the mean of the record {short(bias['record_u_ug'])} µg, of the day after it "
             f"{short(bias['long_u_ug'])} µg; after the next switch-on: {again}"
         )
@@ -47,8 +46,8 @@ def print_plan(document: dict[str, Any]) -> None:
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
         names = ", ".join(faint)
-        out.print(f"* floor above the typical size: {names}")
-    out.print(
+        say(f"* floor above the typical size: {names}")
+    say(
         "v: fraction of the effect's column that remains after the model; 1/v²: variance inflation; floor: smallest detectable "
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
         style="dim",
@@ -69,14 +68,13 @@ def print_plan(document: dict[str, Any]) -> None:
         ["effect not visible", "reason; what to add"], [[r["effect"], r["why"] or r["breaker"]] for r in invisible]
     )
     if "page" in document:
-        out.print(f"Page: {document['page']}")
+        say(f"Page: {document['page']}")
 
 
 def print_procedures(document: dict[str, Any]) -> None:
     """Print the plan of a recipe without the multi-position test."""
-    out = console()
-    out.print(f"{document['recipe']} with {document['device']} on station {document['station']}")
-    out.print(_time(document["minutes"]))
+    say(f"{document['recipe']} with {document['device']} on station {document['station']}")
+    say(_time(document["minutes"]))
     _print_procedure_rows(document)
 
 
@@ -171,11 +169,8 @@ LEAST = 0.01
 
 def print_reach(reach: dict[str, Any] | None) -> None:
     """A table of the quantities with their largest contributions, limits that cannot be met, and remarks."""
-    out = console()
     if reach is None:
-        out.print(
-            "uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate"
-        )
+        say("uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate")
         return
     worst: dict[str, dict[str, Any]] = {}
     for row in reach["quantities"]:
@@ -184,15 +179,15 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], [_line(row) for row in worst.values()])
     for row in worst.values():
         rulers = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["shares"].items() if share >= LEAST)
-        out.print(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}")
+        say(f"{TITLES[row['quantity']]}: {rulers or 'no contribution'}")
     period = f"period of validity {reach['validity_months']} months, frame {reach['frame']}"
-    out.print(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim")
+    say(f"{period}; references by {reach['grade_source'].replace('_', ' ')}", style="dim")
     if reach["grade_source"] == "assumed":
-        out.print("references: assumed values, which allow no certificate")
+        say("references: assumed values, which allow no certificate")
     for name, rules in reach["not_stated"].items():
-        out.print(f"not stated: {name} (dominates {rules})")
+        say(f"not stated: {name} (dominates {rules})")
     for line in (*reach["remarks"], *(f"cannot be met: {one}" for one in reach["unreachable"])):
-        out.print(line)
+        say(line)
 
 
 def _line(row: dict[str, Any]) -> list[str]:
