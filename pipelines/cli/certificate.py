@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import print_json, remark, say
+from pipelines.cli.printing import give_lines, remark
 
 if TYPE_CHECKING:
     from pipelines.certificates.document.issue import Issued
@@ -65,11 +65,8 @@ def command(
     who = read_laboratory(laboratory)
     key = None if sign_with is None else read_key(sign_with, password_file)
     done = issue(Archive(archive), names, who, output, key=key, address=address)
-    if as_json:
-        print_json(_document(done))
-    else:
-        for one in done.written:
-            say(f"certificate {one.number}: {one.pdf}, {one.xml}")
+    lines = [f"certificate {one.number}: {one.pdf}, {one.xml}" for one in done.written]
+    give_lines(_document(done), lines, as_json=as_json)
     for serial, why in done.left_out.items():
         remark(f"certificate: {serial}: {why}")
     raise typer.Exit(PART_FAILED if done.left_out else DONE)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import console, error_console, print_json, print_table, say, short
+from pipelines.cli.printing import console, error_console, print_json, print_table, publish, say, short
 from schemas.progress import Progress
 
 if TYPE_CHECKING:
@@ -158,14 +158,14 @@ class _Game:
         return document
 
     def _diagnose(self) -> dict[str, Any]:
-        from pipelines.cli.diagnose import diagnosed, write_report
+        from pipelines.cli.diagnose import diagnosed
         from pipelines.cli.text.diagnosis_text import print_diagnosis
 
         self._step("2. What is missing?", _command("diagnose", self.folder, self.hidden.model))
         source = str(self.folder / "dwells.parquet")
         document, report = diagnosed(self.lot.dwells, self.lot.history, self.model, source, with_report=True)
         document["history"] = str(self.folder / "history.parquet")
-        write_report(self.folder / "report.html", report)
+        publish(self.folder / "report.html", report, "report")
         if not self.quiet:
             file = self.folder / "model.toml"
             print_diagnosis(document, data=None, model=file)  # the next step of the game adds the effect

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import error_console, print_json, remark
+from pipelines.cli.printing import error_console, print_json, publish
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def command(
     )
     document["history"] = beside or None
     if report is not None:
-        write_report(report, report_text)
+        publish(report, report_text, "report")
     if following is not None and base is not None:
         from pipelines.jobs.recipes import folder_of
 
@@ -175,11 +175,3 @@ def write_next(path: Path, document: dict[str, Any], base: Recipe, home: Path, s
     files.publish(path, recipe_text(recipe, remarks).encode(), "recipe", files.ELSEWHERE)
     out.print(f"next: {path}; to see what it determines:")
     out.print(f"  {command_line('plan', str(path))}")
-
-
-def write_report(path: Path, text: str) -> None:
-    """Write a report, complete or not at all, and print its path."""
-    from pipelines.archive import files
-
-    files.publish(path, text.encode(), "report", files.ELSEWHERE)
-    remark(f"report: {path}")

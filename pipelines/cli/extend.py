@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import console, error_console, print_json
+from pipelines.cli.printing import give_lines, remark, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
+    from pipelines.cli.documents.models import ExtendDocument
     from pipelines.jobs.model_files import ModelStep
 
 PART = "Is the model good enough, and what is missing?"
@@ -82,7 +83,7 @@ def command(
         print_text(new)
     else:
         publish_model(target, new)
-    document = {
+    document: ExtendDocument = {
         "file": str(target),
         "model": after.model.name,
         "version": after.model.version,
@@ -94,15 +95,12 @@ def command(
         "at": step.at.isoformat(),
         "why": step.why,
     }
-    if as_json:
-        print_json(document)
-        return
-    out = error_console() if printed else console()
+    change = f"removes {step.effect}" if remove else f"has {step.effect}"
+    lines = [f"{target}: version {after.model.version} {change} ({step.why})"]
     if begun:
         first = ", ".join(e for e in after.model.effects if e != effect)
-        out.print(f"{target}: created with version 1: {first}")
-    change = f"removes {step.effect}" if remove else f"has {step.effect}"
-    out.print(f"{target}: version {after.model.version} {change} ({step.why})")
+        lines.insert(0, f"{target}: created with version 1: {first}")
+    give_lines(document, lines, as_json=as_json, show=remark if printed else say)
 
 
 def _refuse_contradiction(model: Path, effect: str, remove: str, why: str) -> None:

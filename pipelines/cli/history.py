@@ -9,7 +9,8 @@ import typer
 
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, print_next
-from pipelines.cli.printing import error_console, print_json, print_table, remark, say, short
+from pipelines.cli.printing import error_console, give, print_table, publish, say, short
+from schemas.errors import WrongUse
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 250
@@ -57,22 +58,17 @@ def command(
             for version in versions(model_file)
         ]
     if picture is not None:
-        from pipelines.archive import files
         from pipelines.drawing.picture import picture as drawn
         from pipelines.report.evolution import evolution_chart
 
         chart = evolution_chart(rows, model_file.model.name)
-        files.publish(picture, drawn(chart, picture.suffix.lower()), "picture", files.ELSEWHERE)
-        remark(f"picture: {picture}")
-    if as_json:
-        print_json({"model": model_file.model.name, "file": str(model), "versions": rows})
-    else:
-        _print(rows, model_file.model.name, model)
+        publish(picture, drawn(chart, picture.suffix.lower()), "picture")
+    document = {"model": model_file.model.name, "file": str(model), "versions": rows}
+    give(document, lambda _: _print(rows, model_file.model.name, model), as_json=as_json)
 
 
 def _refuse_picture(picture: Path | None, dwells: str) -> None:
     from pipelines.drawing.picture import refuse_ending
-    from schemas.errors import WrongUse
 
     if picture is None:
         return

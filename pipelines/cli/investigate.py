@@ -13,7 +13,7 @@ import typer
 from pipelines.cli import options
 from pipelines.cli.printing import error_console, give, print_table, remark, say, short
 from pipelines.cli.run import shown
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.inquiry.lineage import JointDiagnosis
 from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from inertial.counts import number_of
-from pipelines.archive import RunInfo
+from pipelines.archive import Archive, RunInfo
 from pipelines.cli import options
-from pipelines.cli.printing import print_json, print_table, say
+from pipelines.cli.printing import give, print_table, say
 from schemas.tables import ADEQUATE
 
 PART = "Results"
@@ -21,13 +21,13 @@ EXAMPLES = (
 
 def command(archive: options.ArchiveOption = None, *, as_json: options.JsonOption = False) -> None:
     """List the runs of the archive in the order of their start."""
-    from pipelines.archive import Archive
-
     store = Archive(archive)
     infos = store.runs()
-    if as_json:
-        print_json({"archive": str(store.root), "runs": [asdict(info) for info in infos]})
-        return
+    document = {"archive": str(store.root), "runs": [asdict(info) for info in infos]}
+    give(document, lambda _: _print(infos, store), as_json=as_json)
+
+
+def _print(infos: list[RunInfo], store: Archive) -> None:
     if not infos:
         say(f"no run in {store.root}; make one with 'tumbleline run'")
         return
@@ -40,13 +40,7 @@ def command(archive: options.ArchiveOption = None, *, as_json: options.JsonOptio
 
 def _line(info: RunInfo) -> list[str]:
     started = info.started[:16].replace("T", " ")
-    return [
-        info.id,
-        started,
-        info.station or "import",
-        _result(info),
-        f"{_units(info.units)}, {info.device}",
-    ]
+    return [info.id, started, info.station or "import", _result(info), f"{_units(info.units)}, {info.device}"]
 
 
 def _result(info: RunInfo) -> str:

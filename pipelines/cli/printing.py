@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inertial.uncertainty import rounding
@@ -42,6 +43,14 @@ def say(what: object = "", style: str = "", end: str = "\n") -> None:
     console().print(what, style=style, end=end)
 
 
+def publish(path: Path, content: str | bytes, what: str) -> None:
+    """Write a file, complete or not at all, and name it on standard error."""
+    from pipelines.archive import files
+
+    files.publish(path, content.encode() if isinstance(content, str) else content, what, files.ELSEWHERE)
+    remark(f"{what}: {path}")
+
+
 def remark(text: str, style: str = "", end: str = "\n") -> None:
     """Print a text on standard error."""
     error_console().print(text, style=style, end=end)
@@ -53,6 +62,13 @@ def give(document: Any, show: Callable[[Any], object], *, as_json: bool) -> None
         print_json(document)
     else:
         show(document)
+
+
+def give_lines(
+    document: Any, lines: Iterable[str], *, as_json: bool, show: Callable[[str], object] | None = None
+) -> None:
+    """The result of a command: its document as JSON, or lines for people, which ``show`` prints."""
+    give(document, lambda _: [(show or say)(line) for line in lines], as_json=as_json)
 
 
 def print_json(document: Any) -> None:

@@ -49,12 +49,8 @@ def command(
         raise WrongUse("query: --json and --csv are both given, one is needed; leave one out")
     answer = ask(Archive(archive), sql, compact=compact)
     if as_json:
-        print_json(
-            {
-                "columns": list(answer.columns),
-                "rows": [dict(zip(answer.columns, row, strict=True)) for row in answer.rows],
-            }
-        )
+        rows = [dict(zip(answer.columns, row, strict=True)) for row in answer.rows]
+        print_json({"columns": list(answer.columns), "rows": rows})
         return
     if as_csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")

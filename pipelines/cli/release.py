@@ -9,7 +9,7 @@ import typer
 
 from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.printing import print_json, print_table, say
+from pipelines.cli.printing import give, give_lines, print_table, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -46,20 +46,19 @@ def command(
     """
     store = Archive(archive)
     if listed:
-        _refuse_both(model)
+        if model is not None:
+            raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
         _list(store, as_json=as_json)
         return
     record = _released(
         store, model, since, effect_file, {"device": device, "station": station, "reason": reason, "force": force}
     )
-    if as_json:
-        print_json({"archive": str(store.root), **_document(record)})
-        return
-    say(
+    lines = [
         f"release {record.number}: {_name(record)} for {_where(record)} from {record.since:%Y-%m-%d %H:%M} UTC",
-    )
-    say(f"  {', '.join(record.effects)}")
-    say(f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}")
+        f"  {', '.join(record.effects)}",
+        f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
+    ]
+    give_lines({"archive": str(store.root), **_document(record)}, lines, as_json=as_json)
 
 
 def _released(
@@ -80,11 +79,6 @@ def _released(
     )
 
 
-def _refuse_both(model: Path | None) -> None:
-    if model is not None:
-        raise WrongUse(f"release: --list and the model {model.name} are both given, one is needed; leave one out")
-
-
 def _list(store: Archive, *, as_json: bool) -> None:
     from datetime import UTC, datetime
 
@@ -93,27 +87,21 @@ def _list(store: Archive, *, as_json: bool) -> None:
     records = releases(store)
     now = datetime.now(UTC)
     valid = {one.number for one in records if released(store, one.device, one.station, now) == one}
-    if as_json:
-        rows = [{**_document(one), "in_use": one.number in valid} for one in records]
-        print_json({"archive": str(store.root), "releases": rows})
-        return
+    rows = [{**_document(record), "in_use": record.number in valid} for record in records]
+    give({"archive": str(store.root), "releases": rows}, lambda _: _print(store, records, valid), as_json=as_json)
+
+
+def _print(store: Archive, records: list[Release], valid: set[int]) -> None:
     if not records:
         say(f"no model is released in {store.root}; release one with 'tumbleline release'")
         return
     lines = [
-        [
-            str(one.number),
-            _name(one),
-            _where(one),
-            f"{one.since:%Y-%m-%d}",
-            "yes" if one.number in valid else "",
-            one.who,
-        ]
-        for one in records
+        [str(r.number), _name(r), _where(r), f"{r.since:%Y-%m-%d}", "yes" if r.number in valid else "", r.who]
+        for r in records
     ]
     print_table(["no.", "model", "for", "from", "in use", "by"], lines, whole=4)
-    for one in records:
-        say(f"  {one.number}: {one.reason}{' (forced)' if one.forced else ''}")
+    for record in records:
+        say(f"  {record.number}: {record.reason}{' (forced)' if record.forced else ''}")
 
 
 def _name(record: Release) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import print_json
+from pipelines.cli.printing import give
 
 PART = "Results"
 ORDER = 330
@@ -30,7 +30,4 @@ def command(
         from pipelines.cli.imported_report import make_imported_report
 
         make_imported_report(stored)
-    if as_json:
-        print_json({"run": stored.id, "report": str(stored.report)})
-    else:
-        typer.echo(stored.report)
+    give({"run": stored.id, "report": str(stored.report)}, lambda _: typer.echo(stored.report), as_json=as_json)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import print_json, say
+from pipelines.cli.printing import give_lines
 
 PART = "Certificates, trace, audit"
 ORDER = 420
@@ -49,7 +49,5 @@ def command(
     ended = [f"{serial}/{number}" for number in event.ends]
     for run in dict.fromkeys(one.run for one in ledger.calibrations(serial) if one.certificate in ended):
         renew_report(Run(store, run))
-    if as_json:
-        print_json({"unit": serial, "revoked": ended, **event.document()})
-    else:
-        say(f"revoked {', '.join(ended)} from {event.start} on: {event.reason}")
+    lines = [f"revoked {', '.join(ended)} from {event.start} on: {event.reason}"]
+    give_lines({"unit": serial, "revoked": ended, **event.document()}, lines, as_json=as_json)

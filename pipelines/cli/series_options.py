@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipelines.cli.printing import error_console, remark
+from pipelines.cli.printing import error_console, publish
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -51,14 +51,11 @@ def write_pictures(document: dict[str, Any], plot: Path | None, page: Path | Non
     """Draw a document of ``allan`` or ``psd`` as a picture, and as a page with its tables."""
     if plot is None and page is None:
         return
-    from pipelines.archive import files
     from pipelines.drawing.picture import picture, refuse_ending
     from pipelines.report.noise_page import noise_chart, noise_page
 
     if plot is not None:
         refuse_ending(plot, "--plot")
-        files.publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot", files.ELSEWHERE)
-        remark(f"plot: {plot}")
+        publish(plot, picture(noise_chart(document), plot.suffix.lower()), "plot")
     if page is not None:
-        files.publish(page, noise_page(document).encode(), "page", files.ELSEWHERE)
-        remark(f"page: {page}")
+        publish(page, noise_page(document), "page")

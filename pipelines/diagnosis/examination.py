@@ -46,12 +46,12 @@ def examination(
     measurement, faults, diagnosis = examined(table, history, effects, left_out)
     whole = {
         **document(measurement, faults, diagnosis, left_out=left_out),
-        **_extras(measurement.units, effects, diagnosis),
+        **report_fields(measurement.units, effects, diagnosis),
     }
     return Examination(whole, measurement, diagnosis)
 
 
-def _extras(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
+def report_fields(units: tuple[str, ...], effects: list[str], diagnosis: Diagnosis | None) -> dict[str, Any]:
     """Keys of the document beyond the fixed ones: the judged model, breakers of unseen effects, the suggested formula."""
     extras: dict[str, Any] = {"effects": effects, "units": list(units), "breakers": {}, "offer": None}
     if diagnosis is None:

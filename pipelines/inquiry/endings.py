@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.inquiry.lineage import JointDiagnosis
 
 End = Literal[
     "adequate", "told_apart", "nothing_parts", "budget", "declined", "asked", "blocked", "not_judged", "unexplained"

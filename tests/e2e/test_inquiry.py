@@ -18,7 +18,7 @@ from pipelines.cli import app
 from pipelines.cli.documents.station import OperatorDocument
 from pipelines.inquiry.documents import InquiryDocument
 from pipelines.inquiry.inquiry import FollowUp, Inquiry
-from pipelines.inquiry.joint_diagnosis import JointDiagnosis
+from pipelines.inquiry.lineage import JointDiagnosis
 from pipelines.inquiry.loop import Consent, InquirySettings, Participants, run_inquiry
 from pipelines.rerun.selection import selected
 from schemas.errors import WrongUse
