@@ -11,7 +11,7 @@ import typer
 from inertial.counts import number_of, size_text
 from pipelines.archive import Archive
 from pipelines.cli import options
-from pipelines.cli.printing import give_lines
+from pipelines.cli.printing import give_lines, refuse_standard_output
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
 PART = "Certificates, trace, audit"
@@ -93,7 +93,6 @@ def key(
 ) -> None:
     """Make the key that signs manifests, outside the archive, and show its public key."""
     from pipelines.archive import signatures
-    from pipelines.cli.standard_output import refuse_standard_output
 
     refuse_standard_output(output, "archive key", "a private key is never printed")
     path = output or (signatures.key_place() if public else signatures.default_key_place())

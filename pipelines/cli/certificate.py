@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import give_lines, remark
+from pipelines.cli.printing import give_lines, refuse_standard_output, remark
 
 if TYPE_CHECKING:
     from pipelines.certificates.document.issue import Issued
@@ -58,7 +58,6 @@ def command(
     from pipelines.certificates.document.issue import issue
     from pipelines.certificates.document.laboratory import read_laboratory
     from pipelines.certificates.document.signing import read_key
-    from pipelines.cli.standard_output import refuse_standard_output
     from schemas.errors import DONE, PART_FAILED
 
     refuse_standard_output(output, "certificate", "a folder for PDF and XML")

@@ -9,7 +9,7 @@ import typer
 from inertial.counts import number_of
 from pipelines.archive import Run
 from pipelines.cli import options
-from pipelines.cli.printing import give, print_table, remark, say
+from pipelines.cli.printing import error_console, give, print_table, remark, say
 
 if TYPE_CHECKING:
     from pipelines.chain.certify import Certified
@@ -75,15 +75,11 @@ def command(
         keys=public_keys() | (public_keys(key) if key else {}),
     )  # fmt: skip
     try:
-        if source.about.get("capture"):
+        with error_console().status("drawing the report"):
             renew_report(source)
-        elif source.report.is_file():
-            from pipelines.cli.imported_report import make_imported_report
-
-            make_imported_report(source)
     except ArchiveUnusable as problem:  # the certificates are written; the old report may show other coefficients
         remark(f"certify: the report was not made again: {problem}")
-    give(_document(source.id, done), lambda _: _print(source.id, done), as_json=as_json)
+    give(_document(source.id, done), _print, as_json=as_json)
     raise typer.Exit(PART_FAILED if done.left_out else DONE)
 
 
@@ -113,28 +109,17 @@ def _document(run: str, done: Certified) -> dict[str, Any]:
     }
 
 
-def _print(run: str, done: Certified) -> None:
-    there = {event.certificate for event in done.there}
+def _print(document: dict[str, Any]) -> None:
     lines = [
-        [
-            e.certificate,
-            e.grade,
-            e.start,
-            e.until,
-            "already certified" if e.certificate in there else e.action,
-            _ended(e.ends),
-        ]
-        for e in sorted(done.events, key=lambda event: event.serial)
-    ]
+        [e["certificate"], e["grade"], e["from"], e["until"], "already certified" if e["was_there"] else e["action"],
+         ", ".join(f"/{number}" for number in e["ends"])]
+        for e in sorted(document["certified"], key=lambda entry: entry["serial"])
+    ]  # fmt: skip
     if lines:
-        print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {run}")
+        print_table(["certificate", "grade", "from", "until", "entry", "ends"], lines, title=f"run {document['run']}")
         say(
-            f"The documents: tumbleline certificate {run} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
+            f"The documents: tumbleline certificate {document['run']} --laboratory FILE (docs/how-to/issue-a-certificate.md)",
             style="dim",
         )
-    for serial, why in done.left_out.items():
+    for serial, why in document["left_out"].items():
         say(f"  {serial} not certified: {why}")
-
-
-def _ended(sequences: tuple[int, ...]) -> str:
-    return ", ".join(f"/{number}" for number in sequences)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import console, error_console, give, short
+from pipelines.cli.printing import STANDARD_OUTPUT, console, error_console, give, is_standard_output, print_text, short
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -81,7 +81,6 @@ def command(
     contradict the stated noise.
     """
     from pipelines.archive import Archive
-    from pipelines.cli.standard_output import is_standard_output
     from pipelines.export.corrected import corrected, fit_of_unit
     from pipelines.export.correction import correction_document, tracking_of
     from pipelines.export.recording import at_nominal_supply, read_recording
@@ -115,7 +114,6 @@ def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> No
     import io
 
     from pipelines.archive import files
-    from pipelines.cli.standard_output import NAME, print_text
     from pipelines.export.corrected import table_of
     from schemas.errors import WrongUse
 
@@ -124,11 +122,11 @@ def _write(recording: CorrectableRecording, done: Corrected, output: Path) -> No
         sink = io.BytesIO()
         table.to_parquet(sink, index=False)
         data = sink.getvalue()
-    elif output.suffix == ".csv" or output == NAME:
+    elif output.suffix == ".csv" or output == STANDARD_OUTPUT:
         data = table.to_csv(index=False, lineterminator="\n", float_format="%.10g").encode()
     else:
         raise WrongUse(f"--output: found '{output.name}', a name that ends in .csv or .parquet is needed; correct it")
-    if output == NAME:
+    if output == STANDARD_OUTPUT:
         print_text(data.decode())
     else:
         files.publish(output, data, "correct", files.ELSEWHERE)

@@ -11,7 +11,7 @@ import typer
 
 from pipelines.archive import Run
 from pipelines.cli import options
-from pipelines.cli.printing import remark
+from pipelines.cli.printing import STANDARD_OUTPUT, print_text, remark
 
 PART = "Results"
 ORDER = 340
@@ -114,11 +114,10 @@ def command(
 
 def _write(files: dict[str, bytes], output: Path | None) -> None:
     """Write the files: one to standard output, a file or a folder, several to a folder only."""
-    from pipelines.cli.standard_output import NAME, print_text
     from schemas.errors import WrongUse
 
     (name, content), *others = files.items()
-    if output is None or output == NAME:
+    if output is None or output == STANDARD_OUTPUT:
         if others:
             raise WrongUse(
                 f"export: {len(files)} units, each needs a file of its own in this format; give a folder with --output, or "

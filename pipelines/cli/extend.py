@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import give_lines, remark, say
+from pipelines.cli.printing import give_lines, is_standard_output, print_text, remark, say
 from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
@@ -69,7 +69,6 @@ def command(
     history of the file, with the reason.
     """
     from pipelines.cli.inputs import add_effects
-    from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.jobs.model_files import extended, model_step, publish_model, reduced
 
     printed = is_standard_output(output, "extend", as_json=as_json)

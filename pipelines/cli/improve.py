@@ -11,7 +11,7 @@ import typer
 
 from pipelines.archive import Archive, Run
 from pipelines.cli import options
-from pipelines.cli.printing import error_console, give, remark, say
+from pipelines.cli.printing import error_console, give, refuse_standard_output, remark, say
 from pipelines.improvement.improvement import ImprovedTables, Improvement
 from schemas.errors import DONE, PART_FAILED, WrongUse
 
@@ -156,7 +156,6 @@ class _Terminal:
 def _target(model: Path | None, output: Path | None) -> Path:
     """The model file to write; another existing file is refused."""
     from pipelines.cli.next_commands import free_name
-    from pipelines.cli.standard_output import refuse_standard_output
 
     refuse_standard_output(output, "improve", "the model is written, then extended and judged from it")
     target = output or model or Path(free_name())

@@ -10,7 +10,7 @@ from typer.core import TyperGroup
 
 from pipelines.cli import options
 from pipelines.cli.plan_files import save, write_page, write_pictures
-from pipelines.cli.printing import give, print_json, remark
+from pipelines.cli.printing import give, is_standard_output, print_json, print_text, remark
 from pipelines.cli.text.plan_text import print_plan, print_procedures
 from schemas.errors import PART_FAILED
 from schemas.limits import Limits
@@ -259,7 +259,6 @@ def optimise(
     """
     from pipelines.cli.optimal import cheapest_recipe, missing_limits, print_optimum, written
     from pipelines.cli.optimise_options import OptimiseOptions
-    from pipelines.cli.standard_output import is_standard_output, print_text
     from pipelines.jobs.recipes import folder_of
     from pipelines.planning.preset_noise import noise_of
     from schemas.station import load_station

@@ -1,4 +1,4 @@
-"""How commands print: results, remarks, JSON documents and tables."""
+"""How commands print: results, remarks, JSON documents, tables and files."""
 
 from __future__ import annotations
 
@@ -8,12 +8,18 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from inertial.uncertainty import rounding
 from pipelines.tables.json_values import json_value
+from schemas.errors import WrongUse
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
+
+STANDARD_OUTPUT = Path("-")
+"""The name of standard output in place of a file, as the programs of a system understand it."""
 
 short, short_values = rounding.short, rounding.short_values
 """Numbers as commands print them."""
@@ -190,3 +196,23 @@ def _longest(texts: Sequence[str], between: str | None) -> int:
 
 def _is_number(text: str) -> bool:
     return text.replace(".", "", 1).replace("-", "", 1).replace("−", "", 1).replace("e", "", 1).isdigit() or not text
+
+
+def is_standard_output(path: Path | None, command: str, *, as_json: bool = False) -> bool:
+    """Whether a file is to be printed; refused beside a JSON document, which has standard output for itself."""
+    if path == STANDARD_OUTPUT and as_json:
+        raise WrongUse(
+            f"{command}: --json and the output '-' both print on standard output, one is possible; leave one out"
+        )
+    return path == STANDARD_OUTPUT
+
+
+def refuse_standard_output(path: Path | None, command: str, why: str) -> None:
+    """Refuse ``-`` where a file of the system is needed."""
+    if path == STANDARD_OUTPUT:
+        raise WrongUse(f"{command}: output '-' is standard output, a file is needed: {why}; name one")
+
+
+def print_text(text: str) -> None:
+    """A file's text on standard output, byte for byte."""
+    typer.echo(text, nl=False)

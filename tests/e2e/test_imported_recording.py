@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from benchmarks.made_recordings import Recording, make, samples_of
 from pipelines.cli import app
-from pipelines.cli.documents.models import ImportedFitDocument
+from pipelines.rerun.documents import ImportedFitDocument
 from schemas.errors import WrongUse
 
 DWELLS = "time=time_s,x=out_x,y=out_y,z=out_z,sd_x=sd_x,sd_y=sd_y,sd_z=sd_z,n=n,duration=duration_s"

@@ -1,4 +1,4 @@
-"""The JSON documents of models: improved, fitted to imports, extended, released, and of the demonstration."""
+"""The JSON documents of models: improved, extended, released, and of the demonstration."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from pipelines.diagnosis.documents.diagnosis import DiagnosisDocument, LeaveOut, VerdictEvidence
+from pipelines.diagnosis.documents.diagnosis import DiagnosisDocument
 
 
 class ImprovementChoice(TypedDict):
@@ -53,33 +53,6 @@ class ImproveDocument(TypedDict):
     warnings: list[str]
     fresh: Annotated[str | None, "the fresh run that judged the last version; null: there was none"]
     next: Annotated[list[str], "commands to give next"]
-
-
-class FittedUnit(TypedDict):
-    """The decision on a unit of an import that was fitted against limits."""
-
-    unit: str
-    outcome: Literal["pass", "fail", "refused"]
-    grade: str
-    reasons: str
-
-
-class ImportedFitDocument(TypedDict):
-    """``fit --json (an import)``: a model fitted to an import, its verdict and the basis of the verdict."""
-
-    run: Annotated[str, "the run that holds the fit"]
-    fit_of: Annotated[str, "the import"]
-    effects: list[str]
-    left_out: Annotated[list[str], "dwells left out, UNIT:DWELL"]
-    units: Annotated[list[FittedUnit], "empty without limits"]
-    adequate: Annotated[bool | None, "null: cannot be judged"]
-    reason: Annotated[str | None, "why it cannot be judged"]
-    error: Annotated[dict[str, Any], "as in `diagnose --json`; `fit_rms_ug`: residual of all dwells of the fit, µg"]
-    evidence: VerdictEvidence | None
-    leave_out: LeaveOut | None
-    missing: Annotated[list[list[str]], "classes of effects that are missing"]
-    lines: Annotated[list[str], "the same in words"]
-    open: NotRequired[Annotated[list[str], "of a unit that was turned about one axis: what that does not show"]]
 
 
 class ExtendDocument(TypedDict):

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from inertial.counts import number_of
 from pipelines.cli.printing import print_table, say, short
+from pipelines.planning.plan_rows import by_coefficient, worst_axes
 from schemas.decisions import LARGEST_ERROR
+from schemas.units import AXES
 
 RAISED = 3.0
 """Factor by which 1/f and random walk must raise a floor to be listed."""
@@ -17,7 +20,7 @@ def print_plan(document: dict[str, Any]) -> None:
     minutes, error = document["minutes"], document["dwell_error_ug"]
     say(
         f"{document['recipe']} with {document['device']} on station {document['station']}: "
-        f"{document['dwells']} dwells in {document['poses']} poses at {_soaks(len(document['temperatures_C']))}"
+        f"{document['dwells']} dwells in {document['poses']} poses at {number_of(len(document['temperatures_C']), 'soak')}"
     )
     say(_time(minutes))
     say(
@@ -45,8 +48,7 @@ def print_plan(document: dict[str, Any]) -> None:
         print_table(["visible effect", "confounded with"], alike)
     faint = [row["effect"] for row in seen if row["faint"]]
     if faint:
-        names = ", ".join(faint)
-        say(f"* floor above the typical size: {names}")
+        say(f"* floor above the typical size: {', '.join(faint)}")
     say(
         "v: fraction of the effect's column that remains after the model; 1/v²: variance inflation; floor: smallest detectable "
         "contribution to a dwell (3σ, RMS), and its coefficient; =: identical under this plan",
@@ -97,11 +99,8 @@ def _print_procedure_rows(document: dict[str, Any]) -> None:
             for row in rows
         ],
     )
-    figures = [figure for row in rows for figure in row["figures"]]
-    print_table(
-        ["figure", "unit", "limit", "meaning"],
-        [[one["figure"], one["unit"], one["limit"] or "", one["meaning"]] for one in figures],
-    )
+    figures = [[f["figure"], f["unit"], f["limit"] or "", f["meaning"]] for row in rows for f in row["figures"]]
+    print_table(["figure", "unit", "limit", "meaning"], figures)
 
 
 def _time(minutes: dict[str, float]) -> str:
@@ -110,10 +109,6 @@ def _time(minutes: dict[str, float]) -> str:
         f"{name.replace('_', ' ')} {minutes[name]:.0f}" for name in minutes if name != "total" and minutes[name] > 0.0
     )
     return f"{minutes['total']:.0f} min of station time: {parts}"
-
-
-def _soaks(count: int) -> str:
-    return f"{count} soak{'' if count == 1 else 's'}"
 
 
 def _longer(dwell: dict[str, float]) -> str:
@@ -128,15 +123,12 @@ def _longer(dwell: dict[str, float]) -> str:
 
 def _coefficient_lines(rows: list[dict[str, Any]]) -> list[list[str]]:
     """One line per coefficient with its three axes; one value for parameters of the station."""
-    lines: dict[tuple[str, int], list[str]] = {}
-    count: dict[tuple[str, str], int] = {}
-    for row in rows:
-        place = count.get((row["effect"], row["axis"]), 0)
-        count[row["effect"], row["axis"]] = place + 1
-        key = (row["effect"], place if row["axis"] != "*" else 100 + place)
-        line = lines.setdefault(key, [f"{row['effect']}, {row['unit']}", "", "", ""])
-        line[1 + max(0, "xyz".find(row["axis"]))] = short(row["uncertainty_ug"])
-    return list(lines.values())
+    lines: list[list[str]] = []
+    for axes in by_coefficient(rows):
+        first = next(iter(axes.values()))
+        values = {axis.replace("*", "x"): short(row["uncertainty_ug"]) for axis, row in axes.items()}
+        lines.append([f"{first['effect']}, {first['unit']}", *(values.get(axis, "") for axis in AXES)])
+    return lines
 
 
 def _visible_line(row: dict[str, Any]) -> list[str]:
@@ -172,10 +164,7 @@ def print_reach(reach: dict[str, Any] | None) -> None:
     if reach is None:
         say("uncertainty: noise only, the station states no [uncertainty]; no grade above consumer, no certificate")
         return
-    worst: dict[str, dict[str, Any]] = {}
-    for row in reach["quantities"]:
-        if row["quantity"] not in worst or row["u"] > worst[row["quantity"]]["u"]:
-            worst[row["quantity"]] = row
+    worst = worst_axes(reach)
     print_table(["quantity, worst axis", "axis", "u", "U, k = 2", "unit"], [_line(row) for row in worst.values()])
     for row in worst.values():
         rulers = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["shares"].items() if share >= LEAST)
