@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import print_json, remark
+from pipelines.cli.printing import give, remark
 from schemas.errors import WrongUse
 from schemas.foreign import shown
 
@@ -38,8 +38,8 @@ def command(
     """
     from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
-    from pipelines.cli.summary import exit_status, print_summary, summary
-    from pipelines.cli.text.verdict_text import judged, print_adequacy, print_references
+    from pipelines.cli.summary import exit_status, print_result, summary
+    from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import job_of_run
 
     if Path(run).is_file():
@@ -66,10 +66,5 @@ def command(
         runner.abandon()  # the measurements are the old run's: nothing is lost, and no empty run becomes the latest
         raise
     document = judged(summary(runner.run), runner.run)
-    if as_json:
-        print_json(document)
-    else:
-        print_summary(document)
-        print_adequacy(document["adequacy"])
-        print_references(document["references"])
+    give(document, print_result, as_json=as_json)
     raise typer.Exit(exit_status(document))

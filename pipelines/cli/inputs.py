@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipelines.archive import Archive
 from pipelines.cli.printing import remark
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from pipelines.parallel import Distributor
 
 
 def dwells_and_history(source: str, history: str, archive: str | None) -> tuple[pd.DataFrame, pd.DataFrame | None]:
@@ -50,6 +53,21 @@ def add_effects(files: Sequence[Path] | None, formulas: Sequence[str] | None = N
         from pipelines.diagnosis.inputs import use_written_formulas
 
         use_written_formulas(formulas, where)
+
+
+def distribution(store: Archive, runs: Sequence[str], dask: str, workers: int | None) -> tuple[Distributor | None, int]:
+    """How the work on runs is distributed over Dask, None for processes of this machine; and the number of processes.
+
+    Parameters
+    ----------
+    dask, workers : as they were given
+    """
+    from pipelines.flows.dask_cluster import on_dask
+    from pipelines.parallel import processors
+
+    count = max(1, min(workers or processors(), len(runs)))
+    home = store.root.resolve() / "orchestrator" if isinstance(store.root, Path) else None
+    return on_dask(dask, count, home), count
 
 
 def both_runs(

@@ -63,24 +63,16 @@ def command(
     """
     from pipelines.certificates.coefficient_remarks import library_remarks
     from pipelines.cli.next_commands import print_next
-    from pipelines.cli.summary import exit_status, print_summary, summary
+    from pipelines.cli.summary import exit_status, print_result, summary
     from pipelines.cli.terminal import attended, scanned
-    from pipelines.cli.text.verdict_text import judged, print_adequacy, print_references
+    from pipelines.cli.text.verdict_text import judged
     from pipelines.jobs.job import OF_RUN, Request
     from pipelines.jobs.seating import SCAN, read_seating
     from schemas.station import load_station
 
     slots = 0 if recipe.startswith(OF_RUN) else load_station(station).devices.slots.count
     seating = scanned(slots) if units == SCAN else read_seating(units)
-    request_of_lot = Request(
-        recipe=recipe,
-        station=station,
-        units=seating.units,
-        slots=seating.slots,
-        seed=seed,
-        repeat=repeat,
-        faults=tuple(fault or ()),
-    )
+    request_of_lot = Request(recipe, station, seating.units, seating.slots, seed, repeat, tuple(fault or ()))
     asks = prompts if prompts is not None else attended() and not as_json
     requests = request_of_lot.fillings(slots) if asks else [request_of_lot]
     jobs = [request.job(Archive(archive)) for request in requests]
@@ -96,9 +88,7 @@ def command(
         print_json(documents[0] if len(documents) == 1 else {"fillings": documents})
     else:
         for document in documents:
-            print_summary(document)
-            print_adequacy(document["adequacy"])
-            print_references(document["references"])
+            print_result(document)
         print_next(
             [line for run, document in zip(runs, documents, strict=True) for line in _next(run, document, archive)],
         )

@@ -64,13 +64,8 @@ def summary(run: Run) -> dict[str, Any]:
 
 
 def _unit(row: dict[str, Any], figures: pd.DataFrame) -> dict[str, Any]:
-    own = figures[figures["unit"] == row["unit"]]
-    return json_value(
-        {
-            **row,
-            "figures": {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in rows_of(own)},
-        }
-    )
+    of_unit = rows_of(figures[figures["unit"] == row["unit"]])
+    return json_value({**row, "figures": {f["figure"]: {k: f[k] for k in (*FIXED, *RISKS) if k in f} for f in of_unit}})
 
 
 def exit_status(document: dict[str, Any]) -> int:
@@ -83,13 +78,11 @@ def print_summary(document: dict[str, Any]) -> None:
     from rich.text import Text
 
     lines: list[list[str | Text]] = []
-    calibrated = any(name in unit["figures"] for unit in document["units"] for name, _ in SHOWN) or not _listed(
-        document
-    )
-    measured = {
-        name for unit in document["units"] for name in unit["figures"]
-    }  # a recipe without a static record has no N
-    shown = [one for one in (*(SHOWN if calibrated else ()), *_listed(document)) if one[0] in measured or not measured]
+    measured = {name for unit in document["units"] for name in unit["figures"]}  # without a static record there is no N
+    limited = _limited(document)
+    calibrated = bool(measured & dict(SHOWN).keys()) or not limited
+    columns = (*(SHOWN if calibrated else ()), *limited)
+    shown = [(name, head) for name, head in columns if name in measured or not measured]
     for unit in document["units"]:
         values = [short(unit["figures"].get(name, {}).get("value")) for name, _ in shown]
         outcome = Text(unit["outcome"], style=STYLES[unit["outcome"]])
@@ -113,7 +106,16 @@ def print_summary(document: dict[str, Any]) -> None:
     say(f"report  {document['report']}")
 
 
-def _listed(document: dict[str, Any]) -> list[tuple[str, str]]:
+def print_result(document: dict[str, Any]) -> None:
+    """The result of a run for people, with the verdicts on its model and on its references."""
+    from pipelines.cli.text.verdict_text import print_adequacy, print_references
+
+    print_summary(document)
+    print_adequacy(document["adequacy"])
+    print_references(document["references"])
+
+
+def _limited(document: dict[str, Any]) -> list[tuple[str, str]]:
     """Figures of procedures that have a limit, with their heads."""
     from pipelines.procedures import FIGURES
 

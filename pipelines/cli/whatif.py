@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from inertial.counts import number_of
 from pipelines.archive import Archive
 from pipelines.cli import options
+from pipelines.cli.inputs import distribution
 from pipelines.cli.printing import error_console, give, print_table, say, short
-
-if TYPE_CHECKING:
-    from pipelines.jobs.model_change import ModelChange
 
 PART = "Old data, new models"
 ORDER = 540
@@ -47,29 +45,16 @@ def command(
     """
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.selection import selected
-    from pipelines.rerun.whatif import BETTER
+    from pipelines.rerun.whatif import BETTER, evaluated
 
     change = change_from_options("", model, limits, effect_file, where="whatif")
     store = Archive(archive)
     runs = [entry.id for entry in selected(store, selection or ["all"])]
-    document = _evaluated(store, runs, change, dask, workers)
+    distribute, count = distribution(store, runs, dask, workers)
+    with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
+        document = evaluated(store, runs, change, distribute, count)
     give({"archive": str(store.root), **document}, lambda _: _print(document), as_json=as_json)
     raise typer.Exit(0 if document["verdict"] == BETTER else 1)
-
-
-def _evaluated(store: Archive, runs: list[str], change: ModelChange, dask: str, workers: int | None) -> dict[str, Any]:
-    """Every lot with both models, and the errors on later runs of units that were measured before."""
-    from pathlib import Path as LocalPath
-
-    from pipelines.flows.dask_cluster import on_dask
-    from pipelines.parallel import processors
-    from pipelines.rerun.whatif import evaluated
-
-    count = max(1, min(workers or processors(), len(runs)))
-    home = store.root.resolve() / "orchestrator" if isinstance(store.root, LocalPath) else None
-    distribute = on_dask(dask, count, home)
-    with error_console().status(f"evaluating {number_of(len(runs), 'lot')}, {count} at a time"):
-        return evaluated(store, runs, change, distribute, count)
 
 
 def _print(document: dict[str, Any]) -> None:
