@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pipelines.archive import Run
+from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.printing import STANDARD_OUTPUT, print_text, remark
+from schemas.errors import WrongUse, did_you_mean
 
 PART = "Results"
 ORDER = 340
@@ -92,11 +93,9 @@ def command(
     Files for autopilots hold one unit each, and state in µg what the format cannot hold. Only units that passed are exported;
     revoked calibrations are left out. An option that begins with names of formats is for these formats.
     """
-    from pipelines.archive import Archive
     from pipelines.certificates.coefficient_remarks import signature_remarks
     from pipelines.export import FORMATS, ExportSettings, device_ids, export_files, unit_calibrations
     from pipelines.jobs.model_files import use_formulas_of
-    from schemas.errors import WrongUse, did_you_mean
 
     form = "json" if as_json else form
     if form not in FORMATS:
@@ -114,8 +113,6 @@ def command(
 
 def _write(files: dict[str, bytes], output: Path | None) -> None:
     """Write the files: one to standard output, a file or a folder, several to a folder only."""
-    from schemas.errors import WrongUse
-
     (name, content), *others = files.items()
     if output is None or output == STANDARD_OUTPUT:
         if others:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -25,6 +25,8 @@ EXAMPLES = (
 )
 
 MOST_INTERVALS, MOST_FAULTS = 12, 6
+NUMBERS: tuple[tuple[Literal["low", "high", "resolution"], int], ...] = (("low", 6), ("high", 6), ("resolution", 4))
+"""Numbers of a column, with their digits."""
 PICTURES = (".svg", ".png", ".pdf")
 
 
@@ -63,7 +65,8 @@ def command(
     for paths in sets:
         with error_console().status(f"reading {paths[0].name}"):
             inspections.append(inspect(paths, join=join, group=group))
-    _write(inspections[0], picture, page)
+    if picture or page:
+        _write(inspections[0], picture, page)
     documents = [one.document for one in inspections]
     if as_json:
         print_json(documents[0] if len(documents) == 1 else {"inspections": documents})
@@ -79,8 +82,6 @@ def command(
 
 
 def _write(inspection: Inspection, picture: Path | None, page: Path | None) -> None:
-    if picture is None and page is None:
-        return
     from pipelines.report import recording
 
     if picture is not None:
@@ -121,9 +122,7 @@ def _print(one: InspectDocument) -> None:
             )
     for fault in one["faults"][:MOST_FAULTS]:
         what = "is constant" if fault["fault"] == "stuck_output" else "has torn words"
-        say(
-            f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on",
-        )
+        say(f"  axis {fault['axis']} {what}: {fault['samples']} samples from row {fault['first_row']} on")
     more = len(one["faults"]) - MOST_FAULTS
     if more > 0:
         say(f"  and {more} more such faults")
@@ -141,9 +140,7 @@ def _print_columns(one: InspectDocument) -> None:
             column["meaning"],
             column["reason"],
             column["unit"],
-            "" if column["low"] is None else f"{column['low']:.6g}",
-            "" if column["high"] is None else f"{column['high']:.6g}",
-            "" if column["resolution"] is None else f"{column['resolution']:.4g}",
+            *("" if column[key] is None else f"{column[key]:.{digits}g}" for key, digits in NUMBERS),
             str(column["clipped"] or ""),
             str(column["missing"] or ""),
         ]

@@ -132,17 +132,16 @@ def _comparison(document: dict[str, Any]) -> list[str]:
     difference = (
         f"{abs(more):.0f} min {'more' if more > 0.0 else 'less'} than {name}" if abs(more) >= 0.5 else f"as {name}"
     )
-    lines = [
-        (
-            f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
-            f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
-        ),
-    ]
+    first = (
+        f"The new recipe takes {difference}, and {100.0 * document['share']:.0f} % of the textbook plan's time without the "
+        f"static record; {document['verification_dwells']} dwells are for verification (textbook plan: none)."
+    )
+    lines = [first]
     worst = document["own_worst"]
     if worst is not None:
         meets = "meets the required errors" if worst <= 1.0 else f"has up to {worst:.2f} times the required errors"
         lines.append(
-            f"{name} {meets}." + (f" For errors as in {name}, give --factor {worst:.2f}." if worst > 1.0 else "")
+            f"{name} {meets}." + ("" if worst <= 1.0 else f" For errors as in {name}, give --factor {worst:.2f}.")
         )
         if worst <= 1.0 and more > 0.0:
             lines.append(f"{name} is quicker and meets the requirement: keep it.")

@@ -58,7 +58,7 @@ def command(
         f"  {', '.join(record.effects)}",
         f"  evidence: {record.evidence or 'none'}{', forced' if record.forced else ''}",
     ]
-    give_lines({"archive": str(store.root), **_document(record)}, lines, as_json=as_json)
+    give_lines({"archive": str(store.root), **record.document()}, lines, as_json=as_json)
 
 
 def _released(
@@ -87,7 +87,7 @@ def _list(store: Archive, *, as_json: bool) -> None:
     records = releases(store)
     now = datetime.now(UTC)
     valid = {one.number for one in records if released(store, one.device, one.station, now) == one}
-    rows = [{**_document(record), "in_use": record.number in valid} for record in records]
+    rows = [{**record.document(), "in_use": record.number in valid} for record in records]
     give({"archive": str(store.root), "releases": rows}, lambda _: _print(store, records, valid), as_json=as_json)
 
 
@@ -110,20 +110,3 @@ def _name(record: Release) -> str:
 
 def _where(record: Release) -> str:
     return f"{record.device} on {record.station}".removeprefix(" on ").removesuffix(" on ") or "all"
-
-
-def _document(record: Release) -> dict[str, Any]:
-    return {
-        "release": record.number,
-        "model": record.model_name,
-        "version": record.model_version,
-        "effects": list(record.effects),
-        "from": record.since.isoformat(),
-        "device": record.device,
-        "station": record.station,
-        "reason": record.reason,
-        "evidence": record.evidence,
-        "forced": record.forced,
-        "by": record.who,
-        "at": record.when,
-    }

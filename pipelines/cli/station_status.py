@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -53,18 +54,18 @@ def status(
     raise typer.Exit(STATION if now.faults else 0)
 
 
-def _live(look: object, every: float) -> Overview:
+def _live(look: Callable[[], Overview], every: float) -> Overview:
     """Show new readings until Ctrl-C; return the last one."""
     import time
 
     from rich.live import Live
 
-    now: Overview = look()  # pyright: ignore[reportCallIssue]
+    now = look()
     with Live(picture(now), console=console(), refresh_per_second=4, screen=False) as live:
         try:
             while True:
                 time.sleep(every)
-                now = look()  # pyright: ignore[reportCallIssue]
+                now = look()
                 live.update(picture(now))
         except KeyboardInterrupt:
             return now

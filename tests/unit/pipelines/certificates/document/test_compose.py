@@ -30,7 +30,7 @@ from pipelines.certificates.document.pages import page_content
 from pipelines.certificates.document.schema_files import DocumentInvalid, validate
 from pipelines.chain.certify import certify
 from pipelines.cli import app
-from pipelines.cli.documents.certificates import CertificateDocument
+from pipelines.certificates.documents import CertificateDocument
 from pipelines.report.numbers import with_uncertainty as report_rounding
 from schemas.errors import RecipeInvalid, WrongUse
 

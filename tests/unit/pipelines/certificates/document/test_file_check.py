@@ -36,7 +36,7 @@ from pipelines.certificates.document.signature_check import canonical, parsed, x
 from pipelines.certificates.document.signing import SigningKey, sign_pdf, sign_xml
 from pipelines.chain.certify import certify
 from pipelines.cli import app
-from pipelines.cli.documents.certificates import CertifyDocument
+from pipelines.certificates.documents import CertifyDocument
 from schemas.errors import WrongUse
 
 etree = pytest.importorskip("lxml.etree")
