@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipelines.cli import options
 from pipelines.cli.printing import error_console, give, print_table, say, short, short_values
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PART = "Is the model good enough, and what is missing?"
 ORDER = 240
@@ -37,31 +34,16 @@ def command(
 ) -> None:
     """Fit a model to dwells; state its error there, on dwells left out, and on a fresh run with the coefficients unchanged."""
     from pipelines.cli.inputs import add_effects, both_runs, without_dwells
-    from pipelines.diagnosis.diagnose import default_model
+    from pipelines.diagnosis.diagnose import compare, default_model
     from pipelines.diagnosis.inputs import judged_effects
 
     add_effects(effect_file, formula, "compare")
     chosen = judged_effects(dwells, archive, effects, model, "compare")
     first, temperatures, again, again_temperatures = both_runs(dwells, history, fresh, fresh_history, archive)
     table, _ = without_dwells(first, leave_out)
-    document = compared(chosen or default_model(table), table, temperatures, again, again_temperatures)
+    with error_console().status("fitting"):
+        document = compare(table, chosen or default_model(table), temperatures, again, again_temperatures)
     give(document, print_comparison, as_json=as_json)
-
-
-def compared(
-    effects: list[str],
-    dwells: pd.DataFrame,
-    history: pd.DataFrame | None,
-    fresh: pd.DataFrame | None,
-    fresh_history: pd.DataFrame | None,
-) -> dict[str, Any]:
-    """The comparison, on one thread: the matrices are small."""
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1), error_console().status("fitting"):
-        from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
-
-        return compare(dwells, effects, history, fresh, fresh_history)
 
 
 def print_comparison(document: dict[str, Any], poses: int = POSES) -> None:

@@ -144,11 +144,13 @@ class _Game:
         return document
 
     def _compare(self, title: str, *, first: bool) -> dict[str, Any]:
-        from pipelines.cli.compare import compared, print_comparison
+        from pipelines.cli.compare import print_comparison
+        from pipelines.diagnosis.diagnose import compare
 
         self._step(title, _command("compare", self.folder, self.hidden.model if first else None))
         lot = self.lot
-        document = compared(self.model, lot.dwells, lot.history, lot.fresh, lot.fresh_history)
+        with error_console().status("fitting"):
+            document = compare(lot.dwells, self.model, lot.history, lot.fresh, lot.fresh_history)
         if not self.quiet:
             print_comparison(document, poses=0)
         return document

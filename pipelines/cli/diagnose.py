@@ -109,12 +109,7 @@ def diagnosed(
     left_out: Sequence[str] = (),
 ) -> tuple[dict[str, Any], str]:
     """The document of a diagnosis, and its report on request, with the coefficients of a fit if they are given."""
-    from threadpoolctl import threadpool_limits
-
-    from pipelines.parallel import keep_memory
-
-    keep_memory()
-    with threadpool_limits(1), error_console().status("looking for missing effects"):
+    with error_console().status("looking for missing effects"):
         from pipelines.diagnosis.examination import examination  # loads the search for effects: after the first line
 
         made = examination(table, history, judged, left_out)

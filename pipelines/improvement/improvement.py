@@ -66,18 +66,16 @@ def with_effects(text: str, steps: Sequence[ModelStep], file: Path) -> tuple[str
 def errors_by_version(
     versions: Sequence[Version], tables: ImprovedTables, working: Callable[[], AbstractContextManager[Any]]
 ) -> list[dict[str, Any]]:
-    """The errors of each version and the verdict on its change, on one thread: the matrices are small.
+    """The errors of each version and the verdict on its change.
 
     Parameters
     ----------
     working : is entered while a version is fitted
     """
-    from threadpoolctl import threadpool_limits
-
     from pipelines.diagnosis.model_history import evolution
 
     def compared(effects: list[str], before: list[str] | None) -> dict[str, Any]:
-        with threadpool_limits(1), working():
+        with working():
             from pipelines.diagnosis.diagnose import compare  # loads the search for effects: after the first line
 
             return compare(tables.dwells, effects, tables.history, tables.fresh, tables.fresh_history, before)
@@ -146,12 +144,7 @@ class Improvement:
 
     def _diagnosis(self, effects: list[str] | None, *, first: bool) -> dict[str, Any]:
         """The diagnosis of a model, as the attendant sees it."""
-        from threadpoolctl import threadpool_limits
-
-        from pipelines.parallel import keep_memory
-
-        keep_memory()
-        with threadpool_limits(1), self.attendant.working("looking for missing effects"):
+        with self.attendant.working("looking for missing effects"):
             from pipelines.diagnosis.examination import (
                 examination,  # loads the search for effects: after the first line
             )

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
 from inertial.quantities import ANGLE_COLUMNS, FORCE_COLUMNS
 from pipelines.archive import Run, code_hash, stage_key
 from pipelines.certificates.statement import Stated, stated
 from pipelines.diagnosis.examination import examination
 from pipelines.jobs.model_files import use_formulas_of
-from pipelines.parallel import keep_memory
 from pipelines.report.context import OPTIONAL, TABLES, ReportContext
 from pipelines.report.diagnosis import render_diagnosis
 from pipelines.report.panels import budget, certificates
@@ -115,10 +112,8 @@ def make_imported_report(run: Run) -> bool:
         run.seal()
         return True
     rows = rows_of(run.table("coefficients"))
-    keep_memory()
-    with threadpool_limits(1):
-        made = examination(fitted_dwells(run.table("dwells")), past, effects)
-        page = render_diagnosis(made.document, made.measured, made.diagnosis, f"run {run.id}", rows)
+    made = examination(fitted_dwells(run.table("dwells")), past, effects)
+    page = render_diagnosis(made.document, made.measured, made.diagnosis, f"run {run.id}", rows)
     page = page.replace("</body>", f"{decisions(run)}</body>")
     run.save_report(key, page, {"inputs": inputs, "parameters": parameters, "code": code})
     return False
