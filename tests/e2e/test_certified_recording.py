@@ -129,6 +129,10 @@ def test_from_a_recording_with_stated_references_to_its_certificate(folder: Path
     assert run("certificate", "H1").exit_code == 0
     assert "local gravity" in (folder / "H1_1.xml").read_text(encoding="utf-8")
     assert run("verify").exit_code == 0
+    assert run("revoke", "H1", "--reason", "fell to the floor").exit_code == 0
+    page = done.report.read_text(encoding="utf-8")  # made again, as that of a captured run is
+    assert '<span class="tag fail">revoked</span>' in page
+    assert "fell to the floor" in page
 
 
 def test_without_a_statement_an_import_stays_noise_only(folder: Path) -> None:
