@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import error_console, give, print_table, say, short
 from schemas.errors import WrongUse, did_you_mean
@@ -59,7 +60,6 @@ def command(
     Other statistics have an interval where its degrees of freedom are known. 'time', 'tie' and 'mtie' are of the integral
     of the output without its mean: the error of a velocity, in m/s for an output in g.
     """
-    from pipelines.archive import Archive
     from pipelines.chain.noise_documents import allan_document, allan_of_run, statistic_of_run
     from pipelines.cli.series_options import even_series, write_pictures
 
@@ -84,9 +84,7 @@ def command(
 
 def _print(document: dict[str, Any]) -> None:
     span = document["samples"] / document["rate_hz"]
-    say(
-        f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, {short(span)} s",
-    )
+    say(f"{document['source']}: {document['samples']} samples at {short(document['rate_hz'], 5)} Hz, {short(span)} s")
     _print_terms(document) if document["statistic"] == STATISTICS[0] else _print_curves(document)
     for note in document["notes"]:
         say(note, style="yellow")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import print_json, remark, say, short
 from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
@@ -57,7 +58,6 @@ def command(
     as_json: options.JsonOption = False,
 ) -> None:
     """Audit the archive: re-calibrations due, drift, stations, check standards, population. Exit status 1: there are findings."""
-    from pipelines.archive import Archive
     from pipelines.audit.audit import audit
     from pipelines.audit.document import document
     from pipelines.audit.findings import findings

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import give_lines, refuse_standard_output, remark
+from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.certificates.document.issue import Issued
@@ -54,11 +56,9 @@ def command(
     A unit has to be certified before ('tumbleline certify'): the number of its certificate is the one in the ledger. The same
     certificate gives the same bytes, unless it is signed. Exit status 1: some units of a run have no certificate.
     """
-    from pipelines.archive import Archive
     from pipelines.certificates.document.issue import issue
     from pipelines.certificates.document.laboratory import read_laboratory
     from pipelines.certificates.document.signing import read_key
-    from schemas.errors import DONE, PART_FAILED
 
     refuse_standard_output(output, "certificate", "a folder for PDF and XML")
     who = read_laboratory(laboratory)

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
-from pipelines.archive import Run
+from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.printing import error_console, give, print_table, remark, say
+from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
 
 if TYPE_CHECKING:
     from pipelines.chain.certify import Certified
@@ -60,12 +61,10 @@ def command(
     which the new one begins, so that a unit has one valid calibration on each day. The report of the run is made again and names
     the certificates. Exit status 1: some units of the run did not pass and have no certificate.
     """
-    from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
     from pipelines.certificates import Ledger
     from pipelines.chain.certify import certify
     from pipelines.report import renew_report
-    from schemas.errors import DONE, PART_FAILED, ArchiveUnusable
 
     store = Archive(archive)
     serials = tuple(serial.strip() for serial in units.split(",")) if units else ()

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import error_console, print_json, publish
-from schemas.errors import DONE, PART_FAILED
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +93,6 @@ def command(
 
 def _kept_name(dwells: str, archive: str | None) -> str:
     """The name of the data for a page that is kept: what 'latest' means changes."""
-    from pipelines.archive import Archive
     from pipelines.importers.files import is_file
 
     return dwells if is_file(dwells) else Archive(archive).run(dwells).id
@@ -129,11 +129,9 @@ def measured_recipe(dwells: str, recipe: str, archive: str | None) -> Recipe:
     WrongUse
         Neither a file of dwells nor an import states its recipe, and none is named.
     """
-    from pipelines.archive import Archive
     from pipelines.importers.files import is_file
     from pipelines.jobs.job import job_of_run
     from pipelines.jobs.recipes import load_recipe
-    from schemas.errors import WrongUse
 
     if recipe:
         return load_recipe(recipe)

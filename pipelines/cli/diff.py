@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inertial.counts import number_of
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import STYLES, print_json, print_table, say, short
 
@@ -34,7 +35,6 @@ def command(
     as_json: options.JsonOption = False,
 ) -> None:
     """Show which grades, coefficients and figures differ between two runs, relative to their uncertainty, and the causes."""
-    from pipelines.archive import Archive
     from pipelines.rerun.diff import diff
 
     store = Archive(archive)

@@ -8,6 +8,7 @@ import typer
 
 from pipelines.cli import options
 from pipelines.cli.printing import give, print_table, say
+from schemas.errors import DONE, PART_FAILED
 
 if TYPE_CHECKING:
     from pipelines.doctor.documents import DoctorDocument
@@ -38,7 +39,6 @@ def command(
     removed. A station is checked only if --station names it. Exit 1: at least one fault; warnings leave it at 0.
     """
     from pipelines.doctor.examine import examine
-    from schemas.errors import DONE, PART_FAILED
 
     document = examine(archive, station, free_gb)
     give(document, _show, as_json=as_json)

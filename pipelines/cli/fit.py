@@ -7,6 +7,7 @@ from pathlib import Path
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import give, remark
 from schemas.errors import WrongUse
@@ -36,7 +37,6 @@ def command(
     An import is fitted with known poses or, without them, by the norm of gravity. Exit status 1: the model is not adequate, it
     cannot be judged, or a unit did not pass.
     """
-    from pipelines.archive import Archive
     from pipelines.chain.runner import Runner
     from pipelines.cli.summary import exit_status, print_result, summary
     from pipelines.cli.text.verdict_text import judged

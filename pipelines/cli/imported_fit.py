@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pipelines.archive import Run
+from pipelines.archive import Archive, Run
 from pipelines.cli.printing import error_console, give, say
 from pipelines.cli.text.verdict_text import print_verdict_of_fit
 from schemas.errors import DONE, PART_FAILED
@@ -19,7 +19,6 @@ def fit_import(run: Run, change: tuple[str, Path | None, str], leave_out: str, *
     change : effects, model file and limits; empty or None if not given
     leave_out : dwells as UNIT:DWELL,…
     """
-    from pipelines.archive import Archive
     from pipelines.jobs.model_change import change_from_options
     from pipelines.rerun.imported_fit import fit_document
     from pipelines.rerun.rerun import again

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.next_commands import command_line, judged_data, print_extension, print_next
 from pipelines.cli.printing import error_console, give, print_table, remark, say, short
@@ -74,7 +75,6 @@ def command(
     is spent. An interrupted inquiry continues when the same command is given again. Exit status 0: the model is adequate or the
     effects are identified; 1: neither.
     """
-    from pipelines.archive import Archive
     from pipelines.cli.terminal import attended
     from pipelines.inquiry.loop import InquirySettings, Participants, always, directly, run_inquiry
     from pipelines.jobs.job import Request

@@ -9,6 +9,7 @@ import typer
 
 from pipelines.cli import options
 from pipelines.cli.printing import print_json, print_table, say
+from schemas.errors import WrongUse, did_you_mean
 
 PART = "Measure"
 ORDER = 190
@@ -33,8 +34,6 @@ def command(
 
     The same lists are on the page docs/reference/keys.md.
     """
-    from schemas.errors import WrongUse, did_you_mean
-
     if subject and subject not in SUBJECTS:
         raise WrongUse(f"keys: no list is called '{subject}'; {did_you_mean(subject, SUBJECTS)}")
     if not subject:

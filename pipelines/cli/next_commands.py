@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipelines.archive import Run
+from pipelines.archive import Archive, Run
 from pipelines.cli.printing import say
 
 PROGRAM = "tumbleline"
@@ -71,7 +71,6 @@ def judged_data(source: str, history: str, archive: str | None) -> JudgedData:
     if is_file(source):
         fresh = fresh_beside(source)
         return JudgedData(source, history, fresh, history_beside(fresh) if fresh and history else "", archive)
-    from pipelines.archive import Archive
     from pipelines.chain.runner import decisive
     from pipelines.jobs.fresh_run import fresh_repeat, fresh_run_of, repeatable
     from pipelines.jobs.job import OF_RUN, job_of_run, measured_again

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.plan_files import save, write_page, write_pictures
 from pipelines.cli.printing import give, is_standard_output, print_json, print_text, remark
 from pipelines.cli.text.plan_text import print_plan, print_procedures
-from schemas.errors import PART_FAILED
+from schemas.errors import PART_FAILED, RecipeInvalid
 from schemas.limits import Limits
 from schemas.recipe import Recipe
 
@@ -293,7 +294,6 @@ def optimise(
 def _limits(recipe: Recipe, home: Path) -> Limits | None:
     """The limits that a recipe names; None where they are not there, which a plan does not need."""
     from pipelines.jobs.recipes import load_limits
-    from schemas.errors import RecipeInvalid
 
     try:
         return load_limits(recipe, home)
@@ -309,7 +309,6 @@ def with_model(recipe: str, effects: str, model: Path | None, archive: str | Non
     chosen = chosen_effects(effects, model, "plan")
 
     def line(device: str) -> dict[str, Any]:
-        from pipelines.archive import Archive
         from pipelines.jobs.releases import line_model
 
         if chosen:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import give, print_table, remark, say
+from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
 
 if TYPE_CHECKING:
     from pipelines.export import UnitCalibration
@@ -47,10 +49,8 @@ def command(
     back, and verify in two poses. The unit's certificate ends before the first write and is renewed after the verification.
     If a step fails, the unit is not certified, and the previously valid copy is unchanged. Exit status 1: a unit failed.
     """
-    from pipelines.archive import Archive
     from pipelines.programming.job import chosen_units, document, program_run, station_of
     from pipelines.programming.outcome import Choice
-    from schemas.errors import DONE, PART_FAILED, WrongUse, did_you_mean
     from schemas.foreign import shown
     from schemas.station import load_station
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import print_json, print_table, say, short
 from schemas.errors import WrongUse
@@ -42,7 +43,6 @@ def command(
     Views: runs, units, parameters, station, coefficients, figures, calibrations, and every table of the runs (dwells, residuals,
     grades, verification, noise, …) with the run in the first column.
     """
-    from pipelines.archive import Archive
     from pipelines.audit.sql import ask
 
     if as_json and as_csv:

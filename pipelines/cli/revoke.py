@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from pipelines.archive import Archive, Run
 from pipelines.cli import options
 from pipelines.cli.printing import give_lines
 
@@ -38,7 +39,6 @@ def command(
     as_json: options.JsonOption = False,
 ) -> None:
     """Revoke a unit's calibration, with the reason. Nothing is deleted: the revocation is added to the ledger of the unit."""
-    from pipelines.archive import Archive, Run
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of
     from pipelines.report import renew_report

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipelines.archive import Archive
 from pipelines.cli.printing import error_console, publish
 from schemas.errors import WrongUse
 
@@ -31,7 +32,6 @@ def even_series(
     WrongUse
         An option of files was given for a run.
     """
-    from pipelines.archive import Archive
     from pipelines.importers.series import is_series_file, series_of_file, series_of_run
 
     time, time_unit, rate = clock

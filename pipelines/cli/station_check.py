@@ -11,6 +11,7 @@ from inertial.counts import number_of
 from pipelines.cli import options
 from pipelines.cli.printing import print_json, print_table, remark
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
+from schemas.errors import STATION
 
 if TYPE_CHECKING:
     from schemas.lot import Lot
@@ -33,7 +34,6 @@ def check(
     """
     from dataclasses import asdict
 
-    from schemas.errors import STATION
     from schemas.station import load_station
     from stations.serving import look
 

@@ -10,6 +10,7 @@ import typer
 from pipelines.cli import options
 from pipelines.cli.printing import console, print_json, remark, say
 from pipelines.cli.station_lot import DeviceOption, UnitsOption, made_up
+from schemas.errors import STATION
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -35,7 +36,6 @@ def status(
 
     Nothing is moved and no lease is needed: a run in progress is not disturbed.
     """
-    from schemas.errors import STATION
     from schemas.station import load_station
     from stations.overview import looked_at
 

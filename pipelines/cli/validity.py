@@ -10,6 +10,7 @@ from typing import Any
 from pipelines.archive import Archive, Run
 from pipelines.certificates import Calibration
 from pipelines.cli.printing import print_json, print_table, remark, say
+from schemas.errors import WrongUse
 
 MADE = ("stage", "code", "key", "libraries", "schema", "inputs", "parameters", "who", "where", "when")
 
@@ -26,7 +27,6 @@ def show_validity(archive: Archive, serial: str, at: str, known: str, *, as_json
     """Print the calibration that is valid on a day; return whether there is one."""
     from pipelines.certificates import Ledger
     from pipelines.certificates.days import day_of, today
-    from schemas.errors import WrongUse
 
     day = day_of(at, "--at") if at else today()
     history = Ledger(archive).calibrations(serial, day_of(known, "--known") if known else "")

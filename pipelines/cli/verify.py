@@ -8,10 +8,11 @@ from typing import Annotated
 import typer
 
 from inertial.counts import number_of
+from pipelines.archive import Archive
 from pipelines.cli import options
 from pipelines.cli.printing import console, error_console, give
 from pipelines.integrity import Report
-from schemas.errors import DONE, PART_FAILED
+from schemas.errors import DONE, PART_FAILED, WrongUse
 
 SHOWN = 8  # consequences of one finding
 
@@ -71,12 +72,10 @@ def command(
     the XML is made again from the archive and compared whole, and revoked and replaced certificates are found. Exit status 1:
     there are findings, or nothing proves where a certificate comes from.
     """
-    from pipelines.archive import Archive
     from pipelines.archive.signatures import public_keys
     from pipelines.audit.index_check import check_index
     from pipelines.cli.certificate_check import certificate_files, check_certificates
     from pipelines.integrity import verify
-    from schemas.errors import WrongUse
 
     if files := certificate_files(runs or ()):
         accepted = check_certificates(files, trust or (), archive, laboratory, as_json=as_json)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from pipelines.archive import Archive
 from pipelines.cli.printing import remark, say
 from schemas.errors import WrongUse
 
@@ -18,8 +19,6 @@ EXAMPLES = (
     "tumbleline workbench",
     "tumbleline workbench archive --port 8765",
 )
-
-PATIENCE_S = 2  # open streams would hold up the end of the server
 
 
 def command(
@@ -73,9 +72,8 @@ def command(
 
     import uvicorn
 
-    from pipelines.archive import Archive
-    from pipelines.cli.serving_pages import run_until_stopped
-    from pipelines.serving.connections import MOST, ConnectionLimits, TimedRequests
+    from pipelines.cli.serving_pages import page_server, run_until_stopped
+    from pipelines.serving.connections import MOST, ConnectionLimits
     from pipelines.serving.listening import listening_socket
     from pipelines.workbench.application import create_app
     from pipelines.workbench.settings import WorkbenchSettings
@@ -101,10 +99,5 @@ def command(
         say(f"{settings.address}/?token={settings.token}")
         sys.stdout.flush()  # a program that started it waits for the address
         remark("Open the address above; Ctrl-C ends the workbench.")
-        config = uvicorn.Config(
-            TimedRequests(app, place.connections), host=host, port=listening, log_level="warning", access_log=False,
-            server_header=False, ws="none", timeout_graceful_shutdown=PATIENCE_S,
-            ssl_certfile=certificate, ssl_keyfile=key, proxy_headers=False,
-        )  # fmt: skip
-        servers.append(uvicorn.Server(config))
+        servers.append(page_server(app, place, certificate, key))
         run_until_stopped(servers[0], place, "workbench")
