@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from pipelines.cli import options
-from pipelines.cli.printing import print_json, print_table, say
+from pipelines.cli.printing import give, print_table, say
 from schemas.errors import WrongUse, did_you_mean
 
 PART = "Measure"
@@ -36,25 +36,20 @@ def command(
     """
     if subject and subject not in SUBJECTS:
         raise WrongUse(f"keys: no list is called '{subject}'; {did_you_mean(subject, SUBJECTS)}")
-    if not subject:
-        rows = [{"subject": name, "meaning": text} for name, (text, _) in SUBJECTS.items()]
-        document: dict[str, Any] = {"subject": "", "rows": rows}
-    else:
-        document = {"subject": subject, "rows": SUBJECTS[subject][1]()}
-    if as_json:
-        print_json(document)
-        return
-    _print(document["rows"])
-    if not subject:
-        say("tumbleline keys SUBJECT shows a list")
+    subjects = [{"subject": name, "meaning": text} for name, (text, _) in SUBJECTS.items()]
+    rows = SUBJECTS[subject][1]() if subject else subjects
+    give({"subject": subject, "rows": rows}, lambda _: _print(rows), as_json=as_json)
 
 
 def _print(rows: list[dict[str, str]]) -> None:
     """Rows in two columns, name and meaning, with one table for each table of the file."""
     for table in dict.fromkeys(row.get("table", "") for row in rows):
-        own = [row for row in rows if row.get("table", "") == table]
-        head = next(name for name in own[0] if name != "table")
-        print_table([head, "meaning"], [[row[head], _text(row, head)] for row in own], f"[{table}]" if table else "")
+        of_table = [row for row in rows if row.get("table", "") == table]
+        head = next(name for name in of_table[0] if name != "table")
+        lines = [[row[head], _text(row, head)] for row in of_table]
+        print_table([head, "meaning"], lines, f"[{table}]" if table else "")
+    if rows and "subject" in rows[0]:
+        say("tumbleline keys SUBJECT shows a list")
 
 
 def _text(row: dict[str, str], head: str) -> str:

@@ -67,10 +67,10 @@ def command(
         return
     if prov is None and crate is None:
         _print(tree_of(traced))
-    for what in ([f"PROV in {prov}"] if prov else []) + (
-        [f"RO-Crate with {number_of(copied, 'file')} in {crate}"] if crate else []
-    ):
-        say(what)
+    if prov is not None:
+        say(f"PROV in {prov}")
+    if crate is not None:
+        say(f"RO-Crate with {number_of(copied, 'file')} in {crate}")
 
 
 def _print(tree: Tree) -> None:

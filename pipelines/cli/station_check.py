@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -16,7 +15,7 @@ from schemas.errors import STATION
 if TYPE_CHECKING:
     from schemas.lot import Lot
     from schemas.station import StationConfig
-    from stations.self_test import CheckResult, SelfTestBench
+    from stations.self_test import CheckResult
     from stations.serving import RegisterReading
 
 
@@ -62,25 +61,15 @@ def _tested(config: StationConfig, device: str, units: int) -> list[CheckResult]
     history = read_history(path)
     lot = made_up(device, units, 1, repeat=len(history)) if config.kind == "simulated" else _seated(config)
     if lot is None:
-        return [
-            CheckResult(
-                "slots",
-                "reader",
-                ok=False,
-                message="reader: no slot is occupied, at least one unit is needed; seat a unit",
-            )
-        ]
+        message = "reader: no slot is occupied, at least one unit is needed; seat a unit"
+        return [CheckResult("slots", "reader", ok=False, message=message)]
     with open_station(config, lot, run="station check") as opened:
         bench = SelfTestBench(opened, config.self_test, history)
         findings = bench.run()
-    _keep(path, bench, keep)
-    return findings
-
-
-def _keep(path: Path, bench: SelfTestBench, keep: Any) -> None:
     controlled = [finding.ok for finding in bench.findings if finding.check in {"offset", "scale"}]
     if bench.standard is not None and controlled and all(controlled):
         keep(path, bench.standard)
+    return findings
 
 
 def _seated(config: StationConfig) -> Lot | None:
