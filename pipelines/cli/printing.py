@@ -70,11 +70,13 @@ def give(document: Any, show: Callable[[Any], object], *, as_json: bool) -> None
         show(document)
 
 
-def give_lines(
-    document: Any, lines: Iterable[str], *, as_json: bool, show: Callable[[str], object] | None = None
-) -> None:
+def give_lines(document: Any, lines: Iterable[str], *, as_json: bool, show: Callable[[str], object] = say) -> None:
     """The result of a command: its document as JSON, or lines for people, which ``show`` prints."""
-    give(document, lambda _: [(show or say)(line) for line in lines], as_json=as_json)
+    if as_json:
+        print_json(document)
+        return
+    for line in lines:
+        show(line)
 
 
 def print_json(document: Any) -> None:

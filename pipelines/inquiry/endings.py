@@ -56,8 +56,7 @@ def no_follow_up(joint: JointDiagnosis) -> str:
         return f"no measurement on this station discriminates between {ambiguous_classes(joint)}"
     return (
         f"no follow-up was found that is expected to discriminate between {ambiguous_classes(joint)}: they differ too little "
-        "beside the "
-        "noise; measure the plan again with longer dwells, or more units"
+        "beside the noise; measure the plan again with longer dwells, or more units"
     )
 
 
